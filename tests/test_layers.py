@@ -75,7 +75,16 @@ PURE_FILES = (
     }
     | {
         PACKAGE / "bridge" / "ros2" / name
-        for name in ("layouts.py", "links.py", "rules.py", "service_links.py", "statics.py")
+        for name in (
+            "action_links.py",
+            "action_messages.py",
+            "layouts.py",
+            "links.py",
+            "parameter_values.py",
+            "rules.py",
+            "service_links.py",
+            "statics.py",
+        )
     }
     | {
         PACKAGE / "bridge" / "fleet" / name

@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge`: topics and services of ROS 1 for ROS 2, and back, beside an installed ROS 2 (docs/ros2.md)."""
+"""`minirospy ros2-bridge`: topics, services, actions between ROS 1 and ROS 2, beside an installed ROS 2 (docs/ros2.md)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from minirospy.cli.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
+    from minirospy.bridge.ros2.actions import ActionPair
     from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge
     from minirospy.bridge.ros2.services import ServicePair
 
@@ -30,8 +31,8 @@ def _parser() -> Parser:
     parser = Parser(
         "minirospy ros2-bridge",
         "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports. "
-        "A topic is bridged while it has a publisher on one side and a subscriber on the other, a service while one "
-        "side offers it.",
+        "A topic is bridged while it has a publisher on one side and a subscriber on the other, a service or "
+        "an action while one side offers it.",
     )
     parser.add_argument(
         "--topics",
@@ -48,6 +49,14 @@ def _parser() -> Parser:
         metavar="GLOB",
         help="services that are bridged (all)",
         completer="services",
+    )
+    parser.add_argument(
+        "--actions",
+        action="append",
+        default=[],
+        metavar="GLOB",
+        help="actions that are bridged (all)",
+        completer="topics",
     )
     parser.add_argument(
         "--call-timeout",
@@ -70,7 +79,12 @@ def _parser() -> Parser:
 
 
 def _ros2_bridge(
-    topics: Sequence[str], services: Sequence[str], call_timeout: float, rules: str, list: bool
+    topics: Sequence[str],
+    services: Sequence[str],
+    actions: Sequence[str],
+    call_timeout: float,
+    rules: str,
+    list: bool,
 ) -> int:
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
@@ -89,7 +103,11 @@ def _ros2_bridge(
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
     require_rclpy()
     options = Ros2Options(
-        NameFilter.of(topics), NameFilter.of(services), call_seconds=call_timeout, rules=known
+        NameFilter.of(topics),
+        NameFilter.of(services),
+        NameFilter.of(actions),
+        call_seconds=call_timeout,
+        rules=known,
     )
     catalogue = Catalogue(Packages().folders())
 
@@ -131,17 +149,24 @@ class _Listing:
         await self._bridge.close()
 
 
-def _table(pairs: Sequence[Pair | ServicePair]) -> list[str]:
+def _table(pairs: Sequence[Pair | ServicePair | ActionPair]) -> list[str]:
     from minirospy.bridge.ros2.links import Link
+    from minirospy.bridge.ros2.service_links import ServiceLink
 
     if not pairs:
         return [
-            "no topic has a publisher on one side and a subscriber on the other, and no service is offered"
+            "no topic has a publisher on one side and a subscriber on the other, and nothing else is offered"
         ]
     lines = []
     for pair in pairs:
         link = pair.link
-        name = link.topic if isinstance(link, Link) else f"{link.service}  service"
+        match link:
+            case Link():
+                name = link.topic
+            case ServiceLink():
+                name = f"{link.service}  service"
+            case _:
+                name = f"{link.action}  action"
         head = f"{name}  {link.direction.value}  ROS 1 {link.ros1_type}  ROS 2 {link.ros2_type}"
         kept = "  latched" if isinstance(link, Link) and link.is_latched else ""
         lines.append(f"{head}  not bridged: {pair.reason}" if pair.reason else f"{head}{kept}")

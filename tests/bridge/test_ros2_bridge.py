@@ -20,6 +20,9 @@ from minirospy.bridge.access import NameFilter
 from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
+from minirospy.bridge.ros2.parameter_values import Value
+from minirospy.bridge.ros2.rclpy_actions import Accept, Ros2Goal
+from minirospy.bridge.ros2.rclpy_parameters import ParameterStore
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
 from minirospy.bridge.ros2.statics import StaticTransforms
 from minirospy.cli.ros2_bridge import main
@@ -253,6 +256,62 @@ class FakeServer:
         self.is_closed = True
 
 
+@dataclass
+class FakeGoal:
+    ended: Future[tuple[int, bytes]] = field(default_factory=Future)
+    is_cancelled: bool = False
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+
+    def result(self) -> Future[tuple[int, bytes]]:
+        return self.ended
+
+
+@dataclass
+class FakeActionClient:
+    """A client whose server accepts each goal, or refuses it."""
+
+    is_ready: bool = True
+    accepts: bool = True
+    goals: list[tuple[bytes, Callable[[bytes], None], FakeGoal]] = field(default_factory=list)
+    is_closed: bool = False
+
+    def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
+        self.goals.append((goal, feedback, FakeGoal()))
+        accepted: Future[Ros2Goal | None] = Future()
+        accepted.set_result(self.goals[-1][2] if self.accepts else None)
+        return accepted
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+@dataclass
+class FakeActionServer:
+    accept: Accept
+    is_closed: bool = False
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+class FakeParameters:
+    """The parameters of one node."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Value] = {}
+
+    def names(self, node: str) -> list[str]:
+        return list(self.values)
+
+    def get(self, node: str, name: str) -> Value:
+        return self.values.get(name, Value(0))
+
+    def set(self, node: str, name: str, value: Value) -> None:
+        self.values[name] = value
+
+
 class FakeSide:
     """A ROS 2 that a test holds in its hands."""
 
@@ -265,6 +324,9 @@ class FakeSide:
         self.offered: dict[str, str] = {}
         self.clients: dict[str, FakeClient] = {}
         self.servers: dict[str, FakeServer] = {}
+        self.action_clients: dict[str, FakeActionClient] = {}
+        self.action_servers: dict[str, FakeActionServer] = {}
+        self.parameters = FakeParameters()
         self.is_closed = False
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
@@ -311,6 +373,27 @@ class FakeSide:
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> FakeServer:
         self.servers[service] = FakeServer(answer)
         return self.servers[service]
+
+    def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+        if type_ != "example_interfaces/Fibonacci":
+            raise TypesDiffer(f"the action type [{type_}] is not installed in ROS 2")
+        sequence = {"sequence": "sequence<int32>"}
+        return {"order": "int32"}, sequence, sequence
+
+    def action_client(self, action: str, type_: str) -> FakeActionClient:
+        self.action_clients[action] = FakeActionClient()
+        return self.action_clients[action]
+
+    def action_server(self, action: str, type_: str, accept: Accept) -> FakeActionServer:
+        self.action_servers[action] = FakeActionServer(accept)
+        return self.action_servers[action]
+
+    def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> FakeServer:
+        self.store = store
+        return FakeServer(lambda _: Future())
+
+    def node_parameters(self) -> FakeParameters:
+        return self.parameters
 
     def close(self) -> None:
         self.is_closed = True

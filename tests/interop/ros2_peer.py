@@ -6,7 +6,12 @@
 field; with "silent" it never answers
 {"op": "call", "topic": ..., "type": ..., "fields": [{...}, ...]}: once the service is there; says each answer, in any order
 {"op": "call_raw", "topic": ..., "type": ..., "data": hex of the CDR}: the same, with all fields
-{"op": "close", "topic": ...}: its publisher, subscription, service and client
+{"op": "declare", "topic": name of a parameter, "value": ...}
+{"op": "act", "topic": ..., "type": ..., "waits": false}: a server of a Fibonacci action: refuses a negative order, aborts 13;
+with "waits" each goal ends when it is cancelled
+{"op": "goal", "topic": ..., "type": ..., "fields": {...}}: once the server is there; says its feedback and end
+{"op": "cancel", "topic": ...}: the last goal
+{"op": "close", "topic": ...}: its publisher, subscription, service, action and clients
 """
 
 import importlib
@@ -16,6 +21,7 @@ import threading
 import time
 
 import rclpy
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -42,8 +48,15 @@ def class_of(name, kind="msg"):
 
 def made(class_, fields):
     found = class_()
+    types = class_.get_fields_and_field_types()
     for name, value in fields.items():
-        setattr(found, name, value)
+        base = types[name].removeprefix("sequence<").removesuffix(">")
+        if isinstance(value, dict):
+            setattr(found, name, made(class_of(base), value))
+        elif isinstance(value, list) and "/" in base:
+            setattr(found, name, [made(class_of(base), each) for each in value])
+        else:
+            setattr(found, name, value)
     return found
 
 
@@ -61,12 +74,13 @@ class Peer:
     """The node; a method for each operation, which gets the command."""
 
     def __init__(self):
-        self.node = rclpy.create_node("peer", enable_rosout=False, start_parameter_services=False)
+        self.node = rclpy.create_node("peer", enable_rosout=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.thread = threading.Thread(target=self.spin)
         self.thread.start()
         self.publishers, self.subscriptions, self.services, self.clients = {}, {}, {}, {}
+        self.action_servers, self.action_clients, self.goals = {}, {}, {}
 
     def spin(self):
         try:
@@ -136,7 +150,76 @@ class Peer:
         for request in requests:
             self.clients[topic].call_async(request).add_done_callback(answered)
 
+    def declare(self, name, command):
+        self.node.declare_parameter(name, command["value"])
+
+    async def pause(self):
+        passed = Future(executor=self.executor)
+        timer = self.node.create_timer(0.05, lambda: passed.set_result(None))
+        await passed
+        self.node.destroy_timer(timer)
+
+    def act(self, topic, command):
+        class_ = class_of(command["type"], "action")
+
+        async def execute(handle):
+            order = handle.request.order
+            say(op="request", topic=topic, fields={"order": str(order)})
+            result, feedback = class_.Result(), class_.Feedback()
+            for number in range(order):
+                result.sequence = [*result.sequence, number]
+                feedback.sequence = result.sequence
+                handle.publish_feedback(feedback)
+            while command.get("waits") and not handle.is_cancel_requested:
+                await self.pause()
+            if handle.is_cancel_requested:
+                handle.canceled()
+            elif order == 13:
+                handle.abort()
+            else:
+                handle.succeed()
+            return result
+
+        self.action_servers[topic] = ActionServer(
+            self.node,
+            class_,
+            topic,
+            execute,
+            goal_callback=lambda goal: GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    def goal(self, topic, command):
+        class_ = class_of(command["type"], "action")
+        if topic not in self.action_clients:
+            self.action_clients[topic] = ActionClient(self.node, class_, topic)
+        client = self.action_clients[topic]
+        client.wait_for_server()
+
+        def feedback(message):
+            say(op="feedback", topic=topic, data=list(message.feedback.sequence))
+
+        def ended(future):
+            response = future.result()
+            say(op="end", topic=topic, status=response.status, data=list(response.result.sequence))
+
+        def accepted(future):
+            handle = self.goals[topic] = future.result()
+            say(op="accepted", topic=topic, is_accepted=handle.accepted)
+            if handle.accepted:
+                handle.get_result_async().add_done_callback(ended)
+
+        goal = made(class_.Goal, command["fields"])
+        client.send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+
+    def cancel(self, topic, _):
+        self.goals[topic].cancel_goal_async()
+
     def close(self, topic, _):
+        for parts in (self.action_servers, self.action_clients):
+            if topic in parts:
+                parts.pop(topic).destroy()
         for parts, destroy in (
             (self.publishers, self.node.destroy_publisher),
             (self.subscriptions, self.node.destroy_subscription),

@@ -15,11 +15,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from rosbags.typesys import Stores, get_typestore
 
 from minirospy import Node
+from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import RawService, call_raw, raw_class
 from minirospy.errors import ServiceException
+from minirospy.graph.goals import GoalState
 from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.loop import LoopThread
@@ -46,6 +49,11 @@ TYPES = [
     "sensor_msgs/NavSatFix", "sensor_msgs/PointCloud2", "nav_msgs/OccupancyGrid", "nav_msgs/Odometry", "nav_msgs/Path",
     "diagnostic_msgs/DiagnosticArray",
 ]  # fmt: skip
+
+
+RULES = """
+- {ros1_package_name: actionlib_tutorials, ros1_action_name: Fibonacci, ros2_package_name: test_msgs, ros2_action_name: Fibonacci}
+"""
 
 
 class Peer:
@@ -200,7 +208,7 @@ class Scene:
 
 
 @pytest.fixture(scope="module")
-def scene() -> Iterator[Scene]:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
     with contextlib.ExitStack() as parts:
         uri = parts.enter_context(running_master("ours"))
         # A domain that no other test has: from the port, which is this test's alone.
@@ -212,7 +220,10 @@ def scene() -> Iterator[Scene]:
             "ROS_DOMAIN_ID": domain,
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         }
-        code = "import sys; from minirospy.cli.main import main; sys.exit(main(['ros2-bridge']))"
+        rules = tmp_path_factory.mktemp("ros2") / "rules.yaml"
+        rules.write_text(RULES)
+        words = ["ros2-bridge", "--rules", str(rules)]
+        code = f"import sys; from minirospy.cli.main import main; sys.exit(main({words}))"
         bridge = subprocess.Popen([str(PYTHON), "-c", code], env=environment)
 
         def end() -> None:
@@ -500,3 +511,172 @@ def test_a_service_with_nested_types_passes_byte_by_byte(scene: Scene) -> None:
     assert asked[0][-4:] == b"\0\0\0\x3f"
     scene.end(server)
     scene.peer.do("close", "/plan")
+
+
+# --- parameters
+
+
+def test_parameters_of_ros1_are_those_of_the_bridge_in_ros2(scene: Scene) -> None:
+    bridge = "/minirospy_ros2_bridge"
+
+    def call(service: str, **fields: Any) -> dict[str, str]:
+        type_ = "rcl_interfaces/" + service.title().replace("_", "")
+        scene.peer.do("call", f"{bridge}/{service}", type=type_, fields=[fields])
+        return scene.peer.answer(f"{bridge}/{service}")
+
+    async def set_up() -> None:
+        await scene.node.set_param("/robot", {"speed": 1.5, "name": "r2", "ids": [1, 2], "on": True})
+
+    scene.run(set_up())
+    listed = call("list_parameters", prefixes=["robot"])["result"]
+    assert "names=['robot.ids', 'robot.name', 'robot.on', 'robot.speed'], prefixes=['robot']" in listed
+    values = call("get_parameters", names=["robot.speed", "robot.name", "robot.none"])["values"]
+    assert "type=3" in values
+    assert "double_value=1.5" in values
+    assert "string_value='r2'" in values
+    assert values.count("type=0") == 1
+    assert call("get_parameter_types", names=["robot.ids"])["types"] in ("array('B', [7])", "b'\\x07'")
+
+    parameter = {"name": "robot.speed", "value": {"type": 2, "integer_value": 3}}
+    assert "successful=True" in call("set_parameters", parameters=[parameter])["results"]
+    assert scene.run(scene.node.get_param("/robot/speed")) == 3
+    parameter["value"] = {"type": 2, "integer_value": 2**40}
+    refused = call("set_parameters_atomically", parameters=[parameter])["result"]
+    assert "successful=False" in refused
+    assert "does not fit into the 32 bits" in refused
+
+
+def test_parameters_of_ros2_are_reached_by_services_of_ros1(scene: Scene) -> None:
+    scene.peer.do("declare", "gain", value=0.5)
+    bridge = "/minirospy_ros2_bridge"
+
+    def call(service: str, type_: str, *texts: str) -> bytes:
+        (response,) = scene.call(f"{bridge}/{service}", type_, b"".join(map(text, texts)))
+        if isinstance(response, BaseException):
+            raise response
+        return response
+
+    names = call("get_param_names", "rosapi/GetParamNames")
+    assert text("/peer:gain") in names
+    assert call("get_param", "rosapi/GetParam", "/peer:gain", "") == text("0.5")
+    assert call("set_param", "rosapi/SetParam", "/peer:gain", "0.75") == b""
+    assert call("get_param", "rosapi/GetParam", "/peer:gain", "") == text("0.75")
+    assert call("get_param", "rosapi/GetParam", "/peer:none", "7") == text("7")
+    with pytest.raises(ServiceException, match=r"refuses \[none\]"):
+        call("set_param", "rosapi/SetParam", "/peer:none", "1")
+    with pytest.raises(ServiceException, match="write /node:parameter"):
+        call("get_param", "rosapi/GetParam", "gain", "")
+
+
+# --- actions
+
+FIBONACCI = "test_msgs/Fibonacci"
+
+
+def test_goals_of_ros1_reach_a_server_of_ros2(scene: Scene) -> None:
+    scene.peer.do("act", "/count", type=FIBONACCI)
+    scene.peer.do("act", "/wait", type=FIBONACCI, waits=True)
+
+    async def count() -> None:
+        async with ActionClient(scene.node, "/count", FibonacciAction) as client:
+            await client.wait_for_server()
+            goal = client.send(FibonacciGoal(order=5))
+            feedback = [list(each.sequence) async for each in goal]
+            assert feedback == [list(range(number + 1)) for number in range(5)]
+            assert list((await goal).sequence) == [0, 1, 2, 3, 4]
+            assert await ended(client.send(FibonacciGoal(order=-1))) == (GoalState.REJECTED, [])
+            assert await ended(client.send(FibonacciGoal(order=13))) == (GoalState.ABORTED, list(range(13)))
+            goals = [client.send(FibonacciGoal(order=number)) for number in range(8)]
+            for number, goal in enumerate(goals):
+                assert list((await goal).sequence) == list(range(number))
+
+    async def cancel() -> None:
+        async with ActionClient(scene.node, "/wait", FibonacciAction) as client:
+            await client.wait_for_server()
+            goal = client.send(FibonacciGoal(order=3))
+            # It is at work.
+            async for feedback in goal:
+                if len(feedback.sequence) == 3:
+                    break
+            goal.cancel()
+            assert await ended(goal) == (GoalState.PREEMPTED, [0, 1, 2])
+
+    scene.run(count())
+    scene.run(cancel())
+    for name in ("/count", "/wait"):
+        scene.peer.do("close", name)
+    scene.until(lambda graph: "/count/result" not in graph.publishers)
+
+
+async def ended(goal: Any) -> tuple[GoalState, list[int]]:
+    """Return how a goal has ended that was not reached."""
+    with pytest.raises(GoalError) as caught:
+        await goal
+    return caught.value.state, list(getattr(caught.value.result, "sequence", []))
+
+
+def test_a_goal_of_ros1_is_aborted_when_its_server_in_ros2_ends(scene: Scene) -> None:
+    other = Peer(scene.environment)
+    try:
+        other.do("act", "/leaving", type=FIBONACCI, waits=True)
+
+        async def start() -> tuple[Any, Any]:
+            client = ActionClient(scene.node, "/leaving", FibonacciAction)
+            await client.wait_for_server()
+            return client, client.send(FibonacciGoal(order=1))
+
+        client, goal = scene.run(start())
+        other.wait(lambda each: each["op"] == "request")
+    finally:
+        other.close()
+
+    async def end() -> None:
+        state, _ = await ended(goal)
+        assert state is GoalState.ABORTED
+        assert "in ROS 2 has ended" in goal.text
+        await client.close()
+
+    scene.run(end())
+
+
+def test_goals_of_ros2_reach_a_server_of_ros1(scene: Scene) -> None:
+    async def execute(goal: Any) -> dict[str, list[int]]:
+        sequence: list[int] = []
+        for number in range(goal.request.order):
+            sequence.append(number)
+            await goal.publish_feedback(sequence)
+        if goal.request.order == 13:
+            raise GoalError("unlucky", {"sequence": sequence})
+        if goal.request.order == 7:
+            try:
+                await asyncio.sleep(LIMIT)
+            except asyncio.CancelledError:
+                return {"sequence": sequence}
+        return {"sequence": sequence}
+
+    async def start() -> Any:
+        return await ActionServer(
+            scene.node, "/back/count", FibonacciAction, execute, accepts=lambda goal: goal.order >= 0
+        )
+
+    def end_of(order: int, *, is_cancelled: bool = False) -> tuple[int, list[int]]:
+        scene.peer.do("goal", "/back/count", type=FIBONACCI, fields={"order": order})
+        assert scene.peer.wait(lambda each: each["op"] == "accepted")["is_accepted"] == (order >= 0)
+        if order < 0:
+            return 0, []
+        if is_cancelled:
+            for number in range(order):
+                feedback = scene.peer.wait(lambda each: each["op"] == "feedback")
+                assert feedback["data"] == list(range(number + 1))
+            scene.peer.do("cancel", "/back/count")
+        found = scene.peer.wait(lambda each: each["op"] == "end")
+        return found["status"], found["data"]
+
+    server = scene.run(start())
+    # Of a goal that is at work all feedback comes; rclpy drops what it has not read when the result comes.
+    assert end_of(7, is_cancelled=True) == (5, list(range(7)))
+    assert end_of(5) == (4, [0, 1, 2, 3, 4])
+    assert end_of(-1) == (0, [])
+    assert end_of(13) == (6, list(range(13)))
+    scene.end(server)
+    scene.peer.do("close", "/back/count")

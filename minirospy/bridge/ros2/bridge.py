@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
+from minirospy.bridge.ros2.actions import ActionBridge, ActionPair
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, is_bridge, links, marker
+from minirospy.bridge.ros2.parameters import ParameterBridge
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules
 from minirospy.bridge.ros2.services import ServiceBridge, ServicePair
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
@@ -41,7 +43,7 @@ from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.ros2.side import Ros2Handle, Ros2Publisher, Ros2Side
+    from minirospy.bridge.ros2.interface import Ros2Handle, Ros2Publisher, Ros2Side
 
 __all__ = ["Pair", "Ros2Bridge", "Ros2Options"]
 
@@ -57,13 +59,14 @@ _ROS1_QUEUE = 100
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """``topics``, ``services``: which may be bridged. ``call_seconds``: how long a call of a service may take.
+    """``topics``, ``services``, ``actions``: which may be bridged. ``call_seconds``: how long a call of a service may take.
 
     ``slowest_look``: seconds between looks at graphs that do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
     services: NameFilter = field(default_factory=NameFilter)
+    actions: NameFilter = field(default_factory=NameFilter)
     call_seconds: float = 60.0
     rules: Rules = BUILT_IN
     slowest_look: float = 1.0
@@ -125,7 +128,7 @@ class _Types:
 
 
 class Ros2Bridge:
-    """Bridges topics while both sides have an end, and services while one side offers them.
+    """Bridges topics while both sides have an end, services and actions while one side offers them, and parameters.
 
     On the node's loop; messages of ROS 2 pass in its executor's thread.
     """
@@ -140,32 +143,39 @@ class Ros2Bridge:
         self.services = ServiceBridge(
             node, side, options.services, options.rules, catalogue, options.call_seconds
         )
+        self.actions = ActionBridge(node, side, options.actions, options.rules, catalogue)
+        self._parameters = ParameterBridge(node, side, catalogue)
         self._types = _Types(side, options.rules, catalogue)
         self._texts = TypeTexts(node)
         self._headers: dict[tuple[str, str], Header] = {}
         self._watching: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
+        self._is_closed = False
 
     async def start(self) -> None:
         """Bridge until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        await self._parameters.start()
         await self.look()
         self._watching = asyncio.ensure_future(self._watch())
 
     async def close(self) -> None:
         """Close all links, and the side of ROS 2. Idempotent."""
+        self._is_closed = True
         watching, self._watching = self._watching, None
         if watching:
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
         for link in list(self.links):
             await self._close_link(link)
+        await self.actions.close()
         await self.services.close()
+        await self._parameters.close()
         await self._texts.close()
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
-    async def pairs(self) -> list[Pair | ServicePair]:
+    async def pairs(self) -> list[Pair | ServicePair | ActionPair]:
         """Return what would be bridged, and why something is not; opens nothing. Raises as :meth:`look`."""
-        found: list[Pair | ServicePair] = []
+        found: list[Pair | ServicePair | ActionPair] = []
         snapshot = await self._snapshot()
         for link in await self._wanted(snapshot):
             try:
@@ -174,7 +184,7 @@ class Ros2Bridge:
                 found.append(Pair(link, str(error)))
             else:
                 found.append(Pair(link))
-        return [*found, *await self.services.pairs(snapshot.services)]
+        return [*found, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Return when ``condition`` holds after a look."""
@@ -197,6 +207,7 @@ class Ros2Bridge:
                 self.refused[link] = str(error)
                 self.node.log.warning("%s is not bridged (%s): %s", link.topic, link.direction.value, error)
         has_changed = await self.services.look(snapshot.services)
+        has_changed |= await self.actions.look(snapshot)
         self._changed.set()
         self._changed = asyncio.Event()
         return bool(gone or new) or has_changed
@@ -204,7 +215,8 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _FASTEST_LOOK
         is_reported = False
-        while True:
+        # In Python 3.11 wait_for, which calls use, may swallow a cancellation.
+        while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
             try:

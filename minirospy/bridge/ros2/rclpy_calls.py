@@ -10,6 +10,7 @@ import contextlib
 import importlib
 from collections.abc import Callable, Coroutine, Generator
 from concurrent.futures import CancelledError, Future, InvalidStateError
+from types import TracebackType
 from typing import Protocol, TypeVar
 
 from minirospy.errors import BridgeError, MinirospyError
@@ -22,6 +23,7 @@ __all__ = [
     "MessageClass",
     "NotAnsweredError",
     "RclpyFuture",
+    "RclpySubscription",
     "Server",
     "ServiceClass",
     "ServiceNode",
@@ -74,6 +76,24 @@ class RclpyFuture(Protocol):
     def __await__(self) -> Generator[None, None, object]: ...
 
 
+class RclpyHandle(Protocol):
+    """The handle of a subscription, which is entered while it is used."""
+
+    def __enter__(self) -> object: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def take_message(self, class_: MessageClass, raw: bool, /) -> tuple[bytes, object] | None: ...
+
+
+class RclpySubscription(Protocol):
+    """A subscription of rclpy."""
+
+    handle: RclpyHandle
+
+
 class Executor(Protocol):
     """An executor of rclpy."""
 
@@ -110,6 +130,12 @@ class ServiceNode(Protocol):
         qos_profile: object,
         callback_group: object,
     ) -> object: ...
+
+    def create_subscription(
+        self, class_: MessageClass, topic: str, callback: Callable[[bytes], None], depth: int, /, *, raw: bool
+    ) -> RclpySubscription: ...
+
+    def destroy_subscription(self, subscription: RclpySubscription, /) -> bool: ...
 
     def destroy_client(self, client: _RclpyClient) -> bool: ...
 
@@ -150,13 +176,23 @@ class Calls:
         """Offer a service."""
         return Server(self, name, class_, answer)
 
-    async def result(self, future: Future[_T]) -> _T:
-        """Return what a future of another thread brings, in a coroutine of the executor."""
+    async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
+        """Return what a future of another thread brings, in a coroutine of the executor.
+
+        ``after_tasks``: after what the other thread has given to the executor before.
+        """
         waiting = self._future(executor=self.executor)
 
-        def done(_: object) -> None:
+        def finish() -> None:
             waiting.set_result(None)
+            # A coroutine that waits is resumed at the executor's next round.
             self.executor.wake()
+
+        def done(_: object) -> None:
+            if after_tasks:
+                self.executor.create_task(finish)
+            else:
+                finish()
 
         future.add_done_callback(done)
         await waiting

@@ -40,10 +40,11 @@ _NO_RULE = TypeRule()
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules by type: of messages ``pkg/Name``, of services the same in ``services``, of their halves with the suffix of ROS 1."""
+    """Rules by type: ``pkg/Name`` of messages, services and actions; those of their parts are messages, named as in ROS 1."""
 
     messages: Mapping[str, TypeRule] = field(default_factory=dict)
     services: Mapping[str, TypeRule] = field(default_factory=dict)
+    actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
         """Return the rule of a message type, an empty one where there is none."""
@@ -65,15 +66,31 @@ class Rules:
         """Return the names that a service type may have in ROS 2."""
         return self.services.get(ros1_type, _NO_RULE).names or (ros1_type,)
 
+    def ros2_actions(self, ros1_type: str) -> tuple[str, ...]:
+        """Return the names that an action type may have in ROS 2."""
+        return self.actions.get(ros1_type, _NO_RULE).names or (ros1_type,)
+
+    def ros1_actions(self, ros2_type: str) -> tuple[str, ...]:
+        """Return the names that an action type of ROS 2 may have in ROS 1."""
+        return _of_ros1(self.actions, ros2_type)
+
     def ros1_services(self, ros2_type: str) -> tuple[str, ...]:
         """Return the names that a service type of ROS 2 may have in ROS 1."""
-        renamed = [name for name, rule in self.services.items() if ros2_type in rule.names]
-        kept = ros2_type if not self.services.get(ros2_type, _NO_RULE).names else ""
-        return (*([kept] if kept else []), *renamed)
+        return _of_ros1(self.services, ros2_type)
 
     def with_(self, other: Rules) -> Rules:
         """Return these rules, where ``other`` has none for a type."""
-        return Rules({**self.messages, **other.messages}, {**self.services, **other.services})
+        return Rules(
+            {**self.messages, **other.messages},
+            {**self.services, **other.services},
+            {**self.actions, **other.actions},
+        )
+
+
+def _of_ros1(rules: Mapping[str, TypeRule], ros2_type: str) -> tuple[str, ...]:
+    renamed = [name for name, rule in rules.items() if ros2_type in rule.names]
+    kept = [] if rules.get(ros2_type, _NO_RULE).names else [ros2_type]
+    return (*kept, *renamed)
 
 
 def snake_case(name: str) -> str:
@@ -115,6 +132,11 @@ BUILT_IN = Rules(
             "rospy_tutorials/AddTwoInts": TypeRule(names=("example_interfaces/AddTwoInts",)),
         }
     ),
+    MappingProxyType(
+        {
+            "actionlib_tutorials/Fibonacci": TypeRule(names=("example_interfaces/Fibonacci",)),
+        }
+    ),
 )
 """The rules of the usual packages."""
 
@@ -123,12 +145,17 @@ _KEYS = {
     "ros1_package_name",
     "ros1_message_name",
     "ros1_service_name",
+    "ros1_action_name",
     "ros2_package_name",
     "ros2_message_name",
     "ros2_service_name",
+    "ros2_action_name",
     "fields_1_to_2",
     "request_fields_1_to_2",
     "response_fields_1_to_2",
+    "goal_fields_1_to_2",
+    "result_fields_1_to_2",
+    "feedback_fields_1_to_2",
     "enable_foreign_mappings",
 }
 
@@ -146,22 +173,30 @@ def parse_rules(text: str, where: str) -> Rules:
         raise BridgeError(f"{where}: is not a list of rules: start each with '- ros1_package_name: ...'")
 
     messages: dict[str, TypeRule] = {}
-    services: dict[str, TypeRule] = {}
+    others: dict[str, dict[str, TypeRule]] = {"service": {}, "action": {}}
     for number, rule in enumerate(loaded, 1):
-        _add_rule(rule, f"{where}: rule {number}", messages, services)
-    return Rules(messages, services)
+        _add_rule(rule, f"{where}: rule {number}", messages, others)
+    return Rules(messages, others["service"], others["action"])
 
 
-def _add_rule(rule: object, where: str, messages: dict[str, TypeRule], services: dict[str, TypeRule]) -> None:
+_PARTS = {
+    "service": {"request": "Request", "response": "Response"},
+    "action": {"goal": "Goal", "result": "Result", "feedback": "Feedback"},
+}
+
+
+def _add_rule(
+    rule: object, where: str, messages: dict[str, TypeRule], others: dict[str, dict[str, TypeRule]]
+) -> None:
     if not isinstance(rule, dict):
         raise BridgeError(f"{where}: is not a mapping such as 'ros1_package_name: my_msgs'")
     unknown = [str(key) for key in rule if key not in _KEYS]
     if unknown:
         raise BridgeError(f"{where}: has an unknown key [{unknown[0]}]")
-    kind = "service" if "ros1_service_name" in rule else "message"
+    kind = next((each for each in _PARTS if f"ros1_{each}_name" in rule), "message")
     if kind == "message" and "ros1_message_name" not in rule:
         raise BridgeError(
-            f"{where}: names neither a message nor a service: rules for whole packages do not exist, name each type"
+            f"{where}: names neither a message nor a service nor an action: rules for whole packages do not exist, name each type"
         )
     ros1 = _type_name(rule, "ros1", kind, where)
     ros2 = _type_name(rule, "ros2", kind, where)
@@ -169,9 +204,9 @@ def _add_rule(rule: object, where: str, messages: dict[str, TypeRule], services:
         fields = _field_names(rule, "fields_1_to_2", where)
         messages[ros1] = TypeRule((ros2,), fields)
         return
-    services[ros1] = TypeRule((ros2,))
-    for half, suffix in (("request", "Request"), ("response", "Response")):
-        fields = _field_names(rule, f"{half}_fields_1_to_2", where)
+    others[kind][ros1] = TypeRule((ros2,))
+    for part, suffix in _PARTS[kind].items():
+        fields = _field_names(rule, f"{part}_fields_1_to_2", where)
         if fields is not None:
             messages[f"{ros1}{suffix}"] = TypeRule((), fields)
 

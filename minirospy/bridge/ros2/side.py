@@ -1,11 +1,12 @@
 """The side of ROS 2, by rclpy: its topics, publishers and subscriptions of serialized messages.
 
-All of rclpy is behind this file, so that a test can put another side in its place. ROS 2 calls back in a thread of its
+All of rclpy is behind this file and rclpy_*.py. ROS 2 calls back in a thread of its
 executor.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import importlib
 import logging
@@ -13,22 +14,30 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from types import TracebackType
 from typing import Protocol, cast
 
+from minirospy.bridge.ros2.action_links import send_goal_service
+from minirospy.bridge.ros2.interface import (
+    Ros2ActionClient,
+    Ros2Client,
+    Ros2Handle,
+    Ros2Parameters,
+    Ros2Publisher,
+)
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic
-from minirospy.bridge.ros2.rclpy_calls import Calls, NotAnsweredError, ServiceClass
+from minirospy.bridge.ros2.rclpy_actions import Accept, ActionClass, ActionClient, ActionServer
+from minirospy.bridge.ros2.rclpy_calls import (
+    Calls,
+    MessageClass,
+    NotAnsweredError,
+    RclpySubscription,
+    ServiceClass,
+)
+from minirospy.bridge.ros2.rclpy_parameters import NodeParameters, ParameterServer, ParameterStore
 from minirospy.errors import BridgeError
 
-__all__ = [
-    "RclpySide",
-    "Ros2Client",
-    "Ros2Handle",
-    "Ros2Publisher",
-    "Ros2Side",
-    "require_rclpy",
-]
+__all__ = ["RclpySide", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
@@ -36,11 +45,6 @@ _DRAINED = 200
 
 
 # --- what is used of rclpy, which has no types where it is not installed
-
-
-class _MessageClass(Protocol):
-    @staticmethod
-    def get_fields_and_field_types() -> dict[str, str]: ...
 
 
 class _Profile(Protocol):
@@ -60,114 +64,25 @@ class _RclpyPublisher(Protocol):
     def get_subscription_count(self) -> int: ...
 
 
-class _Handle(Protocol):
-    def __enter__(self) -> object: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
-
-    def take_message(self, class_: _MessageClass, raw: bool, /) -> tuple[bytes, object] | None: ...
-
-
-class _RclpySubscription(Protocol):
-    handle: _Handle
-
-
 class _Node(Protocol):
-    def create_publisher(self, class_: _MessageClass, topic: str, profile: _Profile) -> _RclpyPublisher: ...
+    def create_publisher(self, class_: MessageClass, topic: str, profile: _Profile) -> _RclpyPublisher: ...
 
     def create_subscription(
         self,
-        class_: _MessageClass,
+        class_: MessageClass,
         topic: str,
         callback: Callable[[bytes], None],
         profile: _Profile,
         *,
         raw: bool,
-    ) -> _RclpySubscription: ...
+    ) -> RclpySubscription: ...
 
     def destroy_publisher(self, publisher: _RclpyPublisher) -> bool: ...
 
-    def destroy_subscription(self, subscription: _RclpySubscription) -> bool: ...
+    def destroy_subscription(self, subscription: RclpySubscription) -> bool: ...
 
 
 # --- the side
-
-
-class Ros2Publisher(Protocol):
-    """A publisher of serialized messages."""
-
-    @property
-    def subscribers(self) -> int:
-        """The number of subscribers that are connected."""
-
-    def publish(self, data: bytes) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class Ros2Handle(Protocol):
-    """A subscription or a service, which calls back until it is closed."""
-
-    def close(self) -> None: ...
-
-
-class Ros2Client(Protocol):
-    """A client of a service; its methods may be called from any thread."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether a server is connected."""
-
-    def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
-
-    def close(self) -> None: ...
-
-
-class Ros2Side(Protocol):
-    """What the bridge needs of ROS 2. Types are ``pkg/Name``."""
-
-    @property
-    def domain(self) -> str: ...
-
-    def topics(self) -> Mapping[str, tuple[str, ...]]:
-        """Return all topics and their types."""
-
-    def ends(self, topic: str) -> Ros2Topic: ...
-
-    def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
-
-    def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
-
-    def subscribe(
-        self,
-        topic: str,
-        type_: str,
-        deliver: Callable[[bytes], None],
-        *,
-        depth: int,
-        is_reliable: bool,
-        is_latched: bool,
-    ) -> Ros2Handle: ...
-
-    def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes but those of bridges."""
-
-    def services(self) -> Mapping[str, str]:
-        """Return the services that others than this bridge offer, and their types."""
-
-    def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
-
-    def client(self, service: str, type_: str) -> Ros2Client: ...
-
-    def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service: ``answer`` gets the CDR of a request, in a thread; MinirospyError is why a call fails."""
-
-    def close(self) -> None: ...
 
 
 def require_rclpy() -> None:
@@ -297,6 +212,33 @@ class RclpySide:
         self._served.add(service)
         return _Served(server, lambda: self._served.discard(service))
 
+    def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer where it is not installed."""
+        class_ = self._action_class(type_)
+        goal, result, feedback = (
+            dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
+        )
+        return goal, result, feedback
+
+    def action_client(self, action: str, type_: str) -> Ros2ActionClient:
+        """Return a client of an action. Raise TypesDiffer."""
+        return ActionClient(self._calls, action, self._action_class(type_))
+
+    def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
+        """Offer an action. Raise TypesDiffer."""
+        service = send_goal_service(action)
+        server = ActionServer(self._calls, action, self._action_class(type_), accept)
+        self._served.add(service)
+        return _Served(server, lambda: self._served.discard(service))
+
+    def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
+        """Offer the parameters of ROS 1 as those of this node."""
+        return ParameterServer(self._calls, str(self._node.get_name()), store, loop)
+
+    def node_parameters(self) -> Ros2Parameters:
+        """Return access to the parameters of other nodes."""
+        return NodeParameters(self._calls)
+
     def close(self) -> None:
         """End the node and its thread. Idempotent."""
         if self._is_closed:
@@ -338,12 +280,12 @@ class RclpySide:
         return profile
 
     @staticmethod
-    def _class(type_: str) -> _MessageClass:
+    def _class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
         # minirospy's own packages of ROS 1 have classes, too.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
-        return cast("_MessageClass", found)
+        return cast("MessageClass", found)
 
     @staticmethod
     def _service_class(type_: str) -> ServiceClass:
@@ -351,6 +293,13 @@ class RclpySide:
         if not hasattr(getattr(found, "Request", None), "get_fields_and_field_types"):
             raise TypesDiffer(f"the service type [{type_}] is not installed in ROS 2")
         return cast("ServiceClass", found)
+
+    @staticmethod
+    def _action_class(type_: str) -> ActionClass:
+        found = _imported(type_, "action")
+        if not hasattr(getattr(found, "Goal", None), "get_fields_and_field_types"):
+            raise TypesDiffer(f"the action type [{type_}] is not installed in ROS 2")
+        return cast("ActionClass", found)
 
 
 class _Served:
@@ -385,7 +334,7 @@ class _Subscription:
     def __init__(
         self,
         node: _Node,
-        class_: _MessageClass,
+        class_: MessageClass,
         topic: str,
         deliver: Callable[[bytes], None],
         profile: _Profile,

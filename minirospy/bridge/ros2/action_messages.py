@@ -1,0 +1,154 @@
+"""The messages of an action in ROS 1 as bytes: what is around a goal, a feedback and a result, which are passed on. Pure.
+
+Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from minirospy.errors import DeserializationError
+
+__all__ = [
+    "GoalId",
+    "Status",
+    "cancel_message",
+    "goal_message",
+    "parse_cancel",
+    "parse_goal",
+    "parse_status_and_body",
+    "parse_statuses",
+    "status_and_body",
+    "statuses_message",
+]
+
+_HEADER = struct.Struct("<4I")
+_STAMP = struct.Struct("<2I")
+_LENGTH = struct.Struct("<I")
+
+
+class GoalId(NamedTuple):
+    """A goal: its id, and when it was sent, in seconds and nanoseconds."""
+
+    id: str
+    secs: int = 0
+    nsecs: int = 0
+
+    @property
+    def nanoseconds(self) -> int:
+        """The stamp as one number, 0 where there is none."""
+        return self.secs * 1_000_000_000 + self.nsecs
+
+
+class Status(NamedTuple):
+    """A goal's status: a number of GoalState, and a text for people."""
+
+    goal: GoalId
+    state: int
+    text: str = ""
+
+
+def goal_message(goal: GoalId, body: bytes) -> bytes:
+    """Return an ActionGoal."""
+    return _header(goal.secs, goal.nsecs) + _goal_id(goal) + body
+
+
+def parse_goal(data: bytes | memoryview) -> tuple[GoalId, bytes]:
+    """Return a goal's id and its body, of an ActionGoal. Raise DeserializationError."""
+    data = bytes(data)
+    goal, end = _parse_goal_id(data, _parse_header(data))
+    return goal, data[end:]
+
+
+def cancel_message(goal: GoalId) -> bytes:
+    """Return a GoalID."""
+    return _goal_id(goal)
+
+
+def parse_cancel(data: bytes | memoryview) -> GoalId:
+    """Return a GoalID. Raise DeserializationError."""
+    return _parse_goal_id(bytes(data), 0)[0]
+
+
+def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes:
+    """Return an ActionFeedback or ActionResult."""
+    return _header(secs, nsecs) + _status(status) + body
+
+
+def parse_status_and_body(data: bytes | memoryview) -> tuple[Status, bytes]:
+    """Return the parts of an ActionFeedback or ActionResult. Raise DeserializationError."""
+    data = bytes(data)
+    status, end = _parse_status(data, _parse_header(data))
+    return status, data[end:]
+
+
+def statuses_message(secs: int, nsecs: int, statuses: Iterable[Status]) -> bytes:
+    """Return a GoalStatusArray."""
+    parts = [_status(each) for each in statuses]
+    return _header(secs, nsecs) + _LENGTH.pack(len(parts)) + b"".join(parts)
+
+
+def parse_statuses(data: bytes | memoryview) -> list[Status]:
+    """Return the statuses of a GoalStatusArray. Raise DeserializationError."""
+    data = bytes(data)
+    end = _parse_header(data)
+    (count,) = _unpacked(_LENGTH, data, end)
+    end += _LENGTH.size
+    found = []
+    for _ in range(count):
+        status, end = _parse_status(data, end)
+        found.append(status)
+    return found
+
+
+def _header(secs: int, nsecs: int) -> bytes:
+    return _HEADER.pack(0, secs, nsecs, 0)
+
+
+def _parse_header(data: bytes) -> int:
+    *_, length = _unpacked(_HEADER, data, 0)
+    return _HEADER.size + length
+
+
+def _goal_id(goal: GoalId) -> bytes:
+    return _STAMP.pack(goal.secs, goal.nsecs) + _text(goal.id)
+
+
+def _parse_goal_id(data: bytes, start: int) -> tuple[GoalId, int]:
+    secs, nsecs = _unpacked(_STAMP, data, start)
+    id, end = _parse_text(data, start + _STAMP.size)
+    return GoalId(id, secs, nsecs), end
+
+
+def _status(status: Status) -> bytes:
+    return _goal_id(status.goal) + bytes((status.state,)) + _text(status.text)
+
+
+def _parse_status(data: bytes, start: int) -> tuple[Status, int]:
+    goal, end = _parse_goal_id(data, start)
+    if end >= len(data):
+        raise DeserializationError("the message ends too early")
+    text, after = _parse_text(data, end + 1)
+    return Status(goal, data[end], text), after
+
+
+def _text(text: str) -> bytes:
+    data = text.encode("utf-8", "surrogateescape")
+    return _LENGTH.pack(len(data)) + data
+
+
+def _parse_text(data: bytes, start: int) -> tuple[str, int]:
+    (length,) = _unpacked(_LENGTH, data, start)
+    end = start + _LENGTH.size + length
+    if end > len(data):
+        raise DeserializationError("the message ends too early")
+    return data[start + _LENGTH.size : end].decode("utf-8", "surrogateescape"), end
+
+
+def _unpacked(struct_: struct.Struct, data: bytes, start: int) -> tuple[int, ...]:
+    try:
+        return struct_.unpack_from(data, start)
+    except struct.error as error:
+        raise DeserializationError("the message ends too early") from error

@@ -1,0 +1,110 @@
+"""Parameters of ROS 1 as those of a node of ROS 2, and back: names, types and values. Pure.
+
+Sources: http://wiki.ros.org/Parameter%20Server; rcl_interfaces/msg/ParameterType and ParameterValue.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
+from xmlrpc.client import Binary
+
+from minirospy.errors import BridgeError
+
+__all__ = ["FIELDS", "Value", "leaves", "listed", "ros1_name", "ros1_value", "ros2_name", "ros2_value"]
+
+FIELDS = (
+    "",
+    "bool_value",
+    "integer_value",
+    "double_value",
+    "string_value",
+    "byte_array_value",
+    "bool_array_value",
+    "integer_array_value",
+    "double_array_value",
+    "string_array_value",
+)
+"""Type of a parameter in ROS 2 -> the field of a ParameterValue that has its value."""
+
+_BYTES, _STRINGS = 5, 9
+_SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
+_ARRAY_OF_SINGLE = 5
+_SMALLEST, _LARGEST = -(2**31), 2**31 - 1
+
+
+class Value(NamedTuple):
+    """A value in ROS 2: its type, an index of FIELDS, and what its field has. Type 0: it is not set."""
+
+    type: int
+    value: object = None
+
+
+def ros2_name(name: str) -> str:
+    """Return a parameter's name in ROS 2: ``/robot/speed`` is ``robot.speed``."""
+    return name.strip("/").replace("/", ".")
+
+
+def ros1_name(name: str) -> str:
+    """Return a parameter's name in ROS 1."""
+    return "/" + name.strip("./").replace(".", "/")
+
+
+def leaves(value: object, name: str = "") -> Iterator[str]:
+    """Return the names of all parameters in a namespace's value."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from leaves(inner, f"{name}/{key}")
+    elif name:
+        yield name
+
+
+def ros2_value(value: object) -> Value:
+    """Return a value of ROS 1 for ROS 2; one that has no type there is a text, in JSON."""
+    if isinstance(value, Binary):
+        value = value.data
+    if isinstance(value, bytes | bytearray):
+        return Value(_BYTES, [bytes((each,)) for each in value])
+    single = _SINGLE.get(type(value))
+    if single is not None:
+        return Value(single, value)
+    if isinstance(value, list):
+        kinds = {type(each) for each in value}
+        if not kinds:
+            return Value(_STRINGS, [])
+        if kinds == {int, float}:
+            return Value(_SINGLE[float] + _ARRAY_OF_SINGLE, [float(each) for each in value])
+        inner = _SINGLE.get(kinds.pop()) if len(kinds) == 1 else None
+        if inner is not None:
+            return Value(inner + _ARRAY_OF_SINGLE, list(value))
+    return Value(_SINGLE[str], json.dumps(value, default=str))
+
+
+def ros1_value(value: Value) -> object:
+    """Return a value of ROS 2 for ROS 1. Raise BridgeError where ROS 1 has none like it."""
+    if value.type == _BYTES and isinstance(value.value, Collection):
+        return Binary(b"".join(each if isinstance(each, bytes) else bytes((each,)) for each in value.value))
+    if 0 < value.type <= _ARRAY_OF_SINGLE:
+        return _checked(value.value)
+    if _ARRAY_OF_SINGLE < value.type < len(FIELDS) and isinstance(value.value, Collection):
+        return [_checked(each) for each in value.value]
+    raise BridgeError("a parameter of this type cannot be set in ROS 1")
+
+
+def _checked(value: object) -> object:
+    if isinstance(value, int) and not isinstance(value, bool) and not _SMALLEST <= value <= _LARGEST:
+        raise BridgeError(f"{value} does not fit into the 32 bits of an integer in ROS 1")
+    return value
+
+
+def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
+    """Return the names and prefixes that a request for a list wants. ``depth``: levels below a prefix, 0 for all."""
+    found = []
+    for name in names:
+        rests = [name] if not prefixes else []
+        rests += ["" for prefix in prefixes if name == prefix]
+        rests += [name[len(prefix) + 1 :] for prefix in prefixes if name.startswith(f"{prefix}.")]
+        if any(not depth or rest.count(".") < depth for rest in rests):
+            found.append(name)
+    return found, sorted({name.rpartition(".")[0] for name in found if "." in name})

@@ -1,0 +1,259 @@
+"""Actions of the bridge to ROS 2 with another side in place of rclpy: goals, cancels, ends; the pure parts."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import pytest
+from actionlib_msgs.msg import GoalStatusArray
+from actionlib_tutorials.msg import FibonacciAction, FibonacciActionGoal, FibonacciActionResult, FibonacciGoal
+
+from minirospy import Node
+from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.bridge.ros2.action_links import ActionLink, action_links
+from minirospy.bridge.ros2.action_messages import (
+    GoalId,
+    Status,
+    goal_message,
+    parse_goal,
+    parse_status_and_body,
+    parse_statuses,
+    status_and_body,
+    statuses_message,
+)
+from minirospy.bridge.ros2.actions import ActionPair, empty_message
+from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
+from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
+from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
+from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
+from minirospy.errors import DeserializationError
+from minirospy.graph.goals import GoalState
+from minirospy.introspect.snapshot import Snapshot
+from tests.bridge.ros2_definitions import catalogue
+from tests.bridge.test_ros2_bridge import FakeSide
+
+FIBONACCI = "example_interfaces/Fibonacci"
+SEND_GOAL = {"/fly/_action/send_goal": "example_interfaces/Fibonacci_SendGoal"}
+LIMIT = 60.0
+
+
+def data_of(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+# --- pure
+
+
+def test_an_action_of_one_side_alone_is_linked() -> None:
+    server = Snapshot(
+        {"/fly/result": ("/n",)}, {"/fly/goal": ("/n", "/echo")}, {}, {"/fly/goal": "a_msgs/FlyActionGoal"}
+    )
+    client = Snapshot({"/fly/goal": ("/n",)}, {"/fly/result": ("/n",)}, {}, server.types)
+
+    def of(ros1: Snapshot, ros2: dict[str, str]) -> list[ActionLink]:
+        return action_links(ros1, ros2, lambda type_, _: type_)
+
+    assert of(server, {}) == [ActionLink("/fly", Direction.TO_ROS1, "a_msgs/Fly", "a_msgs/Fly")]
+    assert of(client, SEND_GOAL) == [ActionLink("/fly", Direction.TO_ROS2, FIBONACCI, FIBONACCI)]
+    assert of(server, SEND_GOAL) == []
+    assert of(client, {}) == []
+    own = f"/{BRIDGE_PREFIX}"
+    bridged = Snapshot({"/fly/result": (own,)}, {"/fly/goal": (own,)}, {}, server.types)
+    assert of(bridged, {}) == []
+
+
+def test_messages_of_actions_are_those_of_the_generated_classes() -> None:
+    goal = FibonacciActionGoal(goal=FibonacciGoal(order=3))
+    goal.goal_id.id, goal.goal_id.stamp.secs = "g", 4
+    goal.header.stamp.secs = 4
+    assert parse_goal(data_of(goal)) == (GoalId("g", 4, 0), b"\3\0\0\0")
+    assert goal_message(GoalId("g", 4, 0), b"\3\0\0\0") == data_of(goal)
+
+    statuses = [Status(GoalId("a", 1, 2), 3, "done"), Status(GoalId("b"), 1)]
+    data = statuses_message(7, 8, statuses)
+    found = GoalStatusArray().deserialize(data)
+    assert [(each.goal_id.id, each.status, each.text) for each in found.status_list] == [
+        ("a", 3, "done"), ("b", 1, ""),
+    ]  # fmt: skip
+    assert parse_statuses(data) == statuses
+
+    body = status_and_body(7, 8, statuses[0], b"\0\0\0\0")
+    result = FibonacciActionResult().deserialize(body)
+    assert (result.status.goal_id.id, result.status.text) == ("a", "done")
+    assert parse_status_and_body(body) == (statuses[0], b"\0\0\0\0")
+
+
+def test_messages_of_actions_that_end_too_early_are_refused() -> None:
+    data = statuses_message(7, 8, [Status(GoalId("a", 1, 2), 3, "done")])
+    for cut in range(len(data)):
+        with pytest.raises(DeserializationError):
+            parse_statuses(data[:cut])
+
+
+@pytest.mark.parametrize(
+    "name", ["actionlib_tutorials/FibonacciResult", "nav_msgs/Odometry", "std_msgs/Header", "sensor_msgs/Imu"]
+)
+def test_an_empty_message_is_that_of_the_generated_class(name: str) -> None:
+    from minirospy.idl.load import message_class
+
+    assert empty_message(catalogue().message(name), catalogue().message) == data_of(message_class(name)())
+
+
+def test_rules_name_actions_and_their_fields() -> None:
+    rules = BUILT_IN.with_(
+        parse_rules(
+            "- {ros1_package_name: a, ros1_action_name: Fly, ros2_package_name: b, ros2_action_name: Soar, "
+            "goal_fields_1_to_2: {height: altitude}}",
+            "rules.yaml",
+        )
+    )
+    assert rules.ros2_actions("a/Fly") == ("b/Soar",)
+    assert rules.ros1_actions("b/Soar") == ("b/Soar", "a/Fly")
+    assert rules.message("a/FlyGoal").fields == {"height": "altitude"}
+    assert BUILT_IN.ros2_actions("actionlib_tutorials/Fibonacci") == (FIBONACCI,)
+
+
+# --- the bridge
+
+
+def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
+    side = FakeSide()
+
+    async def run() -> None:
+        async with Node("other", rosout=False) as node, Node(BRIDGE_PREFIX, rosout=False) as own:
+            bridge = Ros2Bridge(own, side, Ros2Options(), catalogue())
+            try:
+                await asyncio.wait_for(scene(node, side, bridge), LIMIT)
+            finally:
+                await bridge.close()
+
+    asyncio.run(run())
+
+
+async def sent(side: FakeSide, number: int) -> Any:
+    """Return a goal that ROS 2 has got: its CDR, where feedback goes, its handle."""
+    while len(side.action_clients["/fly"].goals) <= number:
+        await asyncio.sleep(0.01)
+    return side.action_clients["/fly"].goals[number]
+
+
+def cdr(*numbers: int) -> bytes:
+    return b"\0\1\0\0" + b"".join(number.to_bytes(4, "little") for number in (len(numbers), *numbers))
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros1_go_to_ros2_and_come_to_an_end() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        side.offered = SEND_GOAL
+        assert await bridge.look()
+        async with ActionClient(node, "/fly", FibonacciAction) as client:
+            await client.wait_for_server()
+
+            reached = client.send(FibonacciGoal(order=3))
+            data, feedback, handle = await sent(side, 0)
+            assert data == b"\0\1\0\0\3\0\0\0"
+            feedback(cdr(1))
+            assert list((await reached.__anext__()).sequence) == [1]
+            handle.ended.set_result((SUCCEEDED, cdr(1, 2)))
+            assert list((await reached).sequence) == [1, 2]
+
+            for number, (end, state) in enumerate(
+                [(CANCELED, GoalState.PREEMPTED), (ABORTED, GoalState.ABORTED)], 1
+            ):
+                goal = client.send(FibonacciGoal(order=3))
+                _, _, handle = await sent(side, number)
+                goal.cancel()
+                while not handle.is_cancelled:
+                    await asyncio.sleep(0.01)
+                handle.ended.set_result((end, cdr(7)))
+                assert await end_of(goal) == (state, [7])
+
+            side.action_clients["/fly"].accepts = False
+            assert await end_of(client.send(FibonacciGoal(order=3))) == (GoalState.REJECTED, [])
+
+    bridged(scene)
+
+
+async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
+    with pytest.raises(GoalError) as caught:
+        await goal
+    return caught.value.state, list(getattr(caught.value.result, "sequence", []))
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros1_are_aborted_when_the_server_of_ros2_ends() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        side.offered = SEND_GOAL
+        await bridge.look()
+        async with ActionClient(node, "/fly", FibonacciAction) as client:
+            await client.wait_for_server()
+            goal = client.send(FibonacciGoal(order=3))
+            await sent(side, 0)
+            side.offered = {}
+            assert await bridge.look()
+            assert (await end_of(goal))[0] is GoalState.ABORTED
+            assert "in ROS 2 has ended" in goal.text
+            assert side.action_clients["/fly"].is_closed
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros2_go_to_ros1_and_come_to_an_end() -> None:
+    async def execute(goal: Any) -> dict[str, list[int]]:
+        await goal.publish_feedback([goal.request.order])
+        if goal.request.order == 2:
+            raise GoalError("no", {"sequence": [2]})
+        if goal.request.order == 3:
+            with pytest.raises(asyncio.CancelledError):
+                await asyncio.sleep(LIMIT)
+        return {"sequence": [goal.request.order]}
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        server = await ActionServer(
+            node, "/fly", FibonacciAction, execute, accepts=lambda goal: bool(goal.order)
+        )
+        await bridge.look()
+        feedback: asyncio.Queue[bytes] = asyncio.Queue()
+
+        async def accepted(order: int) -> Any:
+            goal = b"\0\1\0\0" + order.to_bytes(4, "little")
+            return await asyncio.wrap_future(
+                side.action_servers["/fly"].accept(goal, lambda data: feedback.put_nowait(data[4:]))
+            )
+
+        goal = await accepted(1)
+        assert await asyncio.wrap_future(goal.ended) == (SUCCEEDED, cdr(1))
+        assert await feedback.get() == cdr(1)[4:]
+        goal = await accepted(2)
+        assert await asyncio.wrap_future(goal.ended) == (ABORTED, cdr(2))
+        goal = await accepted(3)
+        while (await feedback.get()) != cdr(3)[4:]:
+            pass
+        goal.cancel()
+        assert await asyncio.wrap_future(goal.ended) == (CANCELED, cdr(3))
+        assert await accepted(0) is None
+        await server.close()
+        assert await bridge.look()
+        assert side.action_servers["/fly"].is_closed
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
+def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        side.offered = {**SEND_GOAL, "/odd/_action/send_goal": "odd_msgs/Odd_SendGoal"}
+        pairs = [pair for pair in await bridge.pairs() if isinstance(pair, ActionPair)]
+        assert [(pair.link.action, pair.link.ros1_type) for pair in pairs] == [
+            ("/fly", "actionlib_tutorials/Fibonacci"), ("/odd", "odd_msgs/Odd"),
+        ]  # fmt: skip
+        assert not pairs[0].reason
+        assert pairs[1].reason.startswith("[odd_msgs/OddGoal] is not defined here")
+
+    bridged(scene)
