@@ -24,6 +24,7 @@ from minirospy.bridge.ros2.parameter_values import Value
 from minirospy.bridge.ros2.rclpy_actions import Accept, Ros2Goal
 from minirospy.bridge.ros2.rclpy_parameters import ParameterStore
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
+from minirospy.bridge.ros2.side import large_message_settings
 from minirospy.bridge.ros2.statics import StaticTransforms
 from minirospy.cli.ros2_bridge import main
 from minirospy.errors import BridgeError, DeserializationError
@@ -550,6 +551,20 @@ def test_a_type_that_only_its_publisher_knows_is_bridged() -> None:
 
 
 # --- the command
+
+
+def test_fast_dds_gets_room_for_images_unless_it_is_set_up_already() -> None:
+    file = large_message_settings({})["FASTDDS_DEFAULT_PROFILES_FILE"]
+    assert "<segment_size>33554432</segment_size>" in Path(file).read_text(encoding="utf-8")
+    assert large_message_settings({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"})
+    assert "FASTRTPS_DEFAULT_PROFILES_FILE" in large_message_settings({"ROS_DISTRO": "humble"})
+    for name, value in (
+        ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"),
+        ("FASTDDS_DEFAULT_PROFILES_FILE", "mine.xml"),
+        ("FASTRTPS_DEFAULT_PROFILES_FILE", "mine.xml"),
+        ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4"),
+    ):
+        assert large_message_settings({name: value}) == {}
 
 
 def test_without_rclpy_one_line_says_what_to_do(

@@ -52,9 +52,10 @@ _ORIGIN = "ros2_domain"
 _FASTEST_LOOK = 0.25
 _JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
-_DEPTH = 100
-_DEPTH_OF_LARGE = 5
-_ROS1_QUEUE = 100
+_DEPTH = 1000
+_DEPTH_OF_LARGE = 20
+_ROS1_QUEUE = 1000
+"""Messages that may wait: for as long as a busy machine takes to come back, and no longer for images."""
 
 
 @dataclass(frozen=True)
@@ -293,7 +294,7 @@ class Ros2Bridge:
             ros1 = self.node.advertise(
                 link.topic,
                 raw_class(interface),
-                queue_size=_ROS1_QUEUE,
+                queue_size=_DEPTH_OF_LARGE if depth == _DEPTH_OF_LARGE else _ROS1_QUEUE,
                 latch=link.is_latched,
                 headers={_ORIGIN: self.side.domain},
             )

@@ -14,6 +14,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from pathlib import Path
 from typing import Protocol, cast
 
 from minirospy.bridge.ros2.action_links import send_goal_service
@@ -37,7 +38,7 @@ from minirospy.bridge.ros2.rclpy_calls import (
 from minirospy.bridge.ros2.rclpy_parameters import NodeParameters, ParameterServer, ParameterStore
 from minirospy.errors import BridgeError
 
-__all__ = ["RclpySide", "require_rclpy"]
+__all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
@@ -96,12 +97,29 @@ def require_rclpy() -> None:
         ) from error
 
 
+_PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+"""Environment variables that name a file with Fast DDS's settings: the second up to version 2, which _OLD_DISTRIBUTIONS have."""
+_OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
+_OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
+
+
+def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment variables that give large messages room in Fast DDS; none where the user has set it up."""
+    if any(environment.get(name) for name in (*_PROFILES, *_OTHER_SETTINGS)):
+        return {}
+    if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp").startswith("rmw_fastrtps"):
+        return {}
+    is_old = environment.get("ROS_DISTRO") in _OLD_DISTRIBUTIONS
+    return {_PROFILES[is_old]: str(Path(__file__).with_name("fastdds.xml"))}
+
+
 class RclpySide:
     """ROS 2 by rclpy: one node, one executor, in one thread."""
 
     def __init__(self, name: str) -> None:
         """Start the node. Raises BridgeError."""
         require_rclpy()
+        os.environ.update(large_message_settings(os.environ))
         rclpy = importlib.import_module("rclpy")
         self._qos = importlib.import_module("rclpy.qos")
         executors = importlib.import_module("rclpy.executors")
