@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import json
 import os
 import queue
+import shlex
 import subprocess
+import sys
+import textwrap
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from io import BytesIO
@@ -27,7 +31,7 @@ from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import InterfaceType
-from tests.interop.conftest import running_master
+from tests.interop.conftest import OUR_BIN, running_master
 from tests.interop.install_ros2 import PYTHON, STAMP
 
 _T = TypeVar("_T")
@@ -680,3 +684,63 @@ def test_goals_of_ros2_reach_a_server_of_ros1(scene: Scene) -> None:
     assert end_of(13) == (6, list(range(13)))
     scene.end(server)
     scene.peer.do("close", "/back/count")
+
+
+# --- the page
+
+
+def example(name: str, folder: Path) -> str:
+    """Write a program of docs/ros2.md to a file, and return its path."""
+    page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
+    block = page.partition(f"<!-- example {name} -->\n")[2]
+    lines = itertools.takewhile(lambda line: not line or line.startswith("    "), block.split("\n"))
+    file = folder / name
+    file.write_text(textwrap.dedent("\n".join(lines)))
+    return str(file)
+
+
+def command(name: str) -> list[str]:
+    """Return the words of a command that docs/ros2.md has in a line of its own."""
+    page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
+    (line,) = [line for line in page.split("\n") if line.startswith(f"    {name}")]
+    words = shlex.split(line)
+    return [str(OUR_BIN / words[0]), *words[1:]]
+
+
+@contextlib.contextmanager
+def running(words: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
+    program = subprocess.Popen(
+        words, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    # A program that says nothing ends a wait for its line.
+    limit = threading.Timer(LIMIT, program.kill)
+    limit.start()
+    with program:
+        try:
+            yield program
+        finally:
+            limit.cancel()
+            program.kill()
+
+
+def test_examples_of_the_page_do_what_it_says(scene: Scene, tmp_path: Path) -> None:
+    def line_of(program: subprocess.Popen[str]) -> str:
+        assert program.stdout
+        return program.stdout.readline().strip()
+
+    environment = scene.environment
+    with (
+        running(command("rostopic pub"), environment),
+        running([str(PYTHON), example("battery.py", tmp_path)], environment) as battery,
+    ):
+        assert line_of(battery) == "50%"
+    with (
+        running([str(PYTHON), example("drive.py", tmp_path)], environment),
+        running([sys.executable, example("base.py", tmp_path)], environment) as base,
+    ):
+        assert line_of(base) == "0.2 m/s"
+    with (
+        running([sys.executable, example("motors.py", tmp_path)], environment),
+        running([str(PYTHON), example("switch.py", tmp_path)], environment) as switch,
+    ):
+        assert line_of(switch) == "on"
