@@ -627,7 +627,10 @@ def test_a_goal_of_ros1_is_aborted_when_its_server_in_ros2_ends(scene: Scene) ->
         async def start() -> tuple[Any, Any]:
             client = ActionClient(scene.node, "/leaving", FibonacciAction)
             await client.wait_for_server()
-            return client, client.send(FibonacciGoal(order=1))
+            goal = client.send(FibonacciGoal(order=1))
+            while goal.state is not GoalState.ACTIVE:
+                await asyncio.sleep(0.01)
+            return client, goal
 
         client, goal = scene.run(start())
         other.wait(lambda each: each["op"] == "request")

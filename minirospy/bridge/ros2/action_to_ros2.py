@@ -151,6 +151,7 @@ class GoalsToRos2:
         self._changed.set()
         try:
             await asyncio.sleep(_ACK_SECONDS)
+            await self._become_ready()
             async with self._turns:
                 goal.there = await self._watched(
                     self._client.send(request, lambda data: self._pass_feedback(goal, data))
@@ -174,6 +175,12 @@ class GoalsToRos2:
         self._changed.set()
         with contextlib.suppress(ROSException):
             self._result.publish_raw(status_and_body(*self._now(), goal.status, body))
+
+    async def _become_ready(self) -> None:
+        """Wait for the server: that of an action that was found a moment ago may not be connected yet."""
+        end = self._loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
+        while not self._client.is_ready and self._loop.time() < end and not self._ended.is_set():
+            await asyncio.sleep(0.02)
 
     async def _watched(self, future: Future[_T]) -> _T:
         """Return what a future brings, while the server is there. Raise BridgeError."""
