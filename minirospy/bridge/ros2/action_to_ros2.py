@@ -38,6 +38,8 @@ _STATUS_SECONDS = 0.2
 _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
+_SETTLE_SECONDS = 0.5
+_ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
 """actionlib in Python drops what comes before its send_goal has returned."""
 _QUEUE = 50
@@ -94,7 +96,10 @@ class GoalsToRos2:
         self._telling = asyncio.ensure_future(self._publish_statuses())
 
     async def open(self) -> None:
-        """Wait until the master knows it."""
+        """Wait for the server in ROS 2, then until the master knows it."""
+        await self._become_ready()
+        # The server finds the client a moment after the client has found it: before, its answers are lost.
+        await asyncio.sleep(_SETTLE_SECONDS)
         for end in (self._status, self._result, self._feedback, *self._subscriptions):
             await end
 
@@ -153,9 +158,8 @@ class GoalsToRos2:
             await asyncio.sleep(_ACK_SECONDS)
             await self._become_ready()
             async with self._turns:
-                goal.there = await self._watched(
-                    self._client.send(request, lambda data: self._pass_feedback(goal, data))
-                )
+                sending = self._client.send(request, lambda data: self._pass_feedback(goal, data))
+                goal.there = await asyncio.wait_for(self._watched(sending), _ACCEPT_SECONDS)
             if goal.there is None:
                 goal.step(GoalEvent.REJECT, "the server in ROS 2 refuses this goal")
             else:
@@ -166,6 +170,8 @@ class GoalsToRos2:
                 status, data = await self._watched(goal.there.result())
                 body = self._codec.result.to_ros1(data)
                 goal.step(_EVENTS.get(status, GoalEvent.ABORT))
+        except asyncio.TimeoutError:
+            goal.step(GoalEvent.REJECT, f"the server in ROS 2 has not answered within {_ACCEPT_SECONDS:g} s")
         except (BridgeError, DeserializationError) as error:
             # Before it was accepted it cannot be aborted.
             is_known = goal.there is not None
