@@ -47,6 +47,8 @@ _FASTEST_LOOK, _SLOWEST_LOOK = 0.25, 2.0
 _PROBE_SECONDS, _AGAIN_SECONDS = 3.0, 10.0
 _PROBES = 8
 _MOST_IN_FLOWS = 1_000
+_MOST_WANTED, _MOST_READERS = 10_000, 1_000
+"""Topics that readers may want, and readers of each, which peers choose."""
 
 
 class Exporter:
@@ -252,8 +254,10 @@ class Exporter:
         want = parse_want(key)
         if want is None:
             return
+        if is_there and want.topic not in self._readers and len(self._readers) >= _MOST_WANTED:
+            return
         readers = self._readers.setdefault(want.topic, set())
-        if is_there:
+        if is_there and len(readers) < _MOST_READERS:
             readers.add(want.reader)
             outbound = self.outbound.get(want.topic)
             if outbound:
@@ -291,14 +295,14 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close what is sent, and what is published here, as the graph and the wants are."""
-        for topic in list(self.outbound):
+        # Closing waits for the master: other calls of this method run meanwhile, and change both tables.
+        for topic, outbound in list(self.outbound.items()):
             token = self.topics.get(topic)
-            if (
-                token is None
-                or not token.has_same_messages(self.outbound[topic].token)
-                or topic not in self._readers
+            if self.outbound.get(topic) is outbound and (
+                token is None or not token.has_same_messages(outbound.token) or topic not in self._readers
             ):
-                await self.outbound.pop(topic).close()
+                del self.outbound[topic]
+                await outbound.close()
         for topic in list(self._readers):
             token = self.topics.get(topic)
             if token and token.is_published and topic not in self.outbound:
@@ -312,10 +316,13 @@ class Exporter:
                 if topic in self._readers and topic not in self.outbound:
                     self.outbound[topic] = outbound
                     outbound.open()
-        for topic in list(self.inbound):
+        for topic, inbound in list(self.inbound.items()):
             token = self.topics.get(topic)
-            if token is None or not token.is_subscribed or self.inbound[topic].is_idle:
-                await self.inbound.pop(topic).close()
+            if self.inbound.get(topic) is inbound and (
+                token is None or not token.is_subscribed or inbound.is_idle
+            ):
+                del self.inbound[topic]
+                await inbound.close()
 
     # --- messages, calls and questions of others
 

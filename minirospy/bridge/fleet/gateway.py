@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.exporter import Exporter
 from minirospy.bridge.fleet.importer import Importer
-from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, is_robot_name
+from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, is_robot_name, parse_definition
 from minirospy.bridge.fleet.network import FleetNetwork, Later, NetworkOptions, QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
@@ -213,8 +213,10 @@ class Gateway:
 
     async def _definition(self, key: str, _: bytes) -> bytes:
         assert self._definitions
-        type_, md5sum = key.split("/")[-2:]
-        text = await self._definitions.text(type_.replace("%", "/"), md5sum)
+        parsed = parse_definition(key)
+        if parsed is None:
+            raise QueryFailed("this is not the key of a definition")
+        text = await self._definitions.text(*parsed)
         if not text:
             raise QueryFailed("this gateway does not know the definition")
         return text.encode()

@@ -279,15 +279,16 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
+        # All of it before the wait: meanwhile the topic may be subscribed to again, with an outflow of its own.
         subscription, self._subscription = self._subscription, None
-        if subscription:
-            await subscription.close()
         offers, self._offers = self._offers, {}
+        outflow, self._outflow = self._outflow, None
         for declared in offers.values():
             declared.undeclare()
-        outflow, self._outflow = self._outflow, None
         if outflow:
             outflow.close()
+        if subscription:
+            await subscription.close()
 
     def _offer(self) -> None:
         """Offer the topic to the robot while others than this node publish it here."""

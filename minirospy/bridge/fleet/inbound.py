@@ -52,6 +52,7 @@ class InboundTopic:
         self._publisher: Publisher[Message] | None = None
         self._rewriter: FrameRewriter | None = None
         self._is_ready = False
+        self._is_closed = False
         self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
 
     @property
@@ -90,6 +91,7 @@ class InboundTopic:
         """Stop publishing. Idempotent."""
         publisher, self._publisher = self._publisher, None
         self._is_ready = False
+        self._is_closed = True
         if publisher:
             await publisher.close()
 
@@ -104,6 +106,8 @@ class InboundTopic:
         interface = await self._definitions.interface(self.token.type, md5sum, writer)
         if self._strips_frames:
             self._rewriter = await self._definitions.rewriter(self.token.type, md5sum)
+        if self._is_closed:
+            return  # while a peer was queried for the definition
         is_latched = any(offer.is_latched for offer in self._offers)
         try:
             publisher = self._node.advertise(

@@ -11,7 +11,7 @@ from typing import TypeVar
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
 from minirospy.bridge.fleet.keys import ROOT, Claim, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions, QueryFailed
-from minirospy.bridge.fleet.report import Answer, parse_answer
+from minirospy.bridge.fleet.report import Answer, is_shallow, parse_answer
 from minirospy.bridge.fleet.rules import holder
 from minirospy.errors import BridgeError
 from minirospy.runtime.transport.loop import new_event_loop
@@ -70,9 +70,12 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
         data = await network.query(
             f"{ROOT}/param/{claim.name}/{claim.gateway}", name.encode(), seconds=seconds
         )
-        return json.loads(data)
+        value: object = json.loads(data)
     except (QueryFailed, ValueError, RecursionError) as error:
         raise BridgeError(f"robot [{robot}]: {error}") from error
+    if not is_shallow(value):
+        raise BridgeError(f"robot [{robot}]: the value of [{name}] is nested too deeply")
+    return value
 
 
 async def _claims(network: FleetNetwork, kind: str, seconds: float) -> list[Claim]:

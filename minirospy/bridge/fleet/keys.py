@@ -48,6 +48,7 @@ __all__ = [
     "out_key",
     "parse_call",
     "parse_claim",
+    "parse_definition",
     "parse_in",
     "parse_offer",
     "parse_service",
@@ -322,6 +323,15 @@ def parse_call(key: str) -> tuple[str, str] | None:
 def definition_key(gateway: str, type_: str, md5sum: str) -> str:
     """Return the key of a type's full text."""
     return f"{ROOT}/definition/{gateway}/{mangled(type_)}/{md5sum}"
+
+
+def parse_definition(key: str) -> tuple[str, str] | None:
+    """Return type and md5sum of a query for a full text."""
+    match _chunks(key, "definition"):
+        case [_, type_, md5sum]:
+            if _is_type(type_, md5sum) and md5sum != UNKNOWN_MD5:
+                return type_.replace("%", "/"), md5sum
+    return None
 
 
 def serialize_stamp(stamp: Stamp) -> bytes:

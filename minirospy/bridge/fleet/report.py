@@ -11,9 +11,10 @@ from minirospy.bridge.fleet.keys import Claim
 from minirospy.bridge.fleet.rules import holder
 from minirospy.escape import escaped
 
-__all__ = ["Answer", "as_json", "lines", "parse_answer"]
+__all__ = ["Answer", "as_json", "is_shallow", "lines", "parse_answer"]
 
 Json = Mapping[str, object]
+MOST_LEVELS = 50
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,14 @@ def parse_answer(data: bytes) -> Json:
         found = json.loads(data)
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return found if isinstance(found, dict) and is_shallow(found) else {}
+
+
+def is_shallow(value: object, levels: int = MOST_LEVELS) -> bool:
+    """Return whether a value of JSON is nested no deeper than so many levels: what writes it again recurses."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
@@ -142,11 +150,12 @@ def _number(table: Json, key: str) -> int:
 
 def _milliseconds(table: Json, key: str) -> str:
     found = table.get(key)
-    return f"{found * 1e3:.1f} ms" if isinstance(found, (int, float)) else "?"
+    return f"{found * 1e3:.1f} ms" if isinstance(found, (int, float)) and abs(found) < 1e18 else "?"
 
 
 def _text(table: Json, key: str) -> str:
-    return escaped(str(table.get(key, "?"))[:200])
+    # JSON may have half a surrogate pair, which no terminal takes.
+    return escaped(str(table.get(key, "?"))[:200].encode(errors="replace").decode())
 
 
 def _tables(table: Json, key: str) -> list[Json]:

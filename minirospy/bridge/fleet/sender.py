@@ -20,6 +20,8 @@ _CLOSE_SECONDS = 2.0
 _MOST_WAITING = {Lane.TELEOP: 10, Lane.DATA: 100, Lane.BULK: 2}
 _MOST_BYTES = {Lane.TELEOP: 1 << 20, Lane.DATA: 8 << 20, Lane.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
+_MOST_OUTLETS = 64
+"""Publishers of Zenoh that a flow keeps: its own, and those of readers that got latched messages, least recent first to go."""
 
 
 class _Worker:
@@ -133,9 +135,14 @@ class _LaneWorker(_Worker):
                 _log.debug("a message was not sent: %s", error)
 
     def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
-        outlet = outflow._outlets.get(key)
+        outlet = outflow._outlets.pop(key, None)
         if outlet is None:
-            outlet = outflow._outlets[key] = self._network.outlet(key, self._lane)
+            while len(outflow._outlets) >= _MOST_OUTLETS:
+                oldest = next(iter(outflow._outlets))
+                outflow._numbers.pop(oldest, None)
+                outflow._outlets.pop(oldest).undeclare()
+            outlet = self._network.outlet(key, self._lane)
+        outflow._outlets[key] = outlet
         number = outflow._numbers[key] = outflow._numbers.get(key, 0) + 1
         outlet.put(message, attachment=serialize_stamp(Stamp(number, self._clock())))
 
@@ -162,18 +169,26 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """The flows of an intake by key, at most so many."""
+    """The flows of an intake by key, at most so many: the least recently used one makes room. Safe for threads."""
 
     def __init__(self, most: int) -> None:
         self._most = most
+        self._lock = threading.Lock()
         self._flows: dict[object, Flow[_Arrival]] = {}
 
     def of(self, key: object) -> Flow[_Arrival] | None:
-        """Return a key's flow; None where there are too many."""
-        flow = self._flows.get(key)
-        if flow is None and len(self._flows) < self._most:
-            flow = self._flows[key] = Intake.flow()
-        return flow
+        """Return a key's flow; None where there are too many, and messages wait in each."""
+        with self._lock:
+            flow = self._flows.pop(key, None)
+            if flow is None:
+                if len(self._flows) >= self._most:
+                    idle = next((known for known, each in self._flows.items() if not each.waiting), None)
+                    if idle is None:
+                        return None
+                    del self._flows[idle]
+                flow = Intake.flow()
+            self._flows[key] = flow
+            return flow
 
 
 class Intake(_Worker):
