@@ -112,7 +112,7 @@ class JointDoor:
         loop = asyncio.get_running_loop()
         next_load = loop.time()
         next_message = loop.time()
-        while self._sessions or self.always_publishes:
+        while self._sessions or self.always_publishes or self._publisher:
             now = loop.time()
             if now >= next_load:
                 next_load = now + _RELOAD_SECONDS
@@ -171,9 +171,12 @@ class JointDoor:
             task.cancel()
 
         async def follow(subscription: Subscription[JointState]) -> None:
-            async for state in subscription:
-                if self.joints:
-                    self.joints.update(state.name, state.position, state.velocity, state.effort)
+            try:
+                async for state in subscription:
+                    if self.joints:
+                        self.joints.update(state.name, state.position, state.velocity, state.effort)
+            finally:
+                await subscription.close()
 
         self._sources = [
             asyncio.ensure_future(follow(self.node.subscribe(topic, JointState))) for topic in topics
@@ -241,7 +244,9 @@ class JointDoor:
     def state(self) -> dict[str, object]:
         """Return the positions of all joints, also of those that follow others, and who publishes."""
         values = self.joints.values() if self.joints else None
-        positions = dict(zip(values.name, values.position, strict=False)) if values else {}
+        # A source may publish what JSON does not have.
+        pairs = zip(values.name, values.position, strict=False) if values else ()
+        positions = {name: position if math.isfinite(position) else None for name, position in pairs}
         publishers = self._graph().snapshot.publishers.get(self.node.resolve(_TOPIC), ())
         others = [each for each in publishers if each != self.node.name]
         return {"positions": positions, "publishing": self.is_publishing, "others": others}
@@ -276,7 +281,7 @@ class JointSession:
             self._handlers[fields["op"]](fields)
         except UsageError as error:
             self._send_error(str(error))
-        except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError) as error:
             self._send_error(f"not an operation on joints: {error}")
 
     def received_binary(self, data: bytes) -> None:

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.dashboard.joint_door import SUBPROTOCOL
+from minirospy.introspect.snapshot import fetch
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.dashboard.robot import ROBOT
@@ -135,6 +137,49 @@ def test_sources_move_the_joints(serve: Callable[..., Served], client: Callable[
     page.next("state", lambda state: state["positions"].get("wheel") == 0.75)
 
 
+def test_position_that_json_has_not_is_null(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, source_list=["/from_robot"])
+    page = client(served)
+    page.next("joints")
+    node = served.node("arm")
+
+    async def publish() -> None:
+        publisher = await node.advertise("/from_robot", JointState, latch=True)
+        await publisher.publish(JointState(name=["wheel"], position=[float("nan")]))
+
+    served.run(publish())
+    page.next("state", lambda state: state["positions"]["wheel"] is None)
+
+
+def test_topics_are_left_with_the_page_and_the_parameter(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, source_list=["/from_robot"])
+    node = served.node("other")
+
+    def topics() -> tuple[object, object]:
+        state = served.run(fetch(node._node.master))
+        return state.publishers.get("/joint_states"), state.subscribers.get("/from_robot")
+
+    page = client(served)
+    page.next("joints")
+    page.send("publish", on=True)
+    while not all(topics()):
+        page.next("state")
+        page.send("randomize")
+    set_params(served, source_list=["/from_other"])
+    page.next("joints")
+    page.socket.close()
+    until = time.monotonic() + 60
+    while any(topics()):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
 def test_description_that_comes_later_or_is_broken_is_followed(
     serve: Callable[..., Served], client: Callable[..., Client]
 ) -> None:
@@ -157,6 +202,7 @@ def test_description_that_comes_later_or_is_broken_is_followed(
         {"op": "set", "positions": {"none": 1}},
         {"op": "set", "positions": {"wheel": "x"}},
         {"op": "set", "positions": {"wheel": float("nan")}},
+        {"op": "set", "positions": {"wheel": 10**400}},
         {"op": "set", "positions": [1]},
         {"op": "fly"},
         {},

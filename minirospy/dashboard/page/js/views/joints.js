@@ -158,7 +158,7 @@ export class Joints {
         isLeft = true;
         continue;
       }
-      row.position = position;
+      row.position = position ?? NaN;
       this.showRow(row);
     }
     clearTimeout(this.later);
