@@ -68,7 +68,8 @@ class LaunchDoor:
     def start(self, file: LaunchFile, args: Mapping[str, str]) -> None:
         """Start a launch file. Raise MinirospyError. Reads folders, so it blocks."""
         path = self.files.path_of(file)
-        if sum(not run.is_ended for run in self.runs.values()) >= _MOST_RUNS:
+        # Sessions change the table while this thread reads it.
+        if sum(not run.is_ended for run in tuple(self.runs.values())) >= _MOST_RUNS:
             raise UsageError(f"{_MOST_RUNS} launch files run already")
         run = LaunchRun(file.package, file.path, path, args, self.environment, self.packages)
         self.runs[run.id] = run
@@ -250,7 +251,8 @@ class LaunchSession:
 
     def _send_launches(self) -> None:
         launches = []
-        for run in self._door.runs.values():
+        # Threads of other sessions add launches meanwhile.
+        for run in tuple(self._door.runs.values()):
             state = run.state()
             launches.append({**state._asdict(), "nodes": [node._asdict() for node in state.nodes]})
         text = json.dumps({"launches": launches})

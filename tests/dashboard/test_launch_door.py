@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import psutil
 import pytest
@@ -14,11 +16,13 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
-from minirospy.dashboard.launch_door import SUBPROTOCOL
+from minirospy.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSession
+from minirospy.dashboard.launch_run import RunState
 from tests.dashboard.conftest import TOKEN
 from tests.dashboard.lamp import make_lamp
 
 if TYPE_CHECKING:
+    from minirospy.bridge.web.client import WebClient
     from tests.dashboard.conftest import Served
 
 FILE = {"package": "lamp", "file": "launch/lamp.launch"}
@@ -210,3 +214,32 @@ def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
     assert page.next(lambda found: "writes" in found)["writes"] is False
     page.send("start", **FILE, args={"needed": "yes"})
     assert "only who has the token may start programs" in page.error()
+
+
+def test_launch_that_is_added_while_launches_are_reported() -> None:
+    runs: dict[int, object] = {}
+
+    class Run:
+        def state(self) -> RunState:
+            # As the thread of another session does.
+            runs[len(runs)] = self
+            return RunState(1, "lamp", "lamp.launch", {}, "running", "", [])
+
+    runs[0] = Run()
+    sent: list[bytes] = []
+    client = SimpleNamespace(
+        is_owner=True,
+        send_text=lambda _: None,
+        send_text_message=lambda _, data, newest_only: sent.append(data),
+    )
+
+    async def work() -> None:
+        session = LaunchSession(cast(LaunchDoor, SimpleNamespace(runs=runs)), cast("WebClient", client))
+        while not sent and not session.task.done():
+            await asyncio.sleep(0.01)
+        session.ended()
+        with contextlib.suppress(asyncio.CancelledError):
+            await session.task
+
+    asyncio.run(work())
+    assert len(json.loads(sent[0])["launches"]) == 1
