@@ -23,6 +23,8 @@ __all__ = ["SUBPROTOCOL", "RvizDoor", "RvizSession", "read_file"]
 
 SUBPROTOCOL = "minirospy.rviz.v1"
 
+_MOST_WAITING = 20
+
 
 def read_file(path: Path) -> dict[str, object] | None:
     """Return the contents of a .rviz file, None where there is none. Raise RvizFileError."""
@@ -61,10 +63,16 @@ class RvizSession:
         self._client = client
         self._door = door
         self._turn = asyncio.Lock()
+        self._waiting = 0
 
     def received_text(self, text: str) -> None:
         """Carry out an operation, and send its answer."""
+        if self._waiting >= _MOST_WAITING:
+            self._send({"error": "too many operations wait for their answers"})
+            return
+        self._waiting += 1
         task = asyncio.ensure_future(self._answer(text))
+        task.add_done_callback(self._answered)
         self._door.working.add(task)
         task.add_done_callback(self._door.working.discard)
 
@@ -74,6 +82,9 @@ class RvizSession:
 
     def ended(self) -> None:
         """Forget the client; an operation that has started is finished."""
+
+    def _answered(self, _: asyncio.Task[None]) -> None:
+        self._waiting -= 1
 
     async def _answer(self, text: str) -> None:
         loop = asyncio.get_running_loop()

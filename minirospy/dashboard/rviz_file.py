@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
@@ -66,6 +67,9 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise RvizFileError(name, 0, f"not YAML: {str(error).splitlines()[0]}") from None
+    except (LookupError, AttributeError, TypeError):
+        # What the library raises for tags such as !!bool and !!timestamp on other text.
+        raise RvizFileError(name, 0, "not YAML: a tag (!!) does not fit its value") from None
 
     if not isinstance(value, dict) or not isinstance(value.get(_MANAGER), dict):
         raise RvizFileError(name, 0, f'not a file of RViz: it has no "{_MANAGER}"')
@@ -84,6 +88,8 @@ def _plain(value: object) -> object:
         return _with_text_keys(value)
     if isinstance(value, list):
         return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
     # What a tag of the text makes: sets, dates, bytes.
     return value if value is None or isinstance(value, str | int | float) else str(value)
 

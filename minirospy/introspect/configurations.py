@@ -27,6 +27,9 @@ def configuration_documents(text: str) -> list[object]:
         return [each for each in yaml.load_all(text, Loader=Loader) if each is not None]
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise MinirospyError(f"not YAML: {' '.join(str(error).split())}") from error
+    except (LookupError, AttributeError, TypeError) as error:
+        # What the library raises for tags such as !!bool and !!timestamp on other text.
+        raise MinirospyError("not YAML: a tag (!!) does not fit its value") from error
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:

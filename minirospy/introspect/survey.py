@@ -140,6 +140,6 @@ def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
                 if receiver is not None:
                     edge = Edge(answer.node.name, topic, receiver)
                     found[answer.pid, str(number), edge] = Counts(int(messages), int(size))
-        except (TypeError, ValueError, LookupError):
+        except (TypeError, ValueError, LookupError, OverflowError):
             continue
     return found

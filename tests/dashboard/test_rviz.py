@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from websockets.sync.client import connect
@@ -15,12 +17,13 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.cli import dashboard as command
-from minirospy.dashboard.rviz_door import SUBPROTOCOL
+from minirospy.dashboard.rviz_door import SUBPROTOCOL, RvizDoor
 from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
 from minirospy.errors import RvizFileError
 from tests.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:
+    from minirospy.bridge.web.client import WebClient
     from tests.dashboard.conftest import Served
 
 FILE = """Panels:
@@ -74,8 +77,11 @@ def test_file_of_rviz_is_written_as_it_was_read() -> None:
         ("a: \0", "x.rviz: not YAML: "),
         ("x" * 1_000_001, "x.rviz: more than 1000000 characters"),
         ("a: !!python/object:os.system x", "x.rviz:1: not YAML: could not determine a constructor"),
+        ("a: !!bool x", "x.rviz: not YAML: a tag"),
+        ("a: !!timestamp x", "x.rviz: not YAML: a tag"),
+        ("a: !!int ''", "x.rviz: not YAML: a tag"),
     ],
-    ids=range(9),
+    ids=range(12),
 )
 def test_text_that_is_not_a_file_of_rviz_is_refused(text: str, error: str) -> None:
     with pytest.raises(RvizFileError, match="^" + re.escape(error)):
@@ -129,6 +135,31 @@ def test_text_of_the_browser_is_read_and_written(opened: Callable[..., Callable[
     assert "not YAML" in send({"parse": "a: ["})["error"]
     assert "was not started with a .rviz file" in send({"read": True})["error"]
     assert "was not started with a .rviz file" in send({"save": config})["error"]
+
+
+@pytest.mark.parametrize("number", ["1.0e999", "!!float .nan"])
+def test_number_that_json_has_not_is_text(number: str) -> None:
+    found = parse_rviz(f"Visualization Manager: {{Size: {number}}}")
+    json.dumps(found, allow_nan=False)
+
+
+def test_operations_that_wait_are_limited() -> None:
+    sent: list[str] = []
+    client = cast("WebClient", SimpleNamespace(send_text=sent.append))
+
+    async def work() -> None:
+        door = RvizDoor()
+        session = door.open(client)
+        for _ in range(100):
+            session.received_text('{"parse": "a: 1"}')
+        assert len(door.working) <= 20
+        await asyncio.gather(*door.working)
+        session.received_text('{"parse": "a: 1"}')
+        await asyncio.gather(*door.working)
+
+    asyncio.run(work())
+    assert len(sent) == 101
+    assert sum("too many operations" in each for each in sent) == 80
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ import pytest
 from std_msgs.msg import Bool, String
 
 from minirospy import Node
+from minirospy.errors import MinirospyError
+from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.doctor.graph import NodeAnswer
 from minirospy.introspect.doctor.reach import MasterPlace
 from minirospy.introspect.graph import Graph, NodeAddress
@@ -129,3 +131,13 @@ def test_nodes_are_queried_and_their_traffic_is_counted(master: str) -> None:
     finally:
         loop.run(close(), 60)
         loop.close()
+
+
+def test_counts_that_are_not_finite_are_left_out() -> None:
+    assert _counts(answer([["/t", 0, [[1, float("inf"), float("inf"), True]]]])) == {}
+
+
+@pytest.mark.parametrize("text", ["a: !!bool x", "a: !!timestamp x", "a: !!int ''", "a: !!float ''"])
+def test_configuration_whose_tag_does_not_fit_is_refused(text: str) -> None:
+    with pytest.raises(MinirospyError, match="not YAML: a tag"):
+        parameter_values(text)
