@@ -18,7 +18,7 @@ import math
 import struct
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
@@ -61,7 +61,7 @@ class BagDoor:
         self.recording: Recording | None = None
         self._master_uri = master_uri
         self._sessions: set[asyncio.Task[None]] = set()
-        self._is_starting = False
+        self._starting: asyncio.Task[None] | None = None
 
     def select(self, offered: Sequence[str]) -> str:
         """Return the sub-protocol to use. Raise LookupError."""
@@ -78,16 +78,18 @@ class BagDoor:
 
     async def record(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
         """Start a recording. Raise MinirospyError."""
-        if self._is_starting or (self.recording and not self.recording.state().is_ended):
+        is_starting = self._starting and not self._starting.done()
+        if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        self._is_starting = True
-        try:
-            await self._close_recording()
-            path = self.folder.new_file(name, suffix)
-            start = partial(Recording, path, topics, compression, self._master_uri)
-            self.recording = await asyncio.get_running_loop().run_in_executor(None, start)
-        finally:
-            self._is_starting = False
+        # The page may be closed meanwhile: its child must not be lost.
+        self._starting = asyncio.ensure_future(self._start(name, suffix, topics, compression))
+        await asyncio.shield(self._starting)
+
+    async def _start(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
+        await self._close_recording()
+        path = self.folder.new_file(name, suffix)
+        start = partial(Recording, path, topics, compression, self._master_uri)
+        self.recording = await asyncio.get_running_loop().run_in_executor(None, start)
 
     async def stop(self) -> None:
         """Complete the recording, if there is one."""
@@ -99,6 +101,8 @@ class BagDoor:
         for task in list(self._sessions):
             task.cancel()
         await asyncio.gather(*self._sessions, return_exceptions=True)
+        if self._starting:
+            await asyncio.gather(self._starting, return_exceptions=True)
         await self._close_recording()
 
     async def _close_recording(self) -> None:
@@ -244,7 +248,13 @@ class BagSession:
                 text = str(error)
                 raise BagError(text if text.startswith(name) else f"{name}: {text}") from error
 
-        bag = self._bag = await self._in_thread(opening)
+        future = self._thread.submit(opening)
+        try:
+            bag = self._bag = await asyncio.wrap_future(future)
+        except asyncio.CancelledError:
+            # The page was closed meanwhile: what is opened for nobody is closed in that thread.
+            future.add_done_callback(_close_opened)
+            raise
         start, end = bag.span
         topics = [
             [
@@ -370,7 +380,11 @@ class BagSession:
             await self._send_message(bag, _THUMBNAIL, *self._thumbnails.popleft())
 
     async def _send_message(self, bag: OpenBag, kind: int, topic: str, time: int) -> None:
-        message = await self._in_thread(lambda: bag.timeline.message_at(topic, time))
+        try:
+            message = await self._in_thread(lambda: bag.timeline.message_at(topic, time))
+        except (MinirospyError, OSError, ValueError) as error:
+            self._send_error(f"{bag.name}: {topic}: {error}")
+            return
         if message is None:
             return
         number = list(bag.timeline.topics).index(topic)
@@ -393,6 +407,11 @@ class BagSession:
 
     def _send_error(self, text: str) -> None:
         self._client.send_text(json.dumps({"error": text[:500]}))
+
+
+def _close_opened(future: Future[OpenBag]) -> None:
+    if not future.cancelled() and not future.exception():
+        future.result().close()
 
 
 def _text(fields: _Fields, name: str) -> str:

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import struct
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,8 +17,13 @@ from std_msgs.msg import String
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from minirospy.bag.timeline import Timeline
 from minirospy.bridge.access import Access
+from minirospy.dashboard import bag_door
 from minirospy.dashboard.bag_door import SUBPROTOCOL
+from minirospy.dashboard.bag_player import OpenBag
+from minirospy.dashboard.recording import Recording
+from minirospy.errors import BagFormatError
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag, text_body
 from tests.dashboard.conftest import TOKEN
@@ -289,6 +295,92 @@ def test_recording_is_completed_when_the_dashboard_ends(
     served.run(served.dashboard.close())
     assert (folder / "run.bag").is_file()
     assert os.listdir(folder) == ["run.bag"]
+
+
+class Gate:
+    """Keeps a thread of the dashboard at a step until it is opened."""
+
+    def __init__(self) -> None:
+        self.reached = threading.Event()
+        self.opened = threading.Event()
+
+    def pass_through(self) -> None:
+        self.reached.set()
+        assert self.opened.wait(60)
+
+
+def test_recording_is_kept_where_its_page_closes_while_it_starts(
+    serve: Callable[..., Served],
+    client: Callable[..., Client],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gate = Gate()
+
+    class Slow(Recording):
+        def __init__(self, *words: Any) -> None:
+            gate.pass_through()
+            super().__init__(*words)
+
+    monkeypatch.setattr(bag_door, "Recording", Slow)
+    served = serve()
+    assert served.dashboard
+    door = served.dashboard._bags
+    page = client(served)
+    page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
+    assert gate.reached.wait(60)
+    page.socket.close()
+    wait_until(lambda: not door._sessions)
+    gate.opened.set()
+    wait_until(lambda: door.recording is not None)
+
+
+def test_bag_is_closed_where_its_page_closes_while_it_opens(
+    serve: Callable[..., Served],
+    client: Callable[..., Client],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gate = Gate()
+    closed = threading.Event()
+
+    class Slow(OpenBag):
+        def __init__(self, *words: Any) -> None:
+            gate.pass_through()
+            super().__init__(*words)
+
+        def close(self) -> None:
+            super().close()
+            closed.set()
+
+    monkeypatch.setattr(bag_door, "OpenBag", Slow)
+    make_bag(folder / "a.bag", 1)
+    served = serve()
+    assert served.dashboard
+    door = served.dashboard._bags
+    page = client(served)
+    page.send("open", name="a.bag")
+    assert gate.reached.wait(60)
+    page.socket.close()
+    wait_until(lambda: not door._sessions)
+    gate.opened.set()
+    assert closed.wait(60)
+
+
+def test_message_that_cannot_be_read_is_one_line(
+    client: Callable[..., Client], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise BagFormatError("a chunk is damaged")
+
+    monkeypatch.setattr(Timeline, "message_at", fail)
+    make_bag(folder / "a.bag", 1)
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("show", topics=["/chatter"])
+    assert "/chatter: a chunk is damaged" in json_error(page)
+    page.send("list")
+    page.next("files")
 
 
 def test_read_only_client_neither_records_nor_opens(
