@@ -109,7 +109,7 @@ export class Dock {
     pane.view?.close();
     fill(pane.body);
     pane.body.dataset.view = node.view;
-    const [title, View] = this.views[node.view] ?? [node.view, Unknown];
+    const [title, View] = Object.hasOwn(this.views, node.view) ? this.views[node.view] : [node.view, Unknown];
     pane.element.setAttribute("aria-label", t(title));
     setText(pane.head.querySelector(".pane-about"), about(node));
     const place = {
