@@ -5,6 +5,7 @@ import { Door } from "../door.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { decode } from "../ros1.js";
+import { t } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
@@ -53,7 +54,7 @@ export class Bag {
       bag: (bag) => {
         this.say("");
         this.player.open(bag);
-        setText(this.empty, bag.topics.length ? "" : `${bag.name} has no messages.`);
+        setText(this.empty, bag.topics.length ? "" : t("{name} has no messages.", { name: bag.name }));
       },
       state: (state) => this.player.show(state),
       density: (density) => this.player.showDensity(density),
@@ -74,12 +75,12 @@ export class Bag {
   }
 
   showFiles(files, folder, given) {
-    this.files.title = `Bags in ${folder} and below`;
-    fill(this.files, h("option", { value: "" }, files.length ? "choose a bag" : `no bag in ${folder}`),
+    this.files.title = t("Bags in {folder} and below", { folder });
+    fill(this.files, h("option", { value: "" }, files.length ? t("choose a bag") : t("no bag in {folder}", { folder })),
       files.map(([name, size, modified]) => h("option", { value: name }, `${name}  ·  ${sizeText(size)}  ·  ${new Date(modified * 1000).toLocaleString()}`)));
     if (!this.name && given.length && !this.player.bag) this.choose(given[0]);
     this.files.value = this.name;
-    if (!this.player.bag) setText(this.empty, this.writes === false ? "" : files.length ? "Choose a bag to look into it, or record one." : `There is no bag in ${folder} yet: record one.`);
+    if (!this.player.bag) setText(this.empty, this.writes === false ? "" : files.length ? t("Choose a bag to look into it, or record one.") : t("There is no bag in {folder} yet: record one.", { folder }));
   }
 
   choose(name) {
@@ -109,7 +110,7 @@ class Recorder {
     this.count = h("span", { class: "muted" });
     this.empty = h("p", { class: "muted" });
     this.element = h("form", { class: "panel recorder", hidden: true, onsubmit: (event) => { event.preventDefault(); this.record(); } },
-      h("div", { class: "bar" }, h("label", {}, this.all, "all"), this.filter, this.count), this.list, this.empty,
+      h("div", { class: "bar" }, h("label", {}, this.all, t("all")), this.filter, this.count), this.list, this.empty,
       h("div", { class: "bar" }, h("label", {}, "Name", this.name), this.format, this.start));
     this.text = h("span", { class: "num" });
     this.stop = h("button", { type: "button", class: "stop", onclick: () => {
@@ -156,7 +157,7 @@ class Recorder {
       if (element !== next) this.list.insertBefore(element, next);
       before = element;
     }
-    setText(this.empty, channels.size ? "" : "Nothing is published yet.");
+    setText(this.empty, channels.size ? "" : t("Nothing is published yet."));
     this.showFiltered();
     this.showCount();
   }
@@ -184,7 +185,7 @@ class Recorder {
     if (this.element.hidden) return;
     for (const { rate, hz, bytes, end } of this.rows.values()) {
       const found = rate.at(performance.now() / 1000);
-      setText(hz, found ? `${found.hz < 10 ? found.hz.toFixed(2) : found.hz.toFixed(1)} Hz` : end ? "–" : "choose to measure");
+      setText(hz, found ? `${found.hz < 10 ? found.hz.toFixed(2) : found.hz.toFixed(1)} Hz` : end ? "–" : t("choose to measure"));
       setText(bytes, found ? bandwidth(found.bytes) : "");
     }
   }
@@ -206,7 +207,7 @@ class Recorder {
   }
 
   showCount() {
-    setText(this.count, `${this.chosen.size} of ${this.rows.size} topics`);
+    setText(this.count, t("{count} of {all} topics", { count: this.chosen.size, all: this.rows.size }));
     this.start.disabled = !this.chosen.size || this.isRecording;
   }
 
@@ -222,7 +223,7 @@ class Recorder {
     if (!this.isRecording) this.stop.disabled = false;
     this.status.hidden = !recording;
     this.status.classList.toggle("ended", !this.isRecording);
-    if (recording) setText(this.text, `${recording.name} · ${clockText(recording.seconds, 0.1)} · ${sizeText(recording.size)}${this.isRecording ? "" : recording.error ? "" : " · saved"}`);
+    if (recording) setText(this.text, `${recording.name} · ${clockText(recording.seconds, 0.1)} · ${sizeText(recording.size)}${this.isRecording ? "" : recording.error ? "" : ` · ${t("saved")}`}`);
     setText(this.error, recording?.error ?? "");
     this.showCount();
   }
@@ -256,7 +257,7 @@ class Player {
       h("div", { class: "panel bag-panel" },
         h("div", { class: "bar transport" }, button("❙◀◀", "To the start (Home)", () => this.seek(0)), button("◀❙", "To the message before (left arrow)", () => this.send({ op: "back" })),
           this.playButton, button("❙▶", "To the next message (right arrow)", () => this.send({ op: "step" })), this.now, this.date, h("span", { class: "spring" }),
-          h("label", { title: "Double click: 1×" }, "Speed", this.speed, this.speedText), h("label", {}, this.loop, "loop"), this.publishLabel, this.clockLabel),
+          h("label", { title: "Double click: 1×" }, "Speed", this.speed, this.speedText), h("label", {}, this.loop, t("loop")), this.publishLabel, this.clockLabel),
         h("div", { class: "bag-timeline" }, this.labels, this.area)),
       this.moments);
     this.listen();
@@ -295,7 +296,7 @@ class Player {
       top += height;
     }
     this.height = top;
-    fill(this.labels, h("div", { class: "bag-corner muted" }, `${bag.topics.length} topics · ${new Date(bag.start * 1000).toLocaleString()}`), this.rows.map((row) => this.label(row)));
+    fill(this.labels, h("div", { class: "bag-corner muted" }, `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString()}`), this.rows.map((row) => this.label(row)));
     fill(this.moments);
     const order = [...this.rows].sort((one, other) => IMAGES.has(other.type) - IMAGES.has(one.type) || other.count - one.count);
     for (const row of order.slice(0, MOST_SHOWN_FIRST)) this.setShown(row, true);
@@ -309,15 +310,15 @@ class Player {
   }
 
   label(row) {
-    row.box = h("input", { type: "checkbox", "aria-label": `show ${row.name}`, title: "Show its messages", onchange: () => {
+    row.box = h("input", { type: "checkbox", "aria-label": t("show {name}", { name: row.name }), title: "Show its messages", onchange: () => {
       this.setShown(row, row.box.checked);
       this.sendShown();
     } });
-    row.publishBox = h("input", { type: "checkbox", class: "publish-box", checked: row.isPublished, "aria-label": `publish ${row.name}`, title: "Publish this topic", hidden: true, onchange: () => {
+    row.publishBox = h("input", { type: "checkbox", class: "publish-box", checked: row.isPublished, "aria-label": t("publish {name}", { name: row.name }), title: "Publish this topic", hidden: true, onchange: () => {
       row.isPublished = row.publishBox.checked;
       this.publish();
     } });
-    const element = h("div", { class: "bag-label", title: `${row.name}\n${row.type}\n${row.count} messages` }, row.box,
+    const element = h("div", { class: "bag-label", title: `${row.name}\n${row.type}\n${t("{count} messages", { count: row.count })}` }, row.box,
       h("span", { class: "swatch", style: null }), h("span", { class: "name" }, row.name), h("span", { class: "num" }, String(row.count)), row.publishBox);
     element.style.height = `${row.height}px`;
     element.querySelector(".swatch").style.background = color(row.type);
@@ -401,7 +402,7 @@ class Player {
     this.state = state;
     const isPlaying = !state.paused && !state.ended;
     setText(this.playButton, isPlaying ? "❙❙" : "▶");
-    this.playButton.title = isPlaying ? "Pause (space)" : "Play (space)";
+    this.playButton.title = isPlaying ? t("Pause (space)") : t("Play (space)");
     this.playButton.setAttribute("aria-label", this.playButton.title);
     this.playButton.setAttribute("aria-pressed", String(isPlaying));
     setText(this.speedText, `${Number(state.rate.toPrecision(2))}×`);
@@ -443,7 +444,7 @@ class Player {
     let error = "";
     try {
       const definition = this.link.definition(row.type, row.definition);
-      if (!definition) throw new Error("its definition cannot be read");
+      if (!definition) throw new Error(t("its definition cannot be read"));
       message = decode(definition, new Uint8Array(data, HEAD_BYTES));
       if (isMoment) this.cards.get(row.name)?.show(message, time);
       if (!isMoment && IMAGES.has(row.type)) {
@@ -634,7 +635,7 @@ async function pictureOf(message) {
   try {
     return await createImageBitmap(new Blob([message.data]));
   } catch {
-    throw new Error(`a compressed image of format "${message.format}" cannot be shown by this browser`);
+    throw new Error(t('a compressed image of format "{format}" cannot be shown by this browser', { format: message.format }));
   }
 }
 

@@ -2,6 +2,7 @@
 
 import { h, setText } from "../dom.js";
 import { Door } from "../door.js";
+import { t } from "../texts.js";
 
 const PROTOCOL = "minirospy.joints.v1";
 const STEPS = 1000;
@@ -21,19 +22,19 @@ export class Joints {
     const button = (text, op, title) => h("button", { type: "button", title, onclick: () => this.door.send({ op }) }, text);
     this.buttons = [button("Center", "center", "All joints to their zeros"), button("Randomize", "randomize", "All joints anywhere between their limits")];
     this.publishing = h("input", { type: "checkbox", onchange: () => this.door.send({ op: "publish", on: this.publishing.checked }) });
-    this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, this.publishText = h("span", {}, "Publish"));
+    this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, this.publishText = h("span", {}, t("Publish")));
     this.problem = h("p", { class: "error", role: "alert" });
     this.warning = h("p", { class: "joint-warning" });
     this.about = h("p", { class: "muted" });
     this.list = h("div", { class: "panel joints" });
     this.empty = h("p", { class: "empty" });
-    main.append(h("div", { class: "bar" }, this.filter, h("label", {}, this.inDegrees, "degrees"), this.buttons, this.publishLabel,
+    main.append(h("div", { class: "bar" }, this.filter, h("label", {}, this.inDegrees, t("degrees")), this.buttons, this.publishLabel,
       h("button", { type: "button", title: "Read robot_description again", "aria-label": "Read robot_description again", onclick: () => this.door.send({ op: "reload" }) }, "↻")),
     this.problem, this.warning, this.list, this.about, this.empty);
     this.door = new Door(link, PROTOCOL, {
       writes: (writes) => {
         this.writes = writes;
-        setText(this.problem, writes ? "" : "This token is read-only: it sets no joints.");
+        setText(this.problem, writes ? "" : t("This token is read-only: it sets no joints."));
         this.enable();
       },
       joints: (joints, { why }) => this.show(joints, why),
@@ -66,9 +67,9 @@ export class Joints {
       this.list.append(row.element);
     }
     this.list.hidden = !this.rows.size;
-    setText(this.empty, joints ? (this.rows.size ? "" : "This robot has no joint that can be set.") : why);
-    setText(this.about, joints ? [joints.robot, `${joints.topic} at ${joints.rate} Hz while it is published`, joints.sources.length ? `follows ${joints.sources.join(", ")}` : "", ...joints.warnings].filter(Boolean).join(" · ") : "");
-    setText(this.publishText, joints ? `Publish ${joints.topic}` : "Publish");
+    setText(this.empty, joints ? (this.rows.size ? "" : t("This robot has no joint that can be set.")) : why);
+    setText(this.about, joints ? [joints.robot, t("{topic} at {rate} Hz while it is published", { topic: joints.topic, rate: joints.rate }), joints.sources.length ? t("follows {sources}", { sources: joints.sources.join(", ") }) : "", ...joints.warnings].filter(Boolean).join(" · ") : "");
+    setText(this.publishText, joints ? t("Publish {topic}", { topic: joints.topic }) : t("Publish"));
     this.enable();
     this.showFiltered();
     if (this.state) this.follow(this.state);
@@ -89,7 +90,7 @@ export class Joints {
       event.preventDefault();
       set(row.position + (step * (upper - lower)) / 100);
     });
-    row.input = h("input", { type: "number", step: "any", "aria-label": `position of ${name}`, onchange: () => {
+    row.input = h("input", { type: "number", step: "any", "aria-label": t("position of {name}", { name }), onchange: () => {
       const value = Number(row.input.value);
       if (row.input.value !== "" && Number.isFinite(value)) set(value / this.factor(row));
       else this.showRow(row);
@@ -107,7 +108,7 @@ export class Joints {
   // A joint that mimics another one.
   makeFollower(name, kind) {
     const row = { name, kind, slider: null, position: 0, value: h("span", { class: "num joint-value" }), unit: h("span", { class: "muted" }) };
-    row.element = h("div", { class: "joint follower" }, h("span", { class: "name" }, name), h("span", { class: "muted joint-kind" }, kind), h("span", { class: "muted joint-follows" }, "follows another joint"), row.value, row.unit);
+    row.element = h("div", { class: "joint follower" }, h("span", { class: "name" }, name), h("span", { class: "muted joint-kind" }, kind), h("span", { class: "muted joint-follows" }, t("follows another joint")), row.value, row.unit);
     row.element.dataset.joint = name;
     return row;
   }
@@ -147,7 +148,8 @@ export class Joints {
     this.state = state;
     this.publishing.checked = state.publishing;
     this.publishLabel.classList.toggle("on", state.publishing);
-    setText(this.warning, state.others.length ? `${state.others.join(", ")} ${state.others.length > 1 ? "publish" : "publishes"} ${this.joints?.topic ?? "joint states"}, too: the robot jumps between both.` : "");
+    setText(this.warning, state.others.length ? t(state.others.length > 1 ? "{names} publish {topic}, too: the robot jumps between both." : "{names} publishes {topic}, too: the robot jumps between both.",
+      { names: state.others.join(", "), topic: this.joints?.topic ?? t("joint states") }) : "");
     this.warning.hidden = !state.others.length || !state.publishing;
     const now = performance.now();
     let isLeft = false;

@@ -2,11 +2,12 @@
 
 import { fill, h, setText } from "../dom.js";
 import { Door } from "../door.js";
+import { t } from "../texts.js";
 
 const PROTOCOL = "minirospy.launch.v1";
 const MOST_LOG = 400_000; // characters
 const GOOD = "d0";
-const LEVELS = { running: GOOD, starting: "d1", ending: "d1", stopping: "d1", stopped: "d3", ended: "d3", failed: "d2" };
+const LEVELS = { "running": GOOD, "starting": "d1", "ending": "d1", "stopping": "d1", "stopped": "d3", "ended": "d3", "failed": "d2" };
 
 export class Launch {
   constructor(link, words, main, place) {
@@ -25,7 +26,7 @@ export class Launch {
     this.logTitle = h("span", { class: "name" });
     this.text = h("pre", { class: "launch-log", tabindex: 0, role: "log" });
     this.log = h("section", { class: "panel launch-output", hidden: true },
-      h("div", { class: "bar" }, this.logTitle, h("span", { class: "spring" }), h("button", { type: "button", class: "small", onclick: () => this.text.replaceChildren() }, "clear"),
+      h("div", { class: "bar" }, this.logTitle, h("span", { class: "spring" }), h("button", { type: "button", class: "small", onclick: () => this.text.replaceChildren() }, t("clear")),
         h("button", { type: "button", class: "small", "aria-label": "Close the log", onclick: () => this.follow(null) }, "×")), this.text);
     main.append(h("div", { class: "split launch" },
       h("div", { class: "panel side details launch-side" }, h("div", { class: "bar" }, this.filter, h("button", { type: "button", title: "Look for launch files again", "aria-label": "Look for launch files again", onclick: () => this.door.send({ op: "list" }) }, "↻")), this.list),
@@ -70,12 +71,12 @@ export class Launch {
         if (name === this.chosen?.[0] && file === this.chosen[1]) button.setAttribute("aria-current", "true");
         return button;
       }))));
-    if (!shown.length) fill(this.list, h("p", { class: "muted" }, this.files.length ? "No launch file fits the filter." : "No package has a launch file."));
+    if (!shown.length) fill(this.list, h("p", { class: "muted" }, this.files.length ? t("No launch file fits the filter.") : t("No package has a launch file.")));
     this.showEmpty();
   }
 
   showEmpty() {
-    setText(this.empty, this.writes === false || this.launches.length || !this.form.hidden ? "" : "Choose a launch file: its arguments appear here, and Start runs its nodes.");
+    setText(this.empty, this.writes === false || this.launches.length || !this.form.hidden ? "" : t("Choose a launch file: its arguments appear here, and Start runs its nodes."));
   }
 
   describe(name, file) {
@@ -91,7 +92,7 @@ export class Launch {
     this.inputs = new Map(args.map(([each, value, doc]) => [each, { value, doc, input: argInput(each, value) }]));
     fill(this.form, h("h2", {}, h("span", { class: "muted" }, `${name} / `), file),
       [...this.inputs].map(([each, { value, doc, input }]) => h("label", { class: "launch-arg" }, h("span", { class: "key" }, each), input,
-        h("span", { class: "muted hint" }, doc || "", doc && value === null ? " " : "", value === null ? h("em", {}, "required") : ""))),
+        h("span", { class: "muted hint" }, doc || "", doc && value === null ? " " : "", value === null ? h("em", {}, t("required")) : ""))),
       args.length ? null : h("p", { class: "muted" }, "It has no arguments."),
       h("div", { class: "bar" }, h("button", { type: "submit", class: "primary" }, "Start"),
         h("code", { class: "muted" }, this.commandLine = h("span", {}))));
@@ -146,7 +147,7 @@ export class Launch {
     const words = Object.entries(args).map(([key, value]) => `${key}:=${value}`).join(" ");
     run.element = h("section", { class: "panel launch-run" },
       h("h2", {}, run.badge, h("span", { class: "name" }, `${name} / ${file}`), h("code", { class: "muted" }, words), h("span", { class: "spring" }),
-        h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: "" }) }, "roslaunch log"), run.restart, run.stop, run.remove),
+        h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: "" }) }, t("roslaunch log")), run.restart, run.stop, run.remove),
       run.error, h("table", { class: "values launch-nodes" }, run.table));
     run.element.dataset.file = file;
     this.area.prepend(run.element);
@@ -155,7 +156,7 @@ export class Launch {
 
   showRun(run, launch) {
     run.badge.className = `badge ${launch.error ? "d2" : LEVELS[launch.state]}`;
-    setText(run.badge, launch.state);
+    setText(run.badge, t(launch.state));
     setText(run.error, launch.error);
     run.stop.hidden = launch.state === "ended";
     run.stop.disabled = launch.state === "stopping";
@@ -169,8 +170,8 @@ export class Launch {
   makeNode(run, id, { name, program }) {
     const end = (restarts) => () => this.door.send({ op: "end", id, node: name, restarts });
     const row = { badge: h("span", { class: "badge" }), pid: h("span", { class: "num" }), starts: h("span", { class: "muted" }),
-      restart: h("button", { type: "button", class: "small", onclick: end(true) }, "restart"), stop: h("button", { type: "button", class: "small", onclick: end(false) }, "stop") };
-    row.log = h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: name }) }, "log");
+      restart: h("button", { type: "button", class: "small", onclick: end(true) }, t("restart")), stop: h("button", { type: "button", class: "small", onclick: end(false) }, t("stop")) };
+    row.log = h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: name }) }, t("log"));
     row.element = h("tr", {}, h("td", {}, row.badge), h("th", { scope: "row" }, name), h("td", { class: "muted" }, program), h("td", {}, row.starts), h("td", {}, row.pid), h("td", { class: "launch-buttons" }, row.log, row.restart, row.stop));
     row.element.dataset.node = name;
     run.table.append(row.element);
@@ -180,8 +181,8 @@ export class Launch {
   showNode(row, node, launch) {
     const isBad = node.state === "exited" && node.status !== 0;
     row.badge.className = `badge ${node.state === "exited" ? (isBad ? "d2" : "d3") : LEVELS[node.state]}`;
-    setText(row.badge, node.state === "exited" ? (isBad ? `exited: ${statusText(node.status)}` : "finished") : node.state === "failed" ? "not started" : node.state);
-    setText(row.starts, node.starts > 1 ? `started ${node.starts} times` : node.respawns ? "respawns" : "");
+    setText(row.badge, node.state === "exited" ? (isBad ? t("exited: {status}", { status: statusText(node.status) }) : t("finished")) : node.state === "failed" ? t("not started") : t(node.state));
+    setText(row.starts, node.starts > 1 ? t("started {count} times", { count: node.starts }) : node.respawns ? t("respawns") : "");
     setText(row.pid, node.pid ? `pid ${node.pid}` : "");
     row.log.disabled = node.starts === 0;
     row.restart.disabled = row.stop.disabled = node.state !== "running" || launch.state !== "running";
@@ -211,7 +212,7 @@ export class Launch {
       this.text.append(level ? h("span", { class: level }, line) : document.createTextNode(line));
     }
     while (this.text.textContent.length > MOST_LOG) this.text.firstChild.remove();
-    if (isFirst && !text) this.text.append(h("span", { class: "muted" }, "It has printed nothing yet."));
+    if (isFirst && !text) this.text.append(h("span", { class: "muted" }, t("It has printed nothing yet.")));
     if (isAtEnd || isFirst) this.text.scrollTop = this.text.scrollHeight;
   }
 }
@@ -229,5 +230,5 @@ function groupsOf(rows) {
 }
 
 function statusText(status) {
-  return status < 0 ? `signal ${-status}` : String(status);
+  return status < 0 ? t("signal {number}", { number: -status }) : String(status);
 }
