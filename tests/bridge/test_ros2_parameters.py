@@ -129,6 +129,11 @@ def test_parameters_of_ros2_are_read_and_set_by_services() -> None:
             ("get_param", ("/peer:none", ""), r"has no parameter \[none\]"),
             ("get_param", ("none", ""), "write /node:parameter"),
             ("set_param", ("/peer:gains", "{"), "is not JSON"),
+            ("set_param", ("/peer:gains", "[" * 100_000), "is not JSON"),
+            ("set_param", ("/peer:gains", str(2**64)), "64 bits"),
+            ("set_param", ("/peer:gains", f"[1.5, {10**400}]"), "does not fit into ROS 2"),
+            ("get_param", ("/peer:gains",), "ends too early"),
+            ("set_param", (), "ends too early"),
         ):
             with pytest.raises(ServiceException, match=reason):
                 await call(service, *texts)

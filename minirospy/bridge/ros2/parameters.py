@@ -124,7 +124,7 @@ class ParameterBridge:
             raise ServiceException(str(error)) from error
 
     async def _get(self, texts: list[str]) -> bytes:
-        node, name = _parts(texts[0])
+        node, name = _parts(_two(texts)[0])
         value = await self._waited(lambda: self._side.node_parameters().get(node, name))
         if not value.type:
             if not texts[1]:
@@ -134,12 +134,17 @@ class ParameterBridge:
         return _text(json.dumps(found, default=lambda each: list(each.data)))
 
     async def _set(self, texts: list[str]) -> bytes:
-        node, name = _parts(texts[0])
+        node, name = _parts(_two(texts)[0])
         try:
             value = json.loads(texts[1])
-        except ValueError as error:
+            made = Value(0) if value is None else ros2_value(value)
+        except (ValueError, RecursionError) as error:
             raise BridgeError(f"the value of [{name}] is not JSON: {error}") from error
-        made = Value(0) if value is None else ros2_value(value)
+        except OverflowError as error:
+            raise BridgeError(f"the value of [{name}] does not fit into ROS 2: {error}") from error
+        numbers = made.value if isinstance(made.value, list) else [made.value]
+        if any(isinstance(each, int) and not -(2**63) <= each < 2**63 for each in numbers):
+            raise BridgeError(f"the value of [{name}] does not fit into the 64 bits of an integer in ROS 2")
         await self._waited(lambda: self._side.node_parameters().set(node, name, made))
         return b""
 
@@ -168,6 +173,13 @@ def _parts(name: str) -> tuple[str, str]:
 def _text(text: str) -> bytes:
     data = text.encode("utf-8", "surrogateescape")
     return _LENGTH.pack(len(data)) + data
+
+
+def _two(texts: list[str]) -> list[str]:
+    """Return the texts of a request that has two. Raise ValueError where it has fewer."""
+    if len(texts) < 2:
+        raise ValueError("the request ends too early")
+    return texts
 
 
 def _texts(data: bytes) -> list[str]:
