@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import Callable
 from io import BytesIO
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -26,9 +28,12 @@ from minirospy.bridge.ros2.action_messages import (
 )
 from minirospy.bridge.ros2.actions import ActionPair, empty_message
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
+from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
-from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
+from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos2
+from minirospy.bridge.ros2.rclpy_actions import ActionClient as Ros2ActionClient
 from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
+from minirospy.bridge.ros2.side import RclpySide
 from minirospy.errors import DeserializationError
 from minirospy.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
@@ -257,3 +262,51 @@ def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
         assert pairs[1].reason.startswith("[odd_msgs/OddGoal] is not defined here")
 
     bridged(scene)
+
+
+class LateServer:
+    """rclpy's client of an action, whose server answers when the test says so."""
+
+    def __init__(self, *_: object, **__: object) -> None:
+        self.answered: list[Callable[[Any], None]] = []
+        self.cancelled = 0
+        self.accepted = True
+
+    def send_goal_async(self, _: object, *, goal_uuid: object) -> Any:
+        return SimpleNamespace(add_done_callback=self.answered.append)
+
+    def cancel_goal_async(self) -> None:
+        self.cancelled += 1
+
+
+def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    server = LateServer()
+    monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionClient=lambda *_, **__: server))
+    uuids = SimpleNamespace(UUID=lambda **_: None)
+    monkeypatch.setitem(sys.modules, "unique_identifier_msgs", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "unique_identifier_msgs.msg", uuids)
+    node = SimpleNamespace(create_subscription=lambda *_, **__: None)
+    executor = SimpleNamespace(create_task=lambda function, *words: function(*words))
+    options = {"callback_group": None, "qos_profile": None}
+    calls: Any = SimpleNamespace(
+        node=node, executor=executor, options=options, deserialize=lambda data, _: data
+    )
+    class_: Any = SimpleNamespace(Impl=SimpleNamespace(FeedbackMessage=None), Goal=None)
+    client = Ros2ActionClient(calls, "/fly", class_)
+
+    accepted = client.send(b"", lambda _: None)
+    server.answered.pop()(SimpleNamespace(result=lambda: server))
+    assert isinstance(accepted.result(0), GoalOfRos2)
+    assert (server.cancelled, len(client._callbacks)) == (0, 1)
+
+    client.send(b"", lambda _: None).cancel()
+    server.answered.pop()(SimpleNamespace(result=lambda: server))
+    assert (server.cancelled, len(client._callbacks)) == (1, 1)
+
+
+@pytest.mark.parametrize("type_", ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00"])
+def test_a_type_that_is_not_a_name_is_never_imported(type_: str) -> None:
+    for found in (RclpySide._class, RclpySide._service_class, RclpySide._action_class):
+        with pytest.raises(TypesDiffer):
+            found(type_)

@@ -59,7 +59,7 @@ class _Goal:
         self._cancel = cancel
 
     def cancel(self) -> None:
-        """Ask the server to cancel the goal. From any thread."""
+        """Request the server to cancel the goal. From any thread."""
         self._cancel(self)
 
     def accept(self, is_accepted: bool) -> None:
@@ -153,7 +153,7 @@ class GoalsToRos1:
         try:
             is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), _SERVER_SECONDS)
         except asyncio.TimeoutError:
-            del self._goals[id.id]
+            self._goals.pop(id.id, None)
             self._cancel.publish_raw(cancel_message(id))
             raise
         return goal if is_accepted else None

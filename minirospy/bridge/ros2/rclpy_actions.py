@@ -100,7 +100,7 @@ class GoalOfRos2:
         self._on_end = on_end
 
     def cancel(self) -> None:
-        """Ask the server to cancel the goal."""
+        """Request the server to cancel the goal."""
         self._calls.executor.create_task(self._handle.cancel_goal_async)
 
     def result(self) -> Future[tuple[int, bytes]]:
@@ -108,9 +108,9 @@ class GoalOfRos2:
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: RclpyFuture) -> None:
-            response = done.result()
-            self._on_end()
             try:
+                response = done.result()
+                self._on_end()
                 result = self._calls.serialize(getattr(response, "result"))  # noqa: B009 - not known here
                 found = (int(getattr(response, "status")), result)  # noqa: B009
             except Exception as error:  # noqa: BLE001 - whatever rclpy raises
@@ -181,8 +181,13 @@ class ActionClient:
             handle = cast("_ClientHandle", done.result())
             if not handle.accepted:
                 self._callbacks.pop(id, None)
-            with contextlib.suppress(InvalidStateError):
+            try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
+            except InvalidStateError:
+                # Nobody waits any more, and in ROS 1 the goal counts as refused: it must not run.
+                self._callbacks.pop(id, None)
+                if handle.accepted:
+                    handle.cancel_goal_async()
 
         try:
             message = self._calls.deserialize(goal, self._class.Goal)
@@ -217,7 +222,7 @@ class GoalOfRos1(Protocol):
         """The future status, one of those above, and result, None for an empty one."""
 
     def cancel(self) -> None:
-        """Ask the server to cancel the goal. From any thread."""
+        """Request the server to cancel the goal. From any thread."""
 
 
 class Feedback:

@@ -11,6 +11,7 @@ import contextlib
 import importlib
 import logging
 import os
+import re
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -100,6 +101,7 @@ def require_rclpy() -> None:
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables that name a file with Fast DDS's settings: the second up to version 2, which _OLD_DISTRIBUTIONS have."""
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
 
 
@@ -389,6 +391,9 @@ class _Subscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
+    # A server of the other side has named it: a relative or dotted name is not a package's.
+    if not (_NAME.fullmatch(package) and _NAME.fullmatch(name)):
+        return None
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name, None)
     except ImportError:
