@@ -34,6 +34,13 @@ TRANSLATED = (
     "bag",
     "launch",
     "joints",
+    "reconfigure",
+    "nodes",
+    "actions",
+    "tf",
+    "smach",
+    "plot",
+    "graph",
 )
 """The views whose texts have German ones; add yours."""
 

@@ -2,6 +2,7 @@
 // Source: http://wiki.ros.org/tf2/Design.
 
 import { Rate } from "./rates.js";
+import { t } from "./texts.js";
 
 const CONFLICT_SECONDS = 3; // in which a frame has two parents
 const LEAST_AGE = 1; // seconds, under which no frame is old
@@ -55,13 +56,13 @@ export class Frames {
     const frame = this.frames.get(name);
     if (!frame) return "";
     const parents = [...frame.parents].filter(([, at]) => frame.isStatic || now - at < CONFLICT_SECONDS).map(([parent]) => parent);
-    if (parents.length > 1) return `It has ${parents.length} parents, ${parents.sort().join(" and ")}: let one node alone publish it.`;
-    if (this.isCycle(name)) return "It is its own ancestor: no transform through it can be computed.";
+    if (parents.length > 1) return t("It has {count} parents, {names}: let one node alone publish it.", { count: parents.length, names: parents.sort().join(t(" and ")) });
+    if (this.isCycle(name)) return t("It is its own ancestor: no transform through it can be computed.");
     if (frame.isStatic) return "";
     const { age } = this.measured(name, now);
     // By the rate that it had: three seconds after its last message that is no longer measured.
     const limit = Math.max(LEAST_AGE, frame.usualHz ? OLD_PERIODS / frame.usualHz : 0);
-    return age > limit ? `No transform for ${age.toFixed(age < 10 ? 1 : 0)} s: its publisher has stopped, or is slow.` : "";
+    return age > limit ? t("No transform for {age} s: its publisher has stopped, or is slow.", { age: age.toFixed(age < 10 ? 1 : 0) }) : "";
   }
 
   /** Remember the rates, by which frames are found to be old. */

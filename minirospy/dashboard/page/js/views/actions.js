@@ -3,6 +3,7 @@
 import { fill, h, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
 import { actionServers, isRunning, progressOf, stampOf, statusWord } from "../actions.js";
+import { t } from "../texts.js";
 import { yaml } from "./services.js";
 
 const CANCEL_TYPE = "actionlib_msgs/GoalID";
@@ -30,7 +31,7 @@ export class Actions {
     this.buttons = h("div", { class: "bar", hidden: true }, this.sendButton, this.cancelButton);
     this.problem = h("p", { class: "error", role: "alert" });
     this.rows = h("tbody", {});
-    this.table = h("table", { class: "goals" }, h("thead", {}, h("tr", {}, ["Goal", "Status", "", ""].map((each) => h("th", { scope: "col" }, each)))), this.rows);
+    this.table = h("table", { class: "goals" }, h("thead", {}, h("tr", {}, ["Goal", "Status", "", ""].map((each) => h("th", { scope: "col" }, each && t(each))))), this.rows);
     this.noGoals = h("p", { class: "muted" });
     this.badge = h("span", { class: "badge" });
     this.title = h("h2", { class: "grow" });
@@ -71,7 +72,7 @@ export class Actions {
     const names = servers.map(({ name }) => name);
     if (names.join(" ") !== this.names || !this.choice.options.length) {
       this.names = names.join(" ");
-      fill(this.choice, h("option", { value: "" }, names.length ? `choose one of ${names.length} action servers` : "no action servers"),
+      fill(this.choice, h("option", { value: "" }, names.length ? t("choose one of {count} action servers", { count: names.length }) : t("no action servers")),
         names.map((name) => h("option", { value: name }, name)));
     }
     const server = servers.find(({ name }) => name === this.name);
@@ -80,10 +81,10 @@ export class Actions {
     const mayWrite = this.link.state === "open" && this.link.mayWrite;
     this.sendButton.disabled = this.cancelButton.disabled = !mayWrite || !server;
     if (!server && !this.type) {
-      fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" ? "" : names.length ? "Choose an action server: its goal becomes a form." : "No node offers an action. Start one: it appears here."));
+      fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" ? "" : names.length ? t("Choose an action server: its goal becomes a form.") : t("No node offers an action. Start one: it appears here.")));
       setText(this.noGoals, "");
     }
-    if (this.type) setText(this.about, `${this.type}Action${server || this.link.state !== "open" ? "" : ": the server has left"}`);
+    if (this.type) setText(this.about, `${this.type}Action${server || this.link.state !== "open" ? "" : t(": the server has left")}`);
   }
 
   choose(name) {
@@ -109,7 +110,7 @@ export class Actions {
       }),
     ];
     this.buttons.hidden = true;
-    fill(this.fields, h("p", { class: "muted" }, this.link.mayWrite ? "" : "This token is read-only: it sends no goals."));
+    fill(this.fields, h("p", { class: "muted" }, this.link.mayWrite ? "" : t("This token is read-only: it sends no goals.")));
     if (!this.link.mayWrite) return;
     try {
       const { definition } = await this.link.tools.request({ do: "type", name: `${type}ActionGoal` });
@@ -169,7 +170,7 @@ export class Actions {
     if (!goal) {
       if (this.goals.size >= MOST_GOALS) this.forgetOne();
       goal = { id, status: null, text: "", isOwn: false, isListed: false, received: null };
-      const cancel = h("button", { type: "button", class: "small", title: `Cancel ${id}`, onclick: () => this.cancel(id) }, "cancel");
+      const cancel = h("button", { type: "button", class: "small", title: t("Cancel {id}", { id }), onclick: () => this.cancel(id) }, t("cancel"));
       goal.cancel = cancel;
       goal.row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.select(this.chosen === id ? null : id) }, id)),
         h("td", {}, h("span", { class: "badge" })), h("td", { class: "muted" }), h("td", {}, cancel));
@@ -222,13 +223,13 @@ export class Actions {
       const status = goal.finalStatus ?? goal.status;
       const [, badgeCell, textCell] = goal.row.children;
       showBadge(badgeCell.firstChild, status);
-      setText(textCell, goal.text || (goal.isOwn ? "sent here" : ""));
+      setText(textCell, goal.text || (goal.isOwn ? t("sent here") : ""));
       goal.cancel.hidden = status === null ? !goal.isOwn : !isRunning(status);
       goal.cancel.disabled = !this.link.mayWrite;
       goal.row.classList.toggle("selected", goal.id === this.chosen);
     }
     this.table.hidden = !this.goals.size;
-    setText(this.noGoals, !this.type ? "" : isStale ? "The server has sent no status for 5 seconds." : this.goals.size ? "" : "None yet.");
+    setText(this.noGoals, !this.type ? "" : isStale ? t("The server has sent no status for 5 seconds.") : this.goals.size ? "" : t("None yet."));
     const goal = this.goals.get(this.chosen);
     this.details.hidden = !goal;
     if (!goal) return;
@@ -237,12 +238,12 @@ export class Actions {
     const progress = goal.finalStatus === 3 ? 1 : progressOf(goal.feedback);
     this.bar.hidden = progress === null;
     if (progress !== null) this.bar.value = progress;
-    setText(this.feedback, goal.feedback ? yaml(goal.feedback) || "(no fields)" : "none yet");
-    setText(this.result, goal.result ? yaml(goal.result) || "(no fields)" : "none yet");
+    setText(this.feedback, goal.feedback ? yaml(goal.feedback) || t("(no fields)") : t("none yet"));
+    setText(this.result, goal.result ? yaml(goal.result) || t("(no fields)") : t("none yet"));
   }
 }
 
 function showBadge(badge, status) {
-  setText(badge, status === null ? "Sent" : statusWord(status));
+  setText(badge, status === null ? t("Sent") : t(statusWord(status)));
   badge.className = `badge ${status === 3 ? "d0" : status === 1 || status === 0 ? "running" : status === null ? "d3" : status === 4 || status === 5 || status === 9 ? "d2" : "d1"}`;
 }

@@ -5,6 +5,7 @@ import { bandwidth, fill, h, setText, svg, uniqueId } from "../dom.js";
 import { elementsOf, groupsOf, trafficOf } from "../graph_elements.js";
 import { PanZoom } from "../panzoom.js";
 import { Rate } from "../rates.js";
+import { t } from "../texts.js";
 
 const MODES = [["active", "Nodes and topics (active)"], ["all", "Nodes and topics (all)"], ["nodes", "Nodes only"]];
 const SHAPES = { n: "node", t: "topic", a: "action" };
@@ -30,12 +31,12 @@ export class Graph {
         svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
     this.details = h("aside", { class: "panel details side", hidden: true });
     this.empty = h("p", { class: "empty" });
-    this.hasRates = h("input", { type: "checkbox", checked: words.get("rates") !== "0", onchange: () => this.change() });
+    this.hasRates = h("input", { type: "checkbox", checked: words.get(t("rates")) !== "0", onchange: () => this.change() });
     this.hasGroups = h("input", { type: "checkbox", checked: words.get("groups") === "1", onchange: () => this.change() });
     this.folds = h("input", { type: "checkbox", checked: words.get("fold") !== "0", onchange: () => this.change() });
     this.faults = h("span", { class: "error", role: "status" });
-    main.append(h("div", { class: "bar" }, this.mode, h("label", {}, this.hidesDebug, "hide debug"), h("label", {}, this.hasRates, "rates"),
-      h("label", {}, this.folds, "fold actions"), h("label", {}, this.hasGroups, "namespaces"), this.filter,
+    main.append(h("div", { class: "bar" }, this.mode, h("label", {}, this.hidesDebug, "hide debug"), h("label", {}, this.hasRates, t("rates")),
+      h("label", {}, this.folds, "fold actions"), h("label", {}, this.hasGroups, t("namespaces")), this.filter,
       h("button", { type: "button", onclick: () => this.panzoom.fit() }, "Fit"), this.faults),
     h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details));
     this.panzoom = new PanZoom(this.picture, this.drawing);
@@ -69,7 +70,7 @@ export class Graph {
       this.signature = signature;
       this.draw(found);
     }
-    this.empty.textContent = found.nodes.size ? "" : this.link.state === "open" ? "No nodes yet. Start one: it appears here." : "";
+    this.empty.textContent = found.nodes.size ? "" : this.link.state === "open" ? t("No nodes yet. Start one: it appears here.") : "";
     if (this.selected) this.showDetails();
   }
 
@@ -88,7 +89,7 @@ export class Graph {
       const { key } = part.dataset;
       part.classList.toggle("bad", dead.has(key) || (key[0] === "t" && Object.hasOwn(mismatches, key.slice(1))));
     }
-    const texts = [dead.size ? `${dead.size} dead node${dead.size === 1 ? "" : "s"}` : "", ...Object.keys(mismatches).slice(0, 2).map((topic) => `${topic} has two types`)];
+    const texts = [dead.size ? t(dead.size === 1 ? "{count} dead node" : "{count} dead nodes", { count: dead.size }) : "", ...Object.keys(mismatches).slice(0, 2).map((topic) => t("{topic} has two types", { topic }))];
     setText(this.faults, texts.filter(Boolean).join(", "));
     for (const { above, below, edge } of this.drawn) {
       const found = this.hasRates.checked ? trafficOf(edge, this.report.traffic) : null;
@@ -168,7 +169,7 @@ export class Graph {
     const kind = SHAPES[key[0]];
     const shape = { x: x - width / 2, y: y - height / 2, width, height, rx: key[0] === "n" ? height / 2 : key[0] === "a" ? 12 : 4 };
     const select = () => this.select(key);
-    const part = svg("g", { class: kind, tabindex: 0, role: "button", "aria-label": `${kind} ${key.slice(1)}`,
+    const part = svg("g", { class: kind, tabindex: 0, role: "button", "aria-label": `${t(kind)} ${key.slice(1)}`,
       onclick: select, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") select(); } },
     svg("rect", shape), svg("text", { x, y: y + 5 }, key.slice(1)));
     part.dataset.key = key;
@@ -210,22 +211,22 @@ export class Graph {
     const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? "", this.report.mismatches[name] ?? "", this.report.nodes.find((node) => node.name === name)?.trouble ?? ""));
     if (content === this.shown) return;
     this.shown = content;
-    const list = (title, items, kind) => (items.length ? [h("h3", {}, `${title} (${items.length})`), h("ul", {}, items.map((each) => h("li", {}, kind
+    const list = (title, items, kind) => (items.length ? [h("h3", {}, `${t(title)} (${items.length})`), h("ul", {}, items.map((each) => h("li", {}, kind
       ? h("button", { type: "button", class: "link", onclick: () => { this.selected = null; this.select(kind + each); } }, each) : each)))] : []);
     if (this.selected[0] === "a") {
       const ends = (part, table) => table.get(`${name}/${part}`) ?? [];
-      fill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, "goals, feedback and results")),
+      fill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, t("goals, feedback and results"))),
         list("Servers", ends("status", published), "n"), list("Clients", [...new Set([...ends("goal", published), ...ends("cancel", published)])], "n"),
         list("Topics", ["goal", "cancel", "status", "feedback", "result"].map((part) => `${name}/${part}`)));
     } else if (this.selected[0] === "n") {
       const node = this.report.nodes.find((each) => each.name === name);
-      fill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, `It does not answer: ${node.trouble}. What to do: ${node.advice}.`) : null,
-        h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, "process and connections")), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
+      fill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}. What to do: {advice}.", { trouble: node.trouble, advice: node.advice })) : null,
+        h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, t("process and connections"))), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
     } else {
       const type = this.link.channels.get(name)?.type;
       this.rateText ??= h("span", { class: "muted" });
       fill(this.details, h("h2", {}, name), h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
-        h("p", {}, h("a", { href: `#/topics?open=${encodeURIComponent(name)}` }, "live values")),
+        h("p", {}, h("a", { href: `#/topics?open=${encodeURIComponent(name)}` }, t("live values"))),
         list("Publishers", published.get(name) ?? [], "n"), list("Subscribers", subscribed.get(name) ?? [], "n"),
         (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."), this.mismatch(name));
     }

@@ -1,6 +1,7 @@
 // Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after the dead.
 
 import { fill, h, setText } from "../dom.js";
+import { t } from "../texts.js";
 
 export class Nodes {
   constructor(link, words, main, place) {
@@ -16,7 +17,7 @@ export class Nodes {
     this.question = h("div", { class: "panel details question", hidden: true, role: "alertdialog", "aria-label": "Confirm" });
     this.result = h("p", { class: "note", role: "status" });
     this.body = h("tbody", {});
-    this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, ["Node", "Host", "Process", "Answers in", "Topics", "Services"].map((each) => h("th", { scope: "col" }, each)))), this.body);
+    this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, ["Node", "Host", "Process", "Answers in", "Topics", "Services"].map((each) => h("th", { scope: "col" }, t(each))))), this.body);
     this.side = h("aside", { class: "panel details side wide", hidden: true });
     this.empty = h("p", { class: "empty" });
     main.append(h("div", { class: "bar" }, this.filter, this.count, this.cleanButton), this.result, this.question,
@@ -51,11 +52,11 @@ export class Nodes {
       before = row;
     }
     const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).length;
-    setText(this.count, this.nodes.size ? `${this.nodes.size} node${this.nodes.size === 1 ? "" : "s"}${dead ? `, ${dead} without an answer` : ""}` : "");
+    setText(this.count, this.nodes.size ? t(this.nodes.size === 1 ? "{count} node" : "{count} nodes", { count: this.nodes.size }) + (dead ? t(", {count} without an answer", { count: dead }) : "") : "");
     this.cleanButton.hidden = !dead;
     this.cleanButton.disabled = !this.mayChange;
     this.table.hidden = !this.nodes.size;
-    setText(this.empty, this.nodes.size || this.link.state !== "open" ? "" : "looking …");
+    setText(this.empty, this.nodes.size || this.link.state !== "open" ? "" : t("looking …"));
   }
 
   get mayChange() {
@@ -73,8 +74,8 @@ export class Nodes {
     const [, host, pid, answer, topics, services] = row.children;
     setText(host, node.host);
     setText(pid, node.pid ? String(node.pid) : "");
-    setText(answer, node.trouble ? "no answer" : `${node.milliseconds.toFixed(1)} ms`);
-    setText(topics, `${node.publishes.length} out, ${node.subscribes.length} in`);
+    setText(answer, node.trouble ? t("no answer") : `${node.milliseconds.toFixed(1)} ms`);
+    setText(topics, t("{out} out, {in} in", { out: node.publishes.length, in: node.subscribes.length }));
     setText(services, String(node.services.length));
     row.classList.toggle("dead", Boolean(node.trouble));
     row.classList.toggle("selected", node.name === this.chosen);
@@ -99,21 +100,21 @@ export class Nodes {
     const topics = (title, list) => part(title, list.map(([topic, type]) => h("li", {}, h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic), " ", h("span", { class: "muted" }, type))));
     const killButton = h("button", { type: "button", class: "danger", disabled: !this.mayChange || node.name === this.link.node, onclick: () => this.askKill(node.name) }, "Kill …");
     this.pingText = h("span", { class: "muted", role: "status" }, this.pings.get(node.name) ?? "");
-    fill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, `It does not answer: ${node.trouble}. `, h("br"), sentence(node.advice)) : null,
-      h("table", { class: "values facts" }, h("tbody", {}, [["host", node.host], ["process", node.pid || ""], ["address", node.uri]].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))))),
+    fill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}.", { trouble: node.trouble }), " ", h("br"), sentence(node.advice)) : null,
+      h("table", { class: "values facts" }, h("tbody", {}, [["host", node.host], ["process", node.pid || ""], ["address", node.uri]].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, t(name)), h("td", {}, value))))),
       h("div", { class: "bar" }, h("button", { type: "button", onclick: () => this.ping(node.name) }, "Ping"), killButton, this.pingText,
-        node.name === this.link.node ? h("span", { class: "muted" }, "this page") : this.mayChange ? null : h("span", { class: "muted" }, "read-only")),
+        node.name === this.link.node ? h("span", { class: "muted" }, t("this page")) : this.mayChange ? null : h("span", { class: "muted" }, t("read-only"))),
       topics("Publishes", node.publishes), topics("Subscribes to", node.subscribes),
       part("Services", node.services.map((name) => h("li", {}, h("a", { href: `#/services?service=${encodeURIComponent(name)}` }, name)))),
       part("Connections", node.links.map(([topic, direction, other, transport, isConnected]) => h("li", { class: isConnected ? "" : "error" },
-        `${direction === "o" ? "→" : direction === "i" ? "←" : "↔"} ${other} `, h("span", { class: "muted" }, `${topic} by ${transport}${isConnected ? "" : ", not connected"}`)))));
+        `${direction === "o" ? "→" : direction === "i" ? "←" : "↔"} ${other} `, h("span", { class: "muted" }, t("{topic} by {transport}", { topic, transport }) + (isConnected ? "" : t(", not connected")))))));
   }
 
   async ping(name) {
     this.showPing(name, "…");
     try {
       const { seconds } = await this.link.tools.request({ do: "ping", node: name });
-      this.showPing(name, `answered in ${(seconds * 1000).toFixed(2)} ms`);
+      this.showPing(name, t("answered in {time} ms", { time: (seconds * 1000).toFixed(2) }));
     } catch (error) {
       this.showPing(name, error.message);
     }
@@ -137,11 +138,11 @@ export class Nodes {
   }
 
   askKill(name) {
-    this.ask(`Shut down ${name}? What it controls stops or goes on without it.`, "Kill", async () => {
-      this.note(`${name} is requested to shut down …`);
+    this.ask(t("Shut down {name}? What it controls stops or goes on without it.", { name }), "Kill", async () => {
+      this.note(t("{name} is requested to shut down …", { name }));
       try {
         await this.link.tools.request({ do: "kill", node: name });
-        this.note(`${name} was requested to shut down.`);
+        this.note(t("{name} was requested to shut down.", { name }));
       } catch (error) {
         this.note(error.message, true);
       }
@@ -150,10 +151,10 @@ export class Nodes {
 
   askCleanup() {
     const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).map(({ name }) => name);
-    this.ask(`Remove ${dead.join(", ")} from the master? A node that still runs and was only unreachable for a moment would have to be started again.`, "Clean up", async () => {
+    this.ask(t("Remove {names} from the master? A node that still runs and was only unreachable for a moment would have to be started again.", { names: dead.join(", ") }), "Clean up", async () => {
       try {
         const removed = await this.link.tools.request({ do: "cleanup", nodes: dead });
-        this.note(removed.length ? `Removed: ${removed.join(", ")}.` : "They answer again: nothing was removed.");
+        this.note(removed.length ? t("Removed: {names}.", { names: removed.join(", ") }) : t("They answer again: nothing was removed."));
       } catch (error) {
         this.note(error.message, true);
       }
@@ -167,7 +168,7 @@ export class Nodes {
 }
 
 function part(title, items) {
-  return items.length ? [h("h3", {}, `${title} (${items.length})`), h("ul", {}, items)] : [];
+  return items.length ? [h("h3", {}, `${t(title)} (${items.length})`), h("ul", {}, items)] : [];
 }
 
 function sentence(text) {

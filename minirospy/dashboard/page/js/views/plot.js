@@ -32,7 +32,7 @@ export class Plot {
     this.known = h("datalist", { id: uniqueId("paths") });
     this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
     this.problem = h("span", { class: "error" });
-    this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, name)));
+    this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, t(name))));
     const wanted = words.get("window") ?? USUAL_WINDOW;
     this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
     this.axis = h("select", { "aria-label": "The x axis", onchange: () => this.setOver(this.axis.value) });
@@ -124,7 +124,7 @@ export class Plot {
   /** Offer time and each series for the x axis. */
   showAxis() {
     const labels = [...this.series.keys(), ...(this.over && !this.series.has(this.over) ? [this.over] : [])];
-    fill(this.axis, h("option", { value: "" }, "time"), labels.map((label) => h("option", { value: label }, label)));
+    fill(this.axis, h("option", { value: "" }, t("time")), labels.map((label) => h("option", { value: label }, label)));
     this.axis.value = this.over;
   }
 
@@ -191,10 +191,10 @@ export class Plot {
     const series = { label, path, raw, samples: raw, kind: "", derived: null, color, axis: "y", isHidden: false };
     const known = this.kinds.get(label) ?? "";
     if (KINDS.some(([kind]) => kind === known)) this.setKind(series, known);
-    const kinds = h("select", { class: "small", "aria-label": `How ${label} is shown`, onchange: () => {
+    const kinds = h("select", { class: "small", "aria-label": t("How {label} is shown", { label }), onchange: () => {
       this.setKind(series, kinds.value);
       this.remember();
-    } }, KINDS.map(([kind, name]) => h("option", { value: kind }, name)));
+    } }, KINDS.map(([kind, name]) => h("option", { value: kind }, t(name))));
     kinds.value = series.kind;
     series.value = h("span", { class: "num" });
     series.count = h("span", { class: "muted count" });
@@ -210,7 +210,7 @@ export class Plot {
       this.rebuild();
     } }, "left axis");
     series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, kinds, axis,
-      h("button", { type: "button", class: "small", title: `Remove ${label}`, onclick: () => this.remove(series) }, "×"));
+      h("button", { type: "button", class: "small", title: t("Remove {name}", { name: label }), onclick: () => this.remove(series) }, "×"));
     series.row.dataset.label = label;
     this.series.set(label, series);
     this.legend.append(series.row);
@@ -379,7 +379,7 @@ export class Plot {
         }
       }
       setText(series.value, value === null || Number.isNaN(value) ? "–" : number(value));
-      setText(series.count, `${series.samples.total} points`);
+      setText(series.count, t("{count} points", { count: series.samples.total }));
     }
   }
 

@@ -2,6 +2,7 @@
 
 import { download, fill, h, setText } from "../dom.js";
 import { converted, describe, requestOf, shownNumber, sliderStep, statesOf, valuesOf, yamlOf } from "../reconfigure.js";
+import { t } from "../texts.js";
 
 const DESCRIPTIONS = "/parameter_descriptions";
 const UPDATES = "/parameter_updates";
@@ -121,14 +122,14 @@ class Panel {
     this.sentStates = null;
     this.isCalling = false;
     this.result = h("p", { class: "note", role: "status" });
-    this.body = h("div", { class: "config" }, h("p", { class: "muted" }, "waiting for its description …"));
-    this.file = h("input", { type: "file", accept: ".yaml,.yml", hidden: true, "aria-label": `File for ${name}`, onchange: () => this.load() });
+    this.body = h("div", { class: "config" }, h("p", { class: "muted" }, t("waiting for its description …")));
+    this.file = h("input", { type: "file", accept: ".yaml,.yml", hidden: true, "aria-label": t("File for {name}", { name }), onchange: () => this.load() });
     this.saveButton = h("button", { type: "button", disabled: true, onclick: () => this.save() }, "Save");
     this.loadButton = h("button", { type: "button", disabled: true, onclick: () => this.file.click() }, "Load");
     this.usualButton = h("button", { type: "button", disabled: true, onclick: () => this.reset() }, "Defaults");
     this.element = h("section", { class: "panel details", "aria-label": name },
       h("div", { class: "bar" }, h("h2", {}, name || "/"), this.result, this.saveButton, this.loadButton, this.usualButton, this.file,
-        h("button", { type: "button", title: `Close ${name}`, onclick: shut }, "×")), this.body);
+        h("button", { type: "button", title: t("Close {name}", { name }), onclick: shut }, "×")), this.body);
     this.element.dataset.server = name;
     this.ends = [
       link.subscribe({ topic: name + DESCRIPTIONS, mode: "latest" }, (item) => this.described(item)),
@@ -153,8 +154,8 @@ class Panel {
     for (const group of this.groups) group.enable?.(mayChange);
     this.saveButton.disabled = !this.values.size;
     this.loadButton.disabled = this.usualButton.disabled = !mayChange;
-    if (!isThere) this.note("This server has left.", true, true);
-    else if (this.link.state === "open" && !this.link.mayWrite) this.note("This token is read-only: values are shown and cannot be changed.", false, true);
+    if (!isThere) this.note(t("This server has left."), true, true);
+    else if (this.link.state === "open" && !this.link.mayWrite) this.note(t("This token is read-only: values are shown and cannot be changed."), false, true);
     else if (this.isStateShown) this.note("");
   }
 
@@ -217,7 +218,7 @@ class Panel {
     box.dataset.group = group.name;
     if (group.type === "hide") this.groups.push({ id: group.id, show: (state) => { box.hidden = !state; } });
     if (group.type === "collapse") {
-      const fold = h("button", { type: "button", class: "fold", "aria-label": `Open ${group.name}`, onclick: () => this.setState(group.id, inside.hidden) });
+      const fold = h("button", { type: "button", class: "fold", "aria-label": t("Open {name}", { name: group.name }), onclick: () => this.setState(group.id, inside.hidden) });
       const show = (state) => {
         inside.hidden = !state;
         fold.setAttribute("aria-expanded", String(state));
@@ -319,13 +320,13 @@ class Panel {
       this.sent = new Map();
       this.show();
       for (const [name] of corrected) this.controls.get(name)?.flash();
-      const texts = corrected.map(([name, value]) => `${name}: ${shownNumber(values.get(name))} instead of ${shownNumber(value)}`);
-      if (texts.length) this.note(`The server has set ${texts.slice(0, 3).join(", ")}${texts.length > 3 ? ", …" : ""}.`);
+      const texts = corrected.map(([name, value]) => t("{name}: {value} instead of {wanted}", { name, value: shownNumber(values.get(name)), wanted: shownNumber(value) }));
+      if (texts.length) this.note(t("The server has set {values}.", { values: `${texts.slice(0, 3).join(", ")}${texts.length > 3 ? ", …" : ""}` }));
     } catch (error) {
       this.sent = new Map();
       // rospy's server fails on the states of groups in every release; what a person sees is folded all the same.
       if (hasStates && !sent.size) return;
-      this.note(`The server refuses ${[...sent.keys()].join(", ")}: ${error.message}`, true);
+      this.note(t("The server refuses {names}: {why}", { names: [...sent.keys()].join(", "), why: error.message }), true);
       this.show();
     }
   }
@@ -348,16 +349,16 @@ class Panel {
     this.file.value = "";
     if (!file) return;
     try {
-      if (file.size > LARGEST_FILE) throw new Error("the file is too large");
+      if (file.size > LARGEST_FILE) throw new Error(t("the file is too large"));
       const values = await this.link.tools.request({ do: "yaml", text: await file.text() });
       const { parameters } = this.description;
       const names = Object.keys(values);
       const known = names.filter((name) => parameters.has(name));
-      if (!known.length) throw new Error(`none of its names is a parameter of ${this.name}`);
+      if (!known.length) throw new Error(t("none of its names is a parameter of {name}", { name: this.name }));
       const found = known.map((name) => [name, converted(parameters.get(name), values[name])]);
       for (const [name, value] of found) this.changes.set(name, value);
       const others = names.filter((name) => !parameters.has(name));
-      this.note(`${found.length} values of ${file.name}${others.length ? `; not known here: ${others.slice(0, 5).join(", ")}` : ""}`);
+      this.note(t("{count} values of {name}", { count: found.length, name: file.name }) + (others.length ? t("; not known here: {names}", { names: others.slice(0, 5).join(", ") }) : ""));
       await this.send();
     } catch (error) {
       this.note(`${file.name}: ${error.message}`, true);
@@ -366,8 +367,8 @@ class Panel {
 }
 
 function limits({ type, min, max, usual, constants }) {
-  const range = type === "int" || type === "double" ? ` from ${shownNumber(min)} to ${shownNumber(max)},` : "";
-  return `${constants.length ? "enum of " : ""}${type},${range} default ${shownNumber(usual)}`;
+  const range = type === "int" || type === "double" ? t(" from {min} to {max},", { min: shownNumber(min), max: shownNumber(max) }) : "";
+  return `${constants.length ? t("enum of ") : ""}${type},${range} ${t("default {value}", { value: shownNumber(usual) })}`;
 }
 
 function makeTabs() {
@@ -444,7 +445,7 @@ function makeField(parameter, changed) {
     if (slider) delete slider.dataset.isEdited;
     changed(text);
   };
-  const slider = step === null ? null : h("input", { type: "range", min: parameter.min, max: parameter.max, step: parameter.type === "int" ? 1 : "any", "aria-label": `Slider of ${parameter.name}`,
+  const slider = step === null ? null : h("input", { type: "range", min: parameter.min, max: parameter.max, step: parameter.type === "int" ? 1 : "any", "aria-label": t("Slider of {name}", { name: parameter.name }),
     oninput: () => {
       slider.dataset.isEdited = "1";
       input.value = text();

@@ -4,6 +4,7 @@ import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
 import { userdataOf } from "../pickle.js";
 import { layoutContainer, roots } from "../smach_layout.js";
+import { t } from "../texts.js";
 
 const STRUCTURE = "smach_msgs/SmachContainerStructure";
 const STATUS = "smach_msgs/SmachContainerStatus";
@@ -69,13 +70,13 @@ export class Smach {
     const text = servers.join(" ");
     if (text !== this.servers) {
       this.servers = text;
-      fill(this.choice, servers.length ? null : h("option", { value: "" }, "no state machine"), servers.map((name) => h("option", { value: name }, name || "/")));
+      fill(this.choice, servers.length ? null : h("option", { value: "" }, t("no state machine")), servers.map((name) => h("option", { value: name }, name || "/")));
     }
     if (!servers.includes(this.server) && servers.length && this.link.state === "open") this.choose(servers[0], false);
     this.choice.value = this.server;
     if (servers.includes(this.server)) this.subscribe();
-    setText(this.empty, this.structures.size || this.link.state !== "open" ? "" : servers.length ? "Waiting for the structure …"
-      : "No state machine publishes what it does: start smach_ros.IntrospectionServer(\"name\", machine, \"/ROOT\") in its program.");
+    setText(this.empty, this.structures.size || this.link.state !== "open" ? "" : servers.length ? t("Waiting for the structure …")
+      : t("No state machine publishes what it does: start {server} in its program.", { server: 'smach_ros.IntrospectionServer("name", machine, "/ROOT")' }));
   }
 
   choose(server, isRemembered = true) {
@@ -123,7 +124,7 @@ export class Smach {
   // --- drawing
 
   draw() {
-    setText(this.empty, this.structures.size ? "" : "Waiting for the structure …");
+    setText(this.empty, this.structures.size ? "" : t("Waiting for the structure …"));
     const signature = JSON.stringify([[...this.structures.values()].map(({ header, ...rest }) => rest), [...this.folded]]);
     if (signature !== this.signature) {
       this.signature = signature;
@@ -189,7 +190,7 @@ export class Smach {
     element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") select(event); });
     element.setAttribute("tabindex", 0);
     element.setAttribute("role", "button");
-    element.setAttribute("aria-label", state === null ? `container ${path}` : `state ${state} of ${path}`);
+    element.setAttribute("aria-label", state === null ? t("container {path}", { path }) : t("state {state} of {path}", { state, path }));
   }
 
   highlight() {
@@ -205,7 +206,7 @@ export class Smach {
       part.classList.toggle("selected", this.selected !== null && key === (this.selected.state === null ? this.selected.path : `${this.selected.path}/${this.selected.state}`));
     }
     const paths = [...active].filter((key) => ![...active].some((other) => other.startsWith(`${key}/`)));
-    setText(this.now, paths.length ? `now: ${paths.join(", ")}` : this.statuses.size ? "no state is active" : "");
+    setText(this.now, paths.length ? t("now: {states}", { states: paths.join(", ") }) : this.statuses.size ? t("no state is active") : "");
   }
 
   // --- details
@@ -218,14 +219,14 @@ export class Smach {
     if (content === this.shown) return;
     this.shown = content;
     if (!structure) {
-      fill(this.details, h("p", { class: "muted" }, "A click on a state or a container shows its outcomes and its userdata."));
+      fill(this.details, h("p", { class: "muted" }, t("A click on a state or a container shows its outcomes and its userdata.")));
       return;
     }
     const state = this.selected?.state ?? null;
     fill(this.details, h("h2", {}, state === null ? path : `${path}/${state}`), this.facts(structure, status, state),
-      h("h3", {}, `Userdata of ${path}`), this.userdata(status),
+      h("h3", {}, t("Userdata of {path}", { path })), this.userdata(status),
       h("h3", {}, "Last changes"), this.events.length ? h("ul", { class: "smach-events" }, this.events.slice(0, 30).map((event) => h("li", {}, h("span", { class: "muted num" }, new Date(event.seconds * 1000).toLocaleTimeString()), " ",
-        h("span", { class: "muted" }, event.path), " → ", event.active.join(", ") || "ended"))) : h("p", { class: "muted" }, "none yet"));
+        h("span", { class: "muted" }, event.path), " → ", event.active.join(", ") || t("ended")))) : h("p", { class: "muted" }, t("none yet")));
   }
 
   facts(structure, status, state) {
@@ -237,24 +238,24 @@ export class Smach {
       if (!this.folded.delete(key)) this.folded.add(key);
       this.shown = null;
       this.draw();
-    } }, this.folded.has(key) ? "unfold" : "fold") : null;
-    const begin = state === null ? null : h("button", { type: "button", class: "small", disabled: !this.link.mayWrite, title: "The container starts with this state the next time that it is run", onclick: () => this.setInitial(path, state) }, "start here next time");
+    } }, this.folded.has(key) ? t("unfold") : t("fold")) : null;
+    const begin = state === null ? null : h("button", { type: "button", class: "small", disabled: !this.link.mayWrite, title: "The container starts with this state the next time that it is run", onclick: () => this.setInitial(path, state) }, t("start here next time"));
     return [
       h("div", { class: "bar" }, begin, fold),
-      state === null ? h("p", { class: "muted" }, `outcomes: ${structure.container_outcomes.join(", ") || "none"}`) : null,
-      status ? h("p", {}, `active: ${activeOf(status).join(", ") || "none"}`, h("br"), h("span", { class: "muted" }, `starts with: ${status.initial_states.join(", ") || "–"}`)) : null,
+      state === null ? h("p", { class: "muted" }, t("outcomes: {names}", { names: structure.container_outcomes.join(", ") || t("none") })) : null,
+      status ? h("p", {}, t("active: {names}", { names: activeOf(status).join(", ") || t("none") }), h("br"), h("span", { class: "muted" }, t("starts with: {names}", { names: status.initial_states.join(", ") || "–" }))) : null,
       h("table", { class: "values" }, h("tbody", {}, transitions.map(([from, label, to]) => h("tr", {}, state === null ? h("td", {}, from) : null, h("th", { scope: "row" }, label), h("td", {}, `→ ${to}`))))),
     ];
   }
 
   userdata(status) {
-    if (!status) return h("p", { class: "muted" }, "not known yet");
+    if (!status) return h("p", { class: "muted" }, t("not known yet"));
     try {
       const rows = userdataOf(status.local_data);
-      if (!rows.length) return h("p", { class: "muted" }, "empty");
+      if (!rows.length) return h("p", { class: "muted" }, t("empty"));
       return h("table", { class: "values" }, h("tbody", {}, rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, text)))));
     } catch (error) {
-      return h("p", { class: "muted" }, `it cannot be read: ${error.message}`);
+      return h("p", { class: "muted" }, t("it cannot be read: {why}", { why: error.message }));
     }
   }
 

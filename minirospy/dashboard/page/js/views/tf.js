@@ -4,6 +4,7 @@ import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
 import { fill, h, number, setText, svg } from "../dom.js";
 import { Frames, eulerOf } from "../frames.js";
 import { PanZoom } from "../panzoom.js";
+import { t } from "../texts.js";
 
 const REFRESH_MS = 500;
 const HEIGHT = 44;
@@ -71,8 +72,9 @@ export class Tf {
     let bad = 0;
     for (const [name, box] of this.boxes) bad += this.show(name, box, now);
     const roots = this.frames.roots();
-    setText(this.summary, names.length ? `${names.length} frames, ${roots.length === 1 ? `root ${roots[0]}` : `${roots.length} trees: ${roots.slice(0, 4).join(", ")}${roots.length > 4 ? ", …" : ""}`}${bad ? `, ${bad} with a problem` : ""}` : "");
-    setText(this.empty, names.length || this.link.state !== "open" ? "" : "Nothing has come on /tf or /tf_static.");
+    setText(this.summary, names.length ? [t("{count} frames", { count: names.length }), roots.length === 1 ? t("root {name}", { name: roots[0] }) : t("{count} trees: {names}", { count: roots.length, names: `${roots.slice(0, 4).join(", ")}${roots.length > 4 ? ", …" : ""}` }),
+      ...(bad ? [t("{count} with a problem", { count: bad })] : [])].join(", ") : "");
+    setText(this.empty, names.length || this.link.state !== "open" ? "" : t("Nothing has come on {topic}.", { topic: t("/tf or /tf_static") }));
     this.showSide(now);
   }
 
@@ -103,7 +105,7 @@ export class Tf {
     const choose = () => this.choose(name);
     const isRoot = !this.frames.frames.has(name);
     const text = svg("text", { x, y: y + 14, class: "measured" });
-    const element = svg("g", { class: `frame-box${isRoot ? " root" : ""}`, tabindex: 0, role: "button", "aria-label": `frame ${name}`,
+    const element = svg("g", { class: `frame-box${isRoot ? " root" : ""}`, tabindex: 0, role: "button", "aria-label": t("frame {name}", { name }),
       onclick: choose, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") choose(); } },
     svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 6 }), svg("text", { x, y: isRoot ? y + 5 : y - 3 }, name), isRoot ? null : text);
     element.dataset.frame = name;
@@ -145,30 +147,30 @@ export class Tf {
     this.side.hidden = !this.boxes.has(this.chosen);
     if (this.side.hidden) return;
     const rows = [];
-    const add = (name, value) => rows.push(h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)));
+    const add = (name, value) => rows.push(h("tr", {}, h("th", { scope: "row" }, t(name)), h("td", {}, value)));
     if (frame) {
-      const { translation: t, rotation: q } = frame.transform;
+      const { translation: p, rotation: q } = frame.transform;
       const { hz, age } = this.frames.measured(this.chosen, now);
       const angles = eulerOf(q);
       add("parent", frame.parent);
-      add("published", frame.isStatic ? "static" : hz === null ? "measuring …" : `${hz.toFixed(1)} Hz`);
-      if (age !== null) add("last one", `${age.toFixed(age < 10 ? 2 : 0)} s ago`);
-      add("x, y, z", [t.x, t.y, t.z].map((each) => number(Number(each.toFixed(4)))).join(", "));
+      add("published", frame.isStatic ? t("static") : hz === null ? t("measuring …") : `${hz.toFixed(1)} Hz`);
+      if (age !== null) add("last one", t("{age} s ago", { age: age.toFixed(age < 10 ? 2 : 0) }));
+      add("x, y, z", [p.x, p.y, p.z].map((each) => number(Number(each.toFixed(4)))).join(", "));
       add("roll, pitch, yaw", `${angles.map((each) => number(Number((each * 180 / Math.PI).toFixed(2)))).join(", ")} °`);
       add("quaternion", [q.x, q.y, q.z, q.w].map((each) => number(Number(each.toFixed(4)))).join(", "));
       const topic = frame.isStatic ? "/tf_static" : "/tf";
-      add(`on ${topic}`, (this.link.graph.published.get(topic) ?? []).join(", "));
+      add(t("on {topic}", { topic }), (this.link.graph.published.get(topic) ?? []).join(", "));
     }
     const children = [...this.frames.frames.values()].filter(({ parent }) => parent === this.chosen).map(({ child }) => child).sort();
     if (children.length) add("children", children.join(", "));
     const problem = this.frames.problem(this.chosen, now);
-    fill(this.side, h("h2", {}, this.chosen), problem ? h("p", { class: "error" }, problem) : null, frame ? null : h("p", { class: "muted" }, "The root of its tree: nobody publishes its parent."),
+    fill(this.side, h("h2", {}, this.chosen), problem ? h("p", { class: "error" }, problem) : null, frame ? null : h("p", { class: "muted" }, t("The root of its tree: nobody publishes its parent.")),
       h("table", { class: "values facts" }, h("tbody", {}, rows)));
   }
 }
 
 function shownRate(frame, { hz, age }) {
-  if (frame.isStatic) return "static";
-  const old = age < 1 ? "" : ` · ${age.toFixed(age < 10 ? 1 : 0)} s ago`;
+  if (frame.isStatic) return t("static");
+  const old = age < 1 ? "" : ` · ${t("{age} s ago", { age: age.toFixed(age < 10 ? 1 : 0) })}`;
   return hz === null ? `…${old}` : `${hz.toFixed(1)} Hz${old}`;
 }
