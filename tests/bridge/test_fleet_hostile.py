@@ -244,3 +244,25 @@ def test_a_parameter_that_is_nested_deeply_is_one_line() -> None:
         asyncio.run(inquiry.robot_parameter(network(nested(900)), "robot1", "/x", 1.0))
     value = asyncio.run(inquiry.robot_parameter(network(nested(40)), "robot1", "/x", 1.0))
     assert yaml.safe_dump(value)
+
+
+def test_an_answer_that_is_too_long_is_named_as_such() -> None:
+    zenoh = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
+    from minirospy.bridge.fleet.network import MOST_TEXT, FleetNetwork, QueryFailed
+
+    class Long:
+        def __len__(self) -> int:
+            return MOST_TEXT + 1
+
+    def get(_: str, handler: Any, **__: object) -> None:
+        handler.callback(stub(ok=stub(key_expr="a", payload=Long())))
+        handler.drop()
+
+    async def check() -> None:
+        network = FleetNetwork(stub(close=lambda: None, get=get), asyncio.get_running_loop())
+        with pytest.raises(QueryFailed, match="more than"):
+            await network.query("a", seconds=1.0)
+        await network.close()
+
+    assert zenoh.handlers.Callback
+    asyncio.run(check())

@@ -349,8 +349,12 @@ class FleetNetwork:
 
         def arrived(reply: _Reply) -> None:
             if reply.ok is not None:
-                if len(reply.ok.payload) <= MOST_TEXT:
-                    found[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
+                is_short = len(reply.ok.payload) <= MOST_TEXT
+                found[str(reply.ok.key_expr)] = (
+                    reply.ok.payload.to_bytes()
+                    if is_short
+                    else QueryFailed(f"the answer has more than {MOST_TEXT} bytes")
+                )
             elif reply.err is not None:
                 text = reply.err.payload.to_bytes()[:2000].decode(errors="replace")
                 found.setdefault("", QueryFailed(escaped(text)))
