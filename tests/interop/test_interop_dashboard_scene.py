@@ -13,6 +13,7 @@ import pytest
 
 from minirospy.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
+from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import needs_node
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.robots.conftest import ARM
@@ -138,6 +139,26 @@ def test_transforms_that_tf2_refuses_are_refused() -> None:
     assert same_frame.startswith("TF_SELF_TRANSFORM")
     assert no_name.startswith("TF_NO_FRAME_ID")
     assert length.startswith("TF_DENORMALIZED_QUATERNION")
+
+
+def test_frames_without_end_are_refused() -> None:
+    calls = [insert("map", f"f{index}", 1, STILL) for index in range(10_000)]
+    *_, last, refused, again = run(*calls, insert("map", "f0", 2, STILL))
+    assert last == ""
+    assert refused == 'more than 10000 frames: "f9999" is left out'
+    assert again == ""
+
+
+def test_parents_of_a_frame_are_the_latest() -> None:
+    body = """
+        const frames = new Frames();
+        const transform = {translation: {x: 0, y: 0, z: 0}, rotation: {x: 0, y: 0, z: 0, w: 1}};
+        for (let at = 0; at < 1000; at++) {
+          const header = {frame_id: `p${at}`, stamp: {secs: at, nsecs: 0}};
+          frames.add({transforms: [{header, child_frame_id: "a", transform}]}, at, true);
+        }
+        return [...frames.frames.get("a").parents.keys()];"""
+    assert run_script("Frames", "js/frames.js", body) == [f"p{index}" for index in range(980, 1000)]
 
 
 def test_frames_of_a_bag_that_starts_again_replace_the_old_ones() -> None:
@@ -341,6 +362,13 @@ def test_config_shows_displays_groups_and_the_view_and_keeps_the_rest() -> None:
     assert manager["Displays"][2] == plan
     assert manager["Views"]["Current"]["Odd"] == 7
     assert found["raw"]["Panels"] == raw["Panels"]
+
+
+@pytest.mark.parametrize("name", ["constructor", "__proto__", "toString"])
+def test_class_named_like_a_property_of_objects_is_unknown(name: str) -> None:
+    display = {"Class": f"rviz/{name}", "Name": "Odd", "Enabled": True}
+    (found,) = run({"call": "config", "raw": {"Visualization Manager": {"Displays": [display]}}})
+    assert found["unknown"] == [f"Odd (rviz/{name})"]
 
 
 def test_config_that_is_not_one_is_refused() -> None:

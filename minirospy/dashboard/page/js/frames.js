@@ -8,6 +8,7 @@ const CONFLICT_SECONDS = 3; // in which a frame has two parents
 const LEAST_AGE = 1; // seconds, under which no frame is old
 const OLD_PERIODS = 10;
 export const MOST_FRAMES = 2000;
+const MOST_PARENTS = 20; // of a frame, the latest
 
 export class Frames {
   constructor() {
@@ -24,7 +25,9 @@ export class Frames {
         frame = { child, rate: new Rate(), parents: new Map() };
         this.frames.set(child, frame);
       }
+      frame.parents.delete(parent);
       frame.parents.set(parent, at);
+      if (frame.parents.size > MOST_PARENTS) frame.parents.delete(frame.parents.keys().next().value);
       frame.rate.add(at, 1, 0);
       Object.assign(frame, { parent, isStatic, transform, stamp: header.stamp.secs + header.stamp.nsecs * 1e-9, at });
     }

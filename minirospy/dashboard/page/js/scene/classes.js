@@ -41,6 +41,7 @@ const ARROW = [
 
 /** Class (without "rviz/") -> {types, topicKey, settings: [[path, kind, default, shown when]], mode}. */
 export const CLASSES = {
+  __proto__: null, // a file may name a class constructor
   Grid: { settings: [
     ["Reference Frame", frame, "<Fixed Frame>"], ["Plane", scheme(["XY", "XZ", "YZ"]), "XY"], ["Plane Cell Count", number, 10], ["Cell Size", number, 1],
     ["Color", color, "160; 160; 164"], ["Alpha", number, 0.5], ["Offset/X", number, 0], ["Offset/Y", number, 0], ["Offset/Z", number, 0]] },

@@ -5,6 +5,7 @@
 export const IDENTITY = Object.freeze({ p: [0, 0, 0], q: [0, 0, 0, 1] });
 const CACHE_SECONDS = 10; // as in tf2
 const MOST_DEPTH = 1000; // frames between one and its root, as in tf2
+const MOST_FRAMES = 10_000; // names that never come again would fill the memory
 const QUATERNION_TOLERANCE = 0.01; // as in tf2
 
 /** Why there is no transform: kind is "unknown", "unconnected", "loop", "future" or "past". */
@@ -124,6 +125,8 @@ export class Frames {
     if (Math.abs(r.x ** 2 + r.y ** 2 + r.z ** 2 + r.w ** 2 - 1) > QUATERNION_TOLERANCE) {
       return `TF_DENORMALIZED_QUATERNION: the rotation of child_frame_id "${child}" is not normalized`;
     }
+
+    if (this.known.size >= MOST_FRAMES && !(this.known.has(parent) && this.known.has(child))) return `more than ${MOST_FRAMES} frames: "${child}" is left out`;
 
     this.version += 1;
     let edge = this.edges.get(child);

@@ -17,6 +17,7 @@ import { Stage } from "./stage.js";
 import { TOOLS, Tools } from "./tools.js";
 
 const DISPLAYS = {
+  __proto__: null, // a file may name a class constructor
   Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, Path, Pose,
   PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera: Linked };
 const KEY = "3d"; // of what the browser keeps
