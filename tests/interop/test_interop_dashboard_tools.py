@@ -24,6 +24,7 @@ from tests.dashboard.conftest import Served, serve
 from tests.dashboard.lamp import make_lamp
 from tests.dashboard.robot import ROBOT
 from tests.interop.browser import Page
+from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import (
     address,
     browse,
@@ -260,3 +261,14 @@ for (const line of {json.dumps(lines)}) {{
         "the pickle is damaged",
         "the pickle is damaged",
     ]
+
+
+@needs_node
+def test_integer_of_userdata_that_is_very_long_is_only_named() -> None:
+    # All its bytes would keep the page busy for minutes.
+    body = """
+        const bytes = new Uint8Array(1_000_008).fill(255);
+        bytes.set([0x80, 2, 0x8b, 0x40, 0x42, 0x0f, 0]);
+        bytes[1_000_007] = 46;
+        return pythonText(readPickle(bytes));"""
+    assert run_script("readPickle, pythonText", "js/pickle.js", body) == "<int of 1000000 bytes>"

@@ -3,6 +3,7 @@
 
 const MARK = Symbol("mark");
 const DEEPEST = 50;
+const LONGEST = 1000; // bytes of an integer that is read: longer ones would keep the page busy
 const MOST_TEXT = 4000; // characters and values of one that is shown
 
 export class PickleError extends Error {}
@@ -45,8 +46,9 @@ export function readPickle(bytes) {
     return width === 4 ? view.getUint32(from, true) : view.getUint8(from);
   };
   const long = (length) => {
-    let value = 0n;
     const from = need(length);
+    if (length > LONGEST) return { kind: `int of ${length} bytes` };
+    let value = 0n;
     for (let index = length - 1; index >= 0; index--) value = (value << 8n) | BigInt(bytes[from + index]);
     value = length ? BigInt.asIntN(length * 8, value) : 0n;
     return value >= BigInt(Number.MIN_SAFE_INTEGER) && value <= BigInt(Number.MAX_SAFE_INTEGER) ? Number(value) : value;

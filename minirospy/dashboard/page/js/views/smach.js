@@ -20,6 +20,7 @@ string[] initial_states
 string local_data
 `;
 const EMPTY_USERDATA = "gAJ9cQAu"; // pickle.dumps({}, 2) as base64
+const MOST_CONTAINERS = 500;
 const MOST_EVENTS = 100;
 const MOST_SENDS = 10;
 const SEND_MS = 400;
@@ -108,10 +109,11 @@ export class Smach {
   }
 
   structure({ message }) {
-    this.structures.set(message.path, message);
+    if (this.structures.size < MOST_CONTAINERS || this.structures.has(message.path)) this.structures.set(message.path, message);
   }
 
   status({ message, seconds }) {
+    if (this.statuses.size >= MOST_CONTAINERS && !this.statuses.has(message.path)) return;
     const before = this.statuses.get(message.path);
     this.statuses.set(message.path, message);
     const active = activeOf(message);
