@@ -94,7 +94,13 @@ export class Link extends EventTarget {
     batch: ({ items }) => {
       // Handled before the next one is made, so a slow page makes batches larger, not more.
       try {
-        for (const item of items) this.entries.get(item.key)?.(item);
+        for (const item of items) {
+          try {
+            this.entries.get(item.key)?.(item);
+          } catch (error) {
+            reportError(error); // of one view: the others get theirs
+          }
+        }
       } finally {
         this.worker.postMessage({ command: "handled" });
       }

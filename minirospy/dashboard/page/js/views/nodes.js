@@ -29,7 +29,14 @@ export class Nodes {
     for (const end of this.endings) end();
   }
 
-  received({ nodes }) {
+  received({ nodes, trouble }) {
+    if (!nodes) {
+      this.hasTrouble = true;
+      this.note(trouble, true);
+      return;
+    }
+    if (this.hasTrouble) this.note("");
+    this.hasTrouble = false;
     this.nodes = new Map(nodes.map((node) => [node.name, node]));
     this.showList();
     this.showSide();
