@@ -1,6 +1,7 @@
 // .rviz files: the server reads and writes their YAML; the file of the command (`rviz -d FILE`) is saved there, others by the browser.
 
 import { download, h } from "../dom.js";
+import { t } from "../texts.js";
 import { writeView } from "./config.js";
 
 const PROTOCOL = "minirospy.rviz.v1";
@@ -48,9 +49,9 @@ export class Files {
       this.name = name;
       this.mayWrite = writes;
       this.saveButton.hidden = !writes;
-      this.saveButton.title = `Save to ${name}`;
+      this.saveButton.title = t("Save to {name}", { name });
       if (config) this.view.open(config);
-      else this.view.say(`${name} does not exist: Save makes it`);
+      else this.view.say(t("{name} does not exist: Save makes it", { name }));
     });
   }
 
@@ -59,7 +60,7 @@ export class Files {
     this.field.value = "";
     if (!file) return undefined;
     return this.run(async () => {
-      if (file.size > MOST_BYTES) throw new Error(`${file.name}: ${file.size} bytes, ${MOST_BYTES} are allowed`);
+      if (file.size > MOST_BYTES) throw new Error(t("{name}: {size} bytes, {most} are allowed", { name: file.name, size: file.size, most: MOST_BYTES }));
       const { config } = await requested(this.view.link, { parse: await file.text() });
       this.view.open(config);
       this.name ||= file.name;
@@ -78,13 +79,13 @@ export class Files {
 
   async save() {
     const { name } = await requested(this.view.link, { save: this.contents() });
-    this.view.say(`saved ${name}`);
+    this.view.say(t("saved {name}", { name }));
   }
 
   async saveAs() {
     const { text } = await requested(this.view.link, { format: this.contents() });
     const name = (this.name || "view.rviz").replace(/^.*[/\\]/, "");
     download(name, new Blob([text], { type: "text/yaml" }));
-    this.view.say(`saved as ${name}`);
+    this.view.say(t("saved as {name}", { name }));
   }
 }

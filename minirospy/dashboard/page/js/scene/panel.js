@@ -1,6 +1,7 @@
 // The list of displays: what is shown, its status, and its settings under RViz's names.
 
 import { fill, h, setText } from "../dom.js";
+import { t } from "../texts.js";
 import { CLASSES, classForType, classOf, getSetting, setSetting, topicKeyOf } from "./classes.js";
 import { fromHex, hexOf, rgbOf } from "./colors.js";
 import { LEVELS } from "./displays/display.js";
@@ -22,7 +23,7 @@ export class Panel {
     this.list = h("div", { class: "displays" });
     this.element = h("div", { class: "panel side details scene-side" },
       h("div", { class: "bar" }, this.choice),
-      h("div", { class: "bar between" }, h("label", { title: "Add a display for each topic that can be shown" }, this.automatic, "show new topics"), h("label", {}, "background", this.background)),
+      h("div", { class: "bar between" }, h("label", { title: "Add a display for each topic that can be shown" }, this.automatic, "show new topics"), h("label", {}, t("background"), this.background)),
       h("div", { class: "display", "data-name": "Global Status" }, h("div", { class: "display-head" }, this.globalDot, h("strong", {}, "Fixed frame"), this.globalText)),
       this.list);
     for (const name of ["pointerdown", "focus"]) this.choice.addEventListener(name, () => this.fillChoice());
@@ -69,7 +70,7 @@ export class Panel {
     const isKnown = Boolean(CLASSES[classOf(settings)]) || classOf(settings) === "Group";
     const dot = h("span", { class: "dot" });
     const title = h("button", { type: "button", class: "display-name", "aria-expanded": "false", title: settings.Class, onclick: () => this.toggle(settings) }, name);
-    const isEnabled = h("input", { type: "checkbox", checked: settings.Enabled !== false, disabled: !isKnown, "aria-label": `show ${name}`, onchange: () => {
+    const isEnabled = h("input", { type: "checkbox", checked: settings.Enabled !== false, disabled: !isKnown, "aria-label": t("show {name}", { name }), onchange: () => {
       settings.Enabled = settings.Value = isEnabled.checked;
       this.view.set(settings, "Enabled");
     } });
@@ -106,8 +107,8 @@ export class Panel {
     found.parts = h("div", { class: "parts" });
     const rows = (CLASSES[classOf(settings)]?.settings ?? []).filter(([, , , isShown]) => !isShown || isShown(settings)).map((each) => this.editor(settings, each));
     const topic = CLASSES[classOf(settings)]?.isLinked ? getSetting(settings, topicKeyOf(classOf(settings))) : "";
-    fill(body, found.status, isKnown ? rows : h("p", { class: "hint" }, `${settings.Class ?? "a display without a class"} cannot be shown here. It is kept when the file is saved.`),
-      topic ? h("a", { href: `#/image?topic=${encodeURIComponent(topic)}` }, "open the view Image") : null, found.parts,
+    fill(body, found.status, isKnown ? rows : h("p", { class: "hint" }, t("{name} cannot be shown here. It is kept when the file is saved.", { name: settings.Class ?? t("a display without a class") })),
+      topic ? h("a", { href: `#/image?topic=${encodeURIComponent(topic)}` }, t("open the view Image")) : null, found.parts,
       h("div", { class: "bar" }, h("button", { type: "button", class: "small", onclick: () => this.rename(settings) }, "Rename"),
         h("button", { type: "button", class: "small", onclick: () => this.view.remove(settings) }, "Remove")));
   }

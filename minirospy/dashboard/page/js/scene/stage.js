@@ -5,6 +5,7 @@
 import {
   AmbientLight, Color, ColorManagement, DirectionalLight, LinearSRGBColorSpace, OrthographicCamera, PerspectiveCamera, Raycaster, Scene, Vector2,
   Vector3, WebGLRenderer } from "../../vendor/three/three.min.js";
+import { t } from "../texts.js";
 import { Labels } from "./labels.js";
 import { yawOf } from "./transforms.js";
 
@@ -25,7 +26,7 @@ export class Stage {
     this.canvas = document.createElement("canvas");
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("aria-label", "The scene: drag to turn, with shift to move, wheel to zoom");
+    this.canvas.setAttribute("aria-label", t("The scene: drag to turn, with shift to move, wheel to zoom"));
     const options = { antialias: true, alpha: false, powerPreference: "high-performance" };
     const gl = this.canvas.getContext("webgl2", options);
     if (!gl) throw new Error("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader");

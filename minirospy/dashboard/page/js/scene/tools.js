@@ -1,6 +1,7 @@
 // What the mouse does: turning, moving and zooming the view; poses, goals and points that are published; measuring; focus.
 
 import { Group } from "../../vendor/three/three.min.js";
+import { t } from "../texts.js";
 import { arrow, bodyMaterial, discard, segments } from "./shapes.js";
 import { fromYaw } from "./transforms.js";
 
@@ -72,7 +73,7 @@ export class Tools {
       this.advertised.add(topic);
     }
     this.view.chosen(name);
-    this.view.say(TOOLS[name].hint);
+    this.view.say(t(TOOLS[name].hint));
   }
 
   target(name) {
@@ -195,7 +196,7 @@ export class Tools {
     const { stage } = this.view;
     const point = stage.pick(x, y, this.view.pickable());
     if (!point) {
-      this.view.say("there is nothing at this place", true);
+      this.view.say(t("there is nothing at this place"), true);
       return;
     }
     if (this.name === "focus") this.view.focus(point);
@@ -222,7 +223,7 @@ export class Tools {
     measured.label.place.copy(to);
     measured.label.isShown = true;
     stage.invalidate();
-    this.view.say(`Length: ${length.toFixed(4)} m`);
+    this.view.say(t("Length: {length} m", { length: length.toFixed(4) }));
   }
 
   aim(from, to) {
@@ -265,7 +266,7 @@ export class Tools {
     this.choose("move");
     try {
       await link.publish(topic, type, PUBLISHED[type], { header, ...fields });
-      this.view.say(`published ${topic}: ${shown} in ${context.fixedFrame}`);
+      this.view.say(t("published {topic}: {value} in {frame}", { topic, value: shown, frame: context.fixedFrame }));
     } catch (error) {
       this.view.say(`${topic}: ${error.message}`, true);
     }

@@ -1,6 +1,7 @@
 // The 3D view: RViz in the page. The picture with its tools on the left, the displays on the right.
 
 import { fill, h, setText } from "../dom.js";
+import { t } from "../texts.js";
 import { classForType, CLASSES, classOf, getSetting, newSettings, topicKeyOf } from "./classes.js";
 import { rgbOf } from "./colors.js";
 import { Config, readView, writeView } from "./config.js";
@@ -39,10 +40,10 @@ export class SceneView {
     this.hint = h("span", { class: "muted", role: "status" });
     this.place = h("span", { class: "mono muted" });
     this.fixed = h("select", { "aria-label": "Fixed frame", onchange: () => this.chooseFixed(this.fixed.value) });
-    this.kind = h("select", { "aria-label": "View", onchange: () => this.chooseView() }, Object.entries(VIEWS).map(([value, title]) => h("option", { value }, title)));
+    this.kind = h("select", { "aria-label": "View", onchange: () => this.chooseView() }, Object.entries(VIEWS).map(([value, title]) => h("option", { value }, t(title))));
     this.target = h("select", { "aria-label": "Target frame", onchange: () => this.chooseView() });
     this.toolbar = h("div", { class: "tools", role: "toolbar", "aria-label": "Tools" }, Object.entries(TOOLS).map(([name, { title, key }]) => {
-      const button = h("button", { type: "button", class: "small", title: `${title} (${key})`, "aria-pressed": "false", onclick: () => this.tools.choose(name) }, title);
+      const button = h("button", { type: "button", class: "small", title: `${t(title)} (${key})`, "aria-pressed": "false", onclick: () => this.tools.choose(name) }, title);
       button.dataset.tool = name;
       return button;
     }));
@@ -50,7 +51,7 @@ export class SceneView {
     this.sideButton = h("button", { type: "button", class: "small", "aria-pressed": "true", onclick: () => this.toggleSide() }, "Displays");
     this.panel = new Panel(this);
     main.append(
-      h("div", { class: "bar scenebar" }, this.toolbar, h("label", {}, "Fixed frame", this.fixed), h("label", {}, "View", this.kind), h("label", {}, "of", this.target),
+      h("div", { class: "bar scenebar" }, this.toolbar, h("label", {}, "Fixed frame", this.fixed), h("label", {}, "View", this.kind), h("label", {}, t("of"), this.target),
         h("button", { type: "button", class: "small", title: "Back to the view at the start", onclick: () => this.resetView() }, "Reset"), this.files.element, this.sideButton),
       h("div", { class: "split" }, this.frame, this.panel.element),
       h("div", { class: "bar status" }, this.hint, this.place));
@@ -226,7 +227,7 @@ export class SceneView {
     this.shownFrames = key;
     const names = new Set([...frames.names(), ...(this.config.fixedFrame ? [this.config.fixedFrame] : [])]);
     const options = (first) => [first, ...[...names].sort().map((name) => h("option", { value: name }, name))];
-    fill(this.fixed, options(h("option", { value: "" }, this.config.fixedFrame ? "automatic" : `automatic: ${fixedFrame}`)));
+    fill(this.fixed, options(h("option", { value: "" }, this.config.fixedFrame ? t("automatic") : t("automatic: {name}", { name: fixedFrame }))));
     this.fixed.value = this.config.fixedFrame;
     const { target } = this.stage.view;
     if (target !== "<Fixed Frame>") names.add(target);
@@ -277,7 +278,7 @@ export class SceneView {
     const [dx, dy] = [x - p[0], y - p[1]];
     this.stage.setView({ focus: [dx * Math.cos(yaw) + dy * Math.sin(yaw), dy * Math.cos(yaw) - dx * Math.sin(yaw), this.stage.view.kind === "top" ? 0 : z - p[2]] });
     this.tools.choose("move");
-    this.say(`the view turns around (${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)})`);
+    this.say(t("the view turns around {place}", { place: `(${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)})` }));
   }
 
   pickable() {
@@ -296,7 +297,7 @@ export class SceneView {
   }
 
   showPlace(point) {
-    setText(this.place, point ? `x ${point.x.toFixed(2)} y ${point.y.toFixed(2)} m in ${this.context.fixedFrame}` : "");
+    setText(this.place, point ? t("{place} in {frame}", { place: `x ${point.x.toFixed(2)} y ${point.y.toFixed(2)} m`, frame: this.context.fixedFrame }) : "");
   }
 
   toggleSide(isShown = this.panel.element.hidden) {

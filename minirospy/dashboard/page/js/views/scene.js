@@ -1,6 +1,7 @@
 // The 3D view, whose modules and library are loaded when it is opened: other views need neither.
 
 import { fill, h } from "../dom.js";
+import { t } from "../texts.js";
 
 export class Scene {
   constructor(link, words, main) {
@@ -17,7 +18,7 @@ export class Scene {
       fill(main);
       this.view = new SceneView(link, words, main);
     } catch (error) {
-      if (!this.isClosed) fill(main, h("p", { class: "empty error", role: "alert" }, `The 3D view cannot be shown: ${error.message}`));
+      if (!this.isClosed) fill(main, h("p", { class: "empty error", role: "alert" }, t("The 3D view cannot be shown: {why}", { why: error.message })));
     }
   }
 
