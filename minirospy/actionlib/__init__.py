@@ -16,9 +16,19 @@ from minirospy.actionlib.server import ActionServer, nop_cb
 from minirospy.actionlib.simple_client import SimpleActionClient
 from minirospy.actionlib.simple_server import SimpleActionServer
 from minirospy.actionlib.spec import ActionException
-from minirospy.actionlib.states import CommState, SimpleGoalState, TerminalState, get_name_of_constant
+from minirospy.actionlib.states import (
+    INVALID_TRANSITION,
+    NO_TRANSITION,
+    CommState,
+    SimpleGoalState,
+    TerminalState,
+    g_goal_id,
+    get_name_of_constant,
+)
 
 __all__ = [
+    "INVALID_TRANSITION",
+    "NO_TRANSITION",
     "ActionClient",
     "ActionException",
     "ActionServer",
@@ -34,6 +44,7 @@ __all__ = [
     "SimpleGoalState",
     "StatusTracker",
     "TerminalState",
+    "g_goal_id",
     "get_name_of_constant",
     "nop_cb",
 ]

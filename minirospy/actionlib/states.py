@@ -4,7 +4,23 @@ from __future__ import annotations
 
 from minirospy.graph.goals import ClientState, GoalState, SimpleState
 
-__all__ = ["CommState", "SimpleGoalState", "TerminalState", "get_name_of_constant"]
+__all__ = [
+    "INVALID_TRANSITION",
+    "NO_TRANSITION",
+    "CommState",
+    "SimpleGoalState",
+    "TerminalState",
+    "g_goal_id",
+    "get_name_of_constant",
+]
+
+NO_TRANSITION, INVALID_TRANSITION = -1, -2
+"""The marks in the transition table of ROS's client for a status that changes nothing, or is impossible.
+
+Ours is in :mod:`minirospy.graph.goals`; `from actionlib import *` brings them, so programs may use these names.
+"""
+g_goal_id = 1
+"""A number of ROS's module that nothing counts; `from actionlib import *` brings it."""
 
 
 def get_name_of_constant(C: type, n: int) -> str:

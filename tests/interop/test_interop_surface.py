@@ -21,3 +21,17 @@ def test_the_pages_are_up_to_date() -> None:
 def test_nothing_is_missing() -> None:
     lines = [line for page in PAGES for line in page.read_text().splitlines()]
     assert [line for line in lines if "| missing |" in line] == []
+
+
+def test_a_star_of_actionlib_brings_the_same_names() -> None:
+    script = "names = {}\nexec('from actionlib import *', names)\nprint(*sorted(n for n in names if n[:2] != '__'))"
+    names = [
+        set(
+            subprocess.run(
+                [python, "-c", script], capture_output=True, text=True, timeout=60, check=True
+            ).stdout.split()
+        )
+        for python in (sys.executable, "/usr/bin/python3")
+    ]
+    ours, real = names
+    assert real - ours == set()

@@ -24,6 +24,8 @@ from actionlib import server_goal_handle as server_goal_handle
 from actionlib import simple_action_client as simple_action_client
 from actionlib import simple_action_server as simple_action_server
 from actionlib import status_tracker as status_tracker
+from minirospy.actionlib import INVALID_TRANSITION as INVALID_TRANSITION
+from minirospy.actionlib import NO_TRANSITION as NO_TRANSITION
 from minirospy.actionlib import ActionClient as ActionClient
 from minirospy.actionlib import ActionException as ActionException
 from minirospy.actionlib import ActionServer as ActionServer
@@ -39,5 +41,6 @@ from minirospy.actionlib import SimpleActionServer as SimpleActionServer
 from minirospy.actionlib import SimpleGoalState as SimpleGoalState
 from minirospy.actionlib import StatusTracker as StatusTracker
 from minirospy.actionlib import TerminalState as TerminalState
+from minirospy.actionlib import g_goal_id as g_goal_id
 from minirospy.actionlib import get_name_of_constant as get_name_of_constant
 from minirospy.actionlib import nop_cb as nop_cb

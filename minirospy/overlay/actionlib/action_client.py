@@ -4,6 +4,8 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import Header
 
 from minirospy.actionlib import (
+    INVALID_TRANSITION,
+    NO_TRANSITION,
     ActionClient,
     ActionException,
     ClientGoalHandle,
@@ -11,10 +13,13 @@ from minirospy.actionlib import (
     CommStateMachine,
     GoalManager,
     TerminalState,
+    g_goal_id,
     get_name_of_constant,
 )
 
 __all__ = [
+    "INVALID_TRANSITION",
+    "NO_TRANSITION",
     "ActionClient",
     "ActionException",
     "ClientGoalHandle",
@@ -26,5 +31,6 @@ __all__ = [
     "GoalStatusArray",
     "Header",
     "TerminalState",
+    "g_goal_id",
     "get_name_of_constant",
 ]
