@@ -150,6 +150,7 @@ class Node:
             on_parameter=self.parameters.changed_in_worker,
         )
         runtime.when_registered_again.append(self.parameters.forgotten_in_worker)
+
         try:
             await runtime.start()
         except OSError as error:

@@ -131,6 +131,7 @@ def run(
     _heed_break()
     if heeds_interrupts and not interrupted:
         _heed_interrupts()
+
     try:
         status = body() or 0
         sys.stdout.flush()

@@ -34,6 +34,7 @@ def _network_options(parser: Parser, *, listens: bool = True) -> None:
         help="where to connect, as tcp/HOST:7447 or HOST (tcp/127.0.0.1:7447); may be repeated",
         completer="nothing",
     )
+
     if listens:
         parser.add_argument(
             "--listen",
@@ -74,6 +75,7 @@ def _pass_options(parser: Parser) -> None:
         help="pass at most so many messages a second, as '/camera/*=5'",
         completer="nothing",
     )
+
     parser.add_argument(
         "--priority",
         action="append",

@@ -371,6 +371,7 @@ class BagSession:
                 "clock": bag.stage.has_clock,
             },
         )
+
         for topic, before in list(self._shown.items()):
             when = bag.timeline.time_at(topic, state.time)
             if when is not None and when != before:

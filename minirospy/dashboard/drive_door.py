@@ -100,6 +100,7 @@ def parse(text: str) -> Command:
     names = set(fields)
     if names == {"leave"}:
         return Command(_topic(fields["leave"]), None)
+
     if names == {"topic", "twist"}:
         values = _numbers(fields["twist"])
         if len(values) != 6:

@@ -112,6 +112,7 @@ class JointDoor:
         loop = asyncio.get_running_loop()
         next_load = loop.time()
         next_message = loop.time()
+
         while self._sessions or self.always_publishes or self._publisher:
             now = loop.time()
             if now >= next_load:

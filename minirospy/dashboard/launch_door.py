@@ -105,6 +105,7 @@ class _Tail:
         path = self.run.log_file(self.node)
         if path is None:
             return ""
+
         try:
             size = path.stat().st_size
             if path != self._path or size < self._position:

@@ -87,6 +87,7 @@ class Recording:
             str(self._path),
             *topics,
         ]
+
         return start_process(
             "rosbag record",
             command,

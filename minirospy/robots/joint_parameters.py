@@ -47,6 +47,7 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
         publish_default_efforts=bool(param("publish_default_efforts", False)),
     )
     rate = _as_number("rate", param("rate", 10.0))
+
     if rate <= 0:
         raise JointError(f"The rate parameter is {rate:g}: it is a number of messages a second, above 0")
     sources = param("source_list", [])

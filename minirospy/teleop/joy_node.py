@@ -178,6 +178,7 @@ class JoyNode:
             "default trig val": str(options.default_trig_val),
             "sticky buttons": str(options.sticky_buttons),
         }
+
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK if self._is_open else DiagnosticStatus.ERROR,
             name=f"{rospy.get_name().lstrip('/')}: Joystick Driver Status",

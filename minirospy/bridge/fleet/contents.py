@@ -87,6 +87,7 @@ class FleetContents:
         gateway = self._gateways.get(at)
         if gateway is None:
             return False
+
         # A topic whose flags have changed has a new token already when the old one goes.
         if isinstance(token, Claim):
             gateway.claim = None

@@ -193,6 +193,7 @@ class Exporter:
         else:
             return None
         rewriter = await self._definitions.rewriter(type_, md5sum) if self._rules.has_frames else None
+
         return TopicToken(
             self.claim.name,
             self.claim.gateway,
@@ -303,6 +304,7 @@ class Exporter:
             ):
                 del self.outbound[topic]
                 await outbound.close()
+
         for topic in list(self._readers):
             token = self.topics.get(topic)
             if token and token.is_published and topic not in self.outbound:

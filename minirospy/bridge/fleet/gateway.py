@@ -101,6 +101,7 @@ class Gateway:
             )
             await self.importer.start()
             self._declared.append(network.declare_token(claim_key(self.claim, "control")))
+
         if options.name:
             self.exporter = Exporter(
                 self.node,
@@ -158,6 +159,7 @@ class Gateway:
             found["passed_in"] = [
                 {"topic": topic, "messages": each.passed} for topic, each in exporter.inbound.items()
             ]
+
         if self.importer:
             found["refused"] = self.importer.contents.refused
             found["robots"] = [

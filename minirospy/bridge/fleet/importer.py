@@ -171,6 +171,7 @@ class Importer:
             if robot.services.get(service) != known:
                 del shown.services[service]
                 await offered.close()
+
         for topic, token in robot.topics.items():
             if (
                 topic not in shown.topics

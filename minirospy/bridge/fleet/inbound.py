@@ -109,6 +109,7 @@ class InboundTopic:
         if self._is_closed:
             return  # while a peer was queried for the definition
         is_latched = any(offer.is_latched for offer in self._offers)
+
         try:
             publisher = self._node.advertise(
                 self.token.topic, raw_class(interface), queue_size=_QUEUE, latch=is_latched

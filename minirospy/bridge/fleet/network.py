@@ -218,6 +218,7 @@ class FleetNetwork:
         config = _configured(options)
         endpoints = ", ".join(json.loads(config.get_json("connect/endpoints") or "[]"))
         is_reported = False
+
         while True:
             try:
                 return cls(await loop.run_in_executor(None, functools.partial(zenoh.open, config)), loop)
@@ -420,6 +421,7 @@ class FleetNetwork:
         finally:
             if reply is None:
                 query.drop()
+
         try:
             with contextlib.suppress(RuntimeError, self._zenoh.ZError):
                 await self._loop.run_in_executor(self._caller, reply)

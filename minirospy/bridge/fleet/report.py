@@ -95,6 +95,7 @@ def _robot_lines(answer: Answer, is_shown: bool) -> list[str]:
     ]
     if not is_shown:
         parts.append("NOT SHOWN: another gateway has this name")
+
     if status.get("master") is False:
         parts.append("ITS MASTER DOES NOT ANSWER")
     found = [", ".join(part for part in parts if part)]
@@ -118,6 +119,7 @@ def _control_lines(answer: Answer) -> list[str]:
     found = [
         f"control room{name} ({_text(status, 'machine')}), {_count(len(_tables(status, 'robots')), 'robot')}"
     ]
+
     for robot in _tables(status, "robots"):
         found += [
             f"  gets {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}, "

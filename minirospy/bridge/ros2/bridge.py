@@ -283,6 +283,7 @@ class Ros2Bridge:
         made, spec, lookup = await self._converter(link)
         depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
         opened: _OpenLink
+
         if link.direction is Direction.TO_ROS2:
             publisher = self.side.publisher(
                 link.topic, link.ros2_type, depth=1 if link.is_latched else depth, is_latched=link.is_latched

@@ -200,6 +200,7 @@ def _add_rule(
         )
     ros1 = _type_name(rule, "ros1", kind, where)
     ros2 = _type_name(rule, "ros2", kind, where)
+
     if kind == "message":
         fields = _field_names(rule, "fields_1_to_2", where)
         messages[ros1] = TypeRule((ros2,), fields)

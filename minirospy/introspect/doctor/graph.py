@@ -262,6 +262,7 @@ def _ask(tool: str, node: NodeAddress, *, with_stats: bool = False) -> NodeAnswe
     if node.uri is None:
         return NodeAnswer(node, Trouble(Fault.OTHER, "the master does not know its address"))
     slave = SlaveProxy(node.uri, "/" + tool, CONNECT_SECONDS, same_host=False)
+
     with contextlib.closing(slave):
         start = time.perf_counter()
         pid = slave.get_pid()
