@@ -136,6 +136,18 @@ class Page:
         for kind in ("mousePressed", "mouseReleased"):
             self.mouse(kind, find, text)
 
+    def click_until(self, find: str, text: str, shown: str, shown_text: str) -> None:
+        """Click until a visible element has a text, as a person does where what is clicked has just moved away."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            self.click(find, text)
+            again = time.monotonic() + 5
+            while time.monotonic() < again:
+                if self.evaluate(f"Boolean({_finding(shown, shown_text)})"):
+                    return
+                time.sleep(0.05)
+            assert time.monotonic() < end, f"{shown} does not show {shown_text!r}"
+
     def mouse(self, kind: str, find: str, text: str = "") -> None:
         """Press (mousePressed) or release (mouseReleased) the mouse over an element."""
         x, y = self.wait(

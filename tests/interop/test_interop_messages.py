@@ -320,6 +320,8 @@ def check_drawn(peer: Peer, ours: Ours, name: str) -> None:
         if root == "ours" or package not in CATALOGUES["ours"].packages
     ],
 )
+# Hypothesis warns of values that are long to print, as those of MoveIt's types are.
+@pytest.mark.filterwarnings("ignore:Generating overly large repr")
 def test_values(real: Callable[[str], Peer], root: str, package: str) -> None:
     """Drawn values of every type of a package."""
     ours = ours_of(root, package)
