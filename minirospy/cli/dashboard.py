@@ -143,7 +143,7 @@ def _window(
 ) -> Command:
     """Return the command of a window of rqt.
 
-    ``what`` is the description, ``add_arguments`` adds arguments of its own, of which ``chosen`` makes the view and its settings.
+    ``what`` is the description, ``add_arguments`` adds its arguments, of which ``chosen`` makes the view and its settings.
     """
 
     def make_parser() -> Parser:

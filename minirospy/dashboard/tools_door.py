@@ -67,7 +67,7 @@ class ToolsDoor:
         await asyncio.gather(*running, return_exceptions=True)
 
     def graph(self) -> Graph:
-        """Return the graph, with a connection of its own to the master: calls run in threads."""
+        """Return the graph, with a separate connection to the master: calls run in threads."""
         return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
 
     def watch(self, session: ToolsSession) -> None:

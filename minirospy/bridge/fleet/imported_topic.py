@@ -279,7 +279,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # All of it before the wait: meanwhile the topic may be subscribed to again, with an outflow of its own.
+        # All of it before the wait: meanwhile the topic may be subscribed to again, with another outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None

@@ -1,7 +1,7 @@
 """Queues of messages that wait to be sent or delivered: fair between flows, newest first to survive. Pure.
 
 A flow is what belongs together: a topic at the sender, a robot's topic at the receiver. Each keeps its newest messages, and flows
-take turns, so one that floods loses messages of its own only.
+take turns, so one that floods loses only its own messages.
 """
 
 from __future__ import annotations

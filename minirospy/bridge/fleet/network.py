@@ -1,6 +1,6 @@
 """Zenoh, behind one file: the session of a gateway, its tokens, messages and queries.
 
-Zenoh calls back in threads of its own; what this file calls back with comes on the event loop, but for messages, which go
+Zenoh calls back in its own threads; what this file calls back with comes on the event loop, but for messages, which go
 to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a lane's (:mod:`sender`).
 """
 

@@ -31,7 +31,7 @@ _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
 class Lane(IntEnum):
-    """A priority, each with a queue and a thread of its own: what is slow to send does not hold up a lane before it."""
+    """A priority, each with a separate queue and thread: what is slow to send does not hold up a lane before it."""
 
     TELEOP = 0
     DATA = 1
