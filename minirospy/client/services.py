@@ -154,8 +154,14 @@ class Service(Generic[_S_co]):
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
         except Exception as error:  # the user's handler: its error is the client's answer
-            self.error_handler(error, type(error), error, error.__traceback__)
+            self._report(error)
             raise ServiceException(f"error processing request: {error}") from error
+
+    def _report(self, error: Exception) -> None:
+        try:
+            self.error_handler(error, type(error), error, error.__traceback__)
+        except Exception:  # noqa: BLE001 - the user's too; rospy ends the connection, and the client never sees why
+            _log.exception("the error handler of service [%s] failed", self.resolved_name)
 
     @staticmethod
     def _log_error(error: Exception, _: type[Exception], __: Exception, tb: TracebackType | None) -> None:

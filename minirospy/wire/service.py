@@ -43,7 +43,8 @@ def serialize_response(body: bytes) -> bytes:
 
 def serialize_failure(error: Exception) -> bytes:
     """Return what a server sends after a call that failed: the text of ``error``."""
-    text = str(error).encode()
+    # An error's text may hold what UTF-8 does not, as part of a file's name.
+    text = str(error).encode(errors="backslashreplace")
     return _OK_LENGTH.pack(0, len(text)) + text
 
 

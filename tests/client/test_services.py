@@ -10,6 +10,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from minirospy.errors import CallFailed
+from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 SERVER = """
@@ -212,3 +214,32 @@ print(rospy.ServiceProxy("/s", Trigger)().message, flush=True)
     )
     assert hear(node) == "2"
     assert node.wait(30) == 0
+
+
+ERROR_HANDLER = """
+import rospy
+from std_srvs.srv import Trigger
+
+def handler(request):
+    raise ValueError("no such joint")
+
+def error_handler(error, *_):
+    raise RuntimeError("no log")
+
+rospy.init_node("server")
+rospy.Service("/s", Trigger, handler, error_handler=error_handler)
+print("ready", flush=True)
+rospy.spin()
+"""
+
+
+def test_error_handler_that_raises_does_not_hide_the_error(started: list[Program], master: str) -> None:
+    assert hear(start(started, ERROR_HANDLER)) == "ready"
+    proxy = MasterProxy(master, "/test")
+    uri = proxy.lookup_service("/s")
+    proxy.close()
+    client = ServiceClient(uri, "/s", "*", "/test", persistent=True)
+    for _ in range(2):
+        with pytest.raises(CallFailed, match="error processing request: no such joint"):
+            client.call(b"")
+    client.close()

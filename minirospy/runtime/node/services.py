@@ -7,6 +7,7 @@ Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import socket
 import threading
@@ -46,7 +47,10 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Handler = Callable[[memoryview, Header], bytes]
-"""Request bytes and the client's header in, response bytes out; raises ServiceException with the text to send."""
+"""Request bytes and the client's header in, response bytes out; raises ServiceException with the text to send.
+
+Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays.
+"""
 
 AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
 """The same as a coroutine function, on the loop."""
@@ -150,8 +154,20 @@ class ServiceServer:
     def _respond(self, request: memoryview, fields: Header) -> bytes:
         try:
             return serialize_response(self._handler(request, fields))
-        except ServiceException as error:
+        except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+            return self._failure(error)
+
+    def _failure(self, error: Exception) -> bytes:
+        """Return the answer to a call whose handler raised; log what the handler did not mean to send."""
+        if isinstance(error, ServiceException):
             return serialize_failure(error)
+
+        _log.error("service %s: error processing request", self.name, exc_info=error)
+        try:
+            text = str(error)
+        except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
+            text = type(error).__name__
+        return serialize_failure(ServiceException(f"error processing request: {text}"))
 
 
 class LoopServiceServer(ServiceServer):
@@ -201,11 +217,7 @@ class LoopServiceServer(ServiceServer):
                 head = await _receive(sock, REQUEST_HEAD)
                 connection.busy = True
                 request = await _receive(sock, parse_request_head(head))
-                try:
-                    answer = serialize_response(await self._async_handler(request, fields))
-                except ServiceException as error:
-                    answer = serialize_failure(error)
-                await loop.sock_sendall(sock, answer)
+                await loop.sock_sendall(sock, await self._respond_on_loop(sock, request, fields))
                 connection.busy = False
                 if not persistent:
                     return
@@ -214,6 +226,21 @@ class LoopServiceServer(ServiceServer):
         finally:
             self._open.discard(connection)
             sock.close()
+
+    async def _respond_on_loop(self, sock: socket.socket, request: bytes, fields: Header) -> bytes:
+        try:
+            return serialize_response(await self._async_handler(request, fields))
+        except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+            return self._failure(error)
+        except asyncio.CancelledError:
+            # Of this task, or of something that the handler awaited: only Python 3.11 could tell which.
+            if not self._closed:
+                _log.error("service %s: the handler of a call was cancelled", self.name)
+                with contextlib.suppress(OSError):
+                    sock.send(
+                        serialize_failure(ServiceException("error processing request: it was cancelled"))
+                    )
+            raise
 
 
 @dataclass(eq=False)

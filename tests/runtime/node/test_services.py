@@ -22,6 +22,23 @@ TYPE = InterfaceType("a/B", "0" * 32)
 TYPES = {"request_type": "a/BRequest", "response_type": "a/BResponse"}
 
 
+class Unprintable(Exception):
+    def __str__(self) -> str:
+        raise ValueError("no text")
+
+
+FAULTS: dict[bytes, tuple[Exception, bytes]] = {
+    b"value": (ValueError("no such joint"), b"error processing request: no such joint"),
+    # As of a file that the handler reads: not the connection's.
+    b"os": (FileNotFoundError("no map"), b"error processing request: no map"),
+    b"wire": (WireError("short"), b"error processing request: short"),
+    b"bytes": (ValueError("name \udcff"), b"error processing request: name \\udcff"),
+    b"sent": (ServiceException("name \udcff"), b"name \\udcff"),
+    b"text": (Unprintable(), b"error processing request: Unprintable"),
+}
+"""Requests, what the handler raises, and what the client gets."""
+
+
 class Scene(NamedTuple):
     """A node, its loop, and its services /worker and /loop, which do the same."""
 
@@ -49,12 +66,18 @@ def scene(master: str) -> Iterator[Scene]:
             gate.wait(30)
         if bytes(request) == b"fail":
             raise ServiceException("zażółć")
+        if bytes(request) in FAULTS:
+            raise FAULTS[bytes(request)][0]
+        if bytes(request) == b"none":
+            return None  # type: ignore[return-value]
         return bytes(request)[::-1]
 
     async def handle_on_loop(request: bytes, _: object) -> bytes:
         if request == b"wait":
             called.set()
             await asyncio.to_thread(gate.wait, 30)
+        if request == b"cancel":
+            raise asyncio.CancelledError
         return handle(memoryview(request), None)
 
     async def start() -> None:
@@ -112,6 +135,32 @@ def test_calls_on_the_loop(scene: Scene, service: str) -> None:
             await AsyncServiceClient.connect(scene.node.service_uri, service, "1" * 32, "/test")
 
     scene.run(main())
+
+
+@both
+@pytest.mark.parametrize("request_", FAULTS)
+def test_handler_that_raises_is_answered_and_served_on(scene: Scene, service: str, request_: bytes) -> None:
+    client = scene.client(service, persistent=True)
+    with pytest.raises(CallFailed) as caught:
+        client.call(request_)
+    assert caught.value.text == FAULTS[request_][1]
+    assert client.call(b"abc") == b"cba"
+    client.close()
+
+
+@both
+def test_handler_that_returns_no_bytes_is_answered(scene: Scene, service: str) -> None:
+    client = scene.client(service)
+    with pytest.raises(CallFailed, match="error processing request: "):
+        client.call(b"none")
+    client.close()
+
+
+def test_handler_on_the_loop_that_is_cancelled_is_answered(scene: Scene) -> None:
+    client = scene.client("/loop")
+    with pytest.raises(CallFailed, match="error processing request: it was cancelled"):
+        client.call(b"cancel")
+    client.close()
 
 
 @both
