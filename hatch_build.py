@@ -1,4 +1,4 @@
-"""Build hooks: what PyPI shows of the README; ``msgs/`` as Python modules, and the files that the wheel has in addition.
+"""Build hooks: the project's addresses and what PyPI shows of the README; ``msgs/`` as modules, and the wheel's other files.
 
 An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
 checkout, where everything else already is.
@@ -6,16 +6,49 @@ checkout, where everything else already is.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from hatchling.builders.config import BuilderConfig
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
+ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
+"""The environment variable with the address of the repository, set by whoever publishes: docs/release.md."""
+
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
+
+
+def project_urls(address: str) -> dict[str, str]:
+    """Return ``project.urls`` of a repository at ``address``, with the paths of GitHub or, by the host's name, of GitLab.
+
+    Raises ValueError where the address is not one of a repository: PyPI shows it to everyone.
+    """
+    address = address.rstrip("/").removesuffix(".git")
+    try:
+        parts = urlsplit(address)
+        host, is_plain = parts.hostname or "", parts.port is None or parts.port > 0
+    except ValueError:
+        host, is_plain = "", False
+    is_plain = is_plain and not (parts.query or parts.fragment or parts.username or parts.password)
+    if not (is_plain and host and parts.scheme == "https" and re.fullmatch(r"/[\w.~/-]+", parts.path)):
+        raise ValueError(
+            f"{ADDRESS_VARIABLE}={address!r} is not the address of a repository, such as https://HOST/OWNER/NAME"
+        )
+
+    pages = f"{address}/-" if "gitlab" in host.split(".") else address
+    files = f"{pages}/blob/HEAD"
+    return {
+        "Homepage": address,
+        "Documentation": f"{files}/docs/index.md",
+        "Repository": address,
+        "Issues": f"{pages}/issues",
+        "Changelog": f"{files}/CHANGELOG.md",
+    }
 
 
 def readme_of_wheel(text: str, url: str = "") -> str:
@@ -26,15 +59,20 @@ def readme_of_wheel(text: str, url: str = "") -> str:
 
 
 class DescribeProject(MetadataHookInterface):
-    """Writes the description of the package: the README, whose links lead to ``urls.Documentation`` where it is set."""
+    """Writes the addresses of the project, where one is given, and the README, whose links lead there."""
 
     PLUGIN_NAME = "custom"
 
     def update(self, metadata: dict[str, Any]) -> None:
-        """Set the readme."""
+        """Set ``urls`` and the readme; those of an unpacked sdist, which hatchling has read already, stay."""
+        address = os.environ.get(ADDRESS_VARIABLE, "").strip()
+        if "readme" in metadata:
+            return
+
+        metadata["urls"] = urls = project_urls(address) if address else {}
         text = Path(self.root, "README.md").read_text(encoding="utf-8")
-        url = metadata.get("urls", {}).get("Documentation", "")
-        metadata["readme"] = {"content-type": "text/markdown", "text": readme_of_wheel(text, url)}
+        files = urls["Changelog"].rpartition("/")[0] if urls else ""
+        metadata["readme"] = {"content-type": "text/markdown", "text": readme_of_wheel(text, files)}
 
 
 class CompileDefinitions(BuildHookInterface[BuilderConfig]):

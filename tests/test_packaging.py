@@ -7,10 +7,14 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
+
+from hatch_build import ADDRESS_VARIABLE, project_urls
+from tools.release import faults_of_metadata
 
 ROOT = Path(__file__).parents[1]
 MOST_BYTES = 3_000_000
@@ -127,6 +131,33 @@ def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
     assert "# minirospy" in text
     assert not re.findall(r"\]\((?!https?:|#)", text)
     assert "security (docs/security.md)" in text
+
+
+@pytest.mark.timeout(300)
+def test_one_address_is_in_sdist_and_wheel(tmp_path: Path) -> None:
+    """Given when the sdist is made: a wheel that others build of it has the same metadata."""
+    address = "https://git.example.org/robots/ours"
+    sdist = _build(tmp_path, "--sdist", ROOT, {ADDRESS_VARIABLE: address})
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path)
+    source = tmp_path / sdist.name.removesuffix(".tar.gz")
+    wheel = _build(tmp_path / "wheel", "--wheel", source, {ADDRESS_VARIABLE: ""})
+
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode()
+    assert text == (source / "PKG-INFO").read_text(encoding="utf-8")
+    assert faults_of_metadata(text, project_urls(address)) == []
+    assert f"[security]({address}/blob/HEAD/docs/security.md)" in text
+
+
+def _build(target: Path, kind: str, source: Path, environ: dict[str, str]) -> Path:
+    """Build an sdist or a wheel into a new folder; return the file."""
+    command = [sys.executable, "-m", "build", kind, "--no-isolation", "--outdir", str(target), str(source)]
+    done = subprocess.run(command, env={**os.environ, **environ}, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (found,) = (path for path in target.iterdir() if path.is_file())
+    return found
 
 
 @pytest.mark.timeout(180)

@@ -1,10 +1,18 @@
-"""`make release`: which wheels are refused."""
+"""`make release`: which wheels are refused, and the addresses that are published."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
-from tools.release import MOST_BYTES, faults_of_wheel
+from hatch_build import ADDRESS_VARIABLE, project_urls, readme_of_wheel
+from tools.release import MOST_BYTES, faults_of_metadata, faults_of_wheel
+
+ROOT = Path(__file__).parents[1]
 
 SOURCES = [
     "pyproject.toml",
@@ -79,3 +87,73 @@ def test_licences_are_required(contents: dict[str, int]) -> None:
         "minirospy/dashboard/page/vendor/uplot: its LICENSE.txt is missing or empty",
         "the licence of minirospy is missing",
     ]
+
+
+ADDRESS = "https://git.example.org/robots/ours"
+URLS = {
+    "Homepage": ADDRESS,
+    "Documentation": f"{ADDRESS}/blob/HEAD/docs/index.md",
+    "Repository": ADDRESS,
+    "Issues": f"{ADDRESS}/issues",
+    "Changelog": f"{ADDRESS}/blob/HEAD/CHANGELOG.md",
+}
+
+
+@pytest.mark.parametrize("address", [ADDRESS, ADDRESS + "/", ADDRESS + ".git"])
+def test_one_address_gives_all(address: str) -> None:
+    assert project_urls(address) == URLS
+
+
+def test_addresses_of_gitlab_have_its_paths() -> None:
+    urls = project_urls("https://gitlab.example.org/group/robots/ours")
+    assert urls["Changelog"] == "https://gitlab.example.org/group/robots/ours/-/blob/HEAD/CHANGELOG.md"
+    assert urls["Issues"] == "https://gitlab.example.org/group/robots/ours/-/issues"
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "robots/ours",
+        "http://git.example.org/robots/ours",
+        "git@git.example.org:robots/ours",
+        "https://git.example.org",
+        "https:///robots/ours",
+        "https://me:secret@git.example.org/robots/ours",
+        "https://git.example.org/robots/ours?a=b",
+        "https://git.example.org/robots/ours)](x",
+        "https://git.example.org:x/robots/ours",
+        "https://[git.example.org/robots/ours",
+    ],
+)
+def test_release_refuses_what_is_no_address(address: str) -> None:
+    """In one line, before anything is built."""
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "tools" / "release.py")],
+        env={**os.environ, ADDRESS_VARIABLE: address},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == (
+        f"release: ERROR: {ADDRESS_VARIABLE}={address!r} is not the address of a repository, such as https://HOST/OWNER/NAME\n"
+    )
+
+
+def test_metadata_without_the_addresses_is_named() -> None:
+    text = f"Name: x\nProject-URL: Homepage, {ADDRESS}\n\n[here](docs/a.md) [there](https://example.org)\n"
+    addresses, links = faults_of_metadata(text, URLS)
+    assert addresses.startswith(f"its addresses are ['Homepage, {ADDRESS}'], not ['Homepage, ")
+    assert links == "its description has links into the sources: docs/a.md"
+
+    whole = "Name: x\n" + "".join(f"Project-URL: {label}, {url}\n" for label, url in URLS.items())
+    assert faults_of_metadata(whole + "\nText.\n", URLS) == []
+
+
+def test_every_link_of_the_readme_leads_to_a_file() -> None:
+    """Below the address, as the published description has them."""
+    files = f"{ADDRESS}/blob/HEAD/"
+    text = readme_of_wheel((ROOT / "README.md").read_text(encoding="utf-8"), files)
+    named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]
+    assert len(named) > 20
+    assert [name for name in named if not (ROOT / name.partition("#")[0]).is_file()] == []

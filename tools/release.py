@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,8 +18,10 @@ import tarfile
 import tempfile
 import zipfile
 from collections.abc import Collection, Mapping
+from email import message_from_string
 from pathlib import Path
 
+from hatch_build import ADDRESS_VARIABLE, project_urls
 from tools.sbom import SbomError, make_sbom
 
 ROOT = Path(__file__).parents[1]
@@ -44,6 +47,7 @@ class ReleaseError(Exception):
 def main() -> int:
     """Build and check; return the exit status."""
     try:
+        urls = _given_urls()
         if changed := _run("git", "status", "--porcelain"):
             raise ReleaseError(
                 f"not all is committed, but a release is built from the last commit:\n{changed}"
@@ -57,6 +61,8 @@ def main() -> int:
             (wheel,) = (path for path in built if path.suffix == ".whl")
             tracked = _run("git", "ls-files", "-z").split("\0")
             if faults := faults_of_wheel(_contents(wheel), wheel.stat().st_size, tracked):
+                raise ReleaseError("\n".join(f"{wheel.name}: {fault}" for fault in faults))
+            if faults := faults_of_metadata(_metadata(wheel), urls):
                 raise ReleaseError("\n".join(f"{wheel.name}: {fault}" for fault in faults))
 
             bill = make_sbom(wheel, int(epoch))
@@ -72,6 +78,8 @@ def main() -> int:
         print(f"release: ERROR: {error}", file=sys.stderr)
         return 1
 
+    if not urls:
+        print(f"{ADDRESS_VARIABLE} is not set: PyPI would show no address of the project (docs/release.md)")
     for path in sorted(dist.iterdir()):
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         print(f"dist/{path.name}: {path.stat().st_size:,} bytes, sha256 {digest}")
@@ -110,6 +118,27 @@ def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[
     return faults
 
 
+def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
+    """Return what is wrong with a METADATA file whose addresses should be ``urls``, and where the README's links lead."""
+    metadata = message_from_string(text)
+    given = [f"{label}, {url}" for label, url in urls.items()]
+    faults = []
+    if (found := metadata.get_all("Project-URL", [])) != given:
+        faults.append(f"its addresses are {found}, not {given}")
+    if links := re.findall(r"\]\((?!https?:|#)([^)]+)\)", str(metadata.get_payload())):
+        faults.append(f"its description has links into the sources: {', '.join(links)}")
+    return faults
+
+
+def _given_urls() -> dict[str, str]:
+    """Return the addresses that the metadata should have. Raises ReleaseError where the variable has no address."""
+    address = os.environ.get(ADDRESS_VARIABLE, "").strip()
+    try:
+        return project_urls(address) if address else {}
+    except ValueError as error:
+        raise ReleaseError(str(error)) from error
+
+
 def _is_expected(name: str, sources: Collection[str]) -> bool:
     if name in sources or name.partition("/")[0].endswith(".dist-info"):
         return True
@@ -126,6 +155,12 @@ def _is_expected(name: str, sources: Collection[str]) -> bool:
 def _contents(wheel: Path) -> dict[str, int]:
     with zipfile.ZipFile(wheel) as archive:
         return {each.filename: each.file_size for each in archive.infolist()}
+
+
+def _metadata(wheel: Path) -> str:
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (each for each in archive.namelist() if each.endswith(".dist-info/METADATA"))
+        return archive.read(name).decode()
 
 
 def _build(folder: Path, epoch: str, *, elsewhere: bool = False) -> list[Path]:
