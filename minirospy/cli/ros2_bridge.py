@@ -11,9 +11,8 @@ from minirospy.cli.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.ros2.actions import ActionPair
-    from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge
-    from minirospy.bridge.ros2.services import ServicePair
+    from minirospy.bridge.ros2.bridge import Ros2Bridge
+    from minirospy.bridge.ros2.link_table import Pair
 
 __all__ = ["COMMAND", "main"]
 
@@ -149,7 +148,7 @@ class _Listing:
         await self._bridge.close()
 
 
-def _table(pairs: Sequence[Pair | ServicePair | ActionPair]) -> list[str]:
+def _table(pairs: Sequence[Pair]) -> list[str]:
     from minirospy.bridge.ros2.links import Link
     from minirospy.bridge.ros2.service_links import ServiceLink
 

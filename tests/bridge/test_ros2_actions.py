@@ -26,7 +26,7 @@ from minirospy.bridge.ros2.action_messages import (
     status_and_body,
     statuses_message,
 )
-from minirospy.bridge.ros2.actions import ActionPair, empty_message
+from minirospy.bridge.ros2.actions import empty_message
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
@@ -254,7 +254,7 @@ def test_goals_of_ros2_go_to_ros1_and_come_to_an_end() -> None:
 def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = {**SEND_GOAL, "/odd/_action/send_goal": "odd_msgs/Odd_SendGoal"}
-        pairs = [pair for pair in await bridge.pairs() if isinstance(pair, ActionPair)]
+        pairs = [pair for pair in await bridge.pairs() if isinstance(pair.link, ActionLink)]
         assert [(pair.link.action, pair.link.ros1_type) for pair in pairs] == [
             ("/fly", "actionlib_tutorials/Fibonacci"), ("/odd", "odd_msgs/Odd"),
         ]  # fmt: skip

@@ -17,8 +17,9 @@ import pytest
 from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.bridge.access import NameFilter
-from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge, Ros2Options
+from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.layouts import TypesDiffer
+from minirospy.bridge.ros2.link_table import Pair
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
 from minirospy.bridge.ros2.parameter_values import Value
 from minirospy.bridge.ros2.rclpy_actions import Accept, Ros2Goal
@@ -29,7 +30,7 @@ from minirospy.bridge.ros2.statics import StaticTransforms
 from minirospy.cli.ros2_bridge import main
 from minirospy.errors import BridgeError, DeserializationError
 from minirospy.idl.load import message_class
-from minirospy.introspect.snapshot import Snapshot
+from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
 
@@ -421,7 +422,7 @@ async def connected(bridge: Ros2Bridge, count: int = 1) -> None:
     """Wait until the bridge's subscriptions are connected to so many publishers: a look connects, too, and hangs up."""
 
     def found() -> int:
-        return sum(len(each._subscription.headers) for each in bridge.links.values())  # type: ignore[attr-defined]
+        return sum(len(each._subscription.headers) for each in bridge.topics.links.values())
 
     while found() < count:
         await asyncio.sleep(0.01)
@@ -529,9 +530,26 @@ def test_types_that_do_not_map_are_listed_with_the_reason() -> None:
         assert not side.publishers
         await bridge.look()
         assert list(side.publishers) == ["/a"]
-        assert [link.topic for link in bridge.refused] == ["/b"]
+        assert [link.topic for link in bridge.topics.refused] == ["/b"]
 
     bridged(scene, NameFilter.of(["/a", "/b"]))
+
+
+@pytest.mark.usefixtures("master")
+def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        await node.subscribe_raw("/t", lambda *_: None)
+        side.graph["/t"] = Ros2Topic(publishers=(STRING,))
+
+        def subscribe(*_: object, **__: object) -> FakeSubscription:
+            raise ValueError("no room")
+
+        side.subscribe = subscribe  # type: ignore[method-assign]
+        await bridge.look()
+        assert list(bridge.topics.refused.values()) == ["no room"]
+        assert "/t" not in (await fetch(node._node.master)).publishers
+
+    bridged(scene)
 
 
 @pytest.mark.usefixtures("master")

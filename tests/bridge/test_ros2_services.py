@@ -15,7 +15,6 @@ from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
 from minirospy.bridge.ros2.rules import BUILT_IN
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
-from minirospy.bridge.ros2.services import ServicePair
 from minirospy.cli.ros2_bridge import main
 from minirospy.errors import BridgeError, ServiceException
 from minirospy.idl.load import service_class
@@ -199,7 +198,7 @@ def test_types_of_services_that_do_not_map_are_listed_with_the_reason() -> None:
         await RawService(node, "/other", InterfaceType(SET_BOOL, "0" * 32), never)
         await RawService(node, "/hidden", InterfaceType(SET_BOOL, "0" * 32), never)
         side.offered = {"/spawn": "turtlesim/Spawn", "/strange": "strange_msgs/Do"}
-        pairs = [pair for pair in await bridge.pairs() if isinstance(pair, ServicePair)]
+        pairs = [pair for pair in await bridge.pairs() if isinstance(pair.link, ServiceLink)]
         assert [(pair.link.service, bool(pair.reason)) for pair in pairs] == [
             ("/add", False), ("/other", True), ("/spawn", True), ("/strange", True),
         ]  # fmt: skip

@@ -23,6 +23,11 @@ class ActionLink:
     ros1_type: str
     ros2_type: str
 
+    @property
+    def title(self) -> str:
+        """How messages to people name the link."""
+        return f"action {self.action}"
+
 
 def send_goal_service(action: str) -> str:
     """Return the service by which an action of ROS 2 gets its goals."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import raw_class
 from minirospy.bridge.ros2.action_links import ActionLink, action_links
 from minirospy.bridge.ros2.action_to_ros1 import GoalsToRos1
 from minirospy.bridge.ros2.action_to_ros2 import GoalsToRos2
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction
 from minirospy.bridge.ros2.rules import Rules
-from minirospy.errors import DefinitionError, NotFoundError, ROSException
+from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.idl.cdr import Transcoder
 from minirospy.idl.digest import Lookup, full_text, message_md5
 from minirospy.idl.protocols import Message
@@ -27,17 +28,9 @@ if TYPE_CHECKING:
     from minirospy.idl.load import Catalogue
     from minirospy.introspect.snapshot import Snapshot
 
-__all__ = ["ActionBridge", "ActionCodec", "ActionPair", "empty_message"]
+__all__ = ["ActionBridge", "ActionCodec", "empty_message"]
 
 _WIDTHS = {"time": 8, "duration": 8, "string": 4}
-
-
-@dataclass(frozen=True)
-class ActionPair:
-    """An action, and why it is not bridged: nothing where it is."""
-
-    link: ActionLink
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -137,82 +130,37 @@ def empty_message(spec: MessageSpec, lookup: Lookup) -> bytes:
     return b"".join(of_type(field.type) for field in spec.fields)
 
 
-class _OpenAction(Protocol):
-    async def open(self) -> None: ...
-
-    async def close(self) -> None: ...
-
-
 class ActionBridge:
     """Offers the actions of each side to the other one. On the node's loop."""
 
     def __init__(
         self, node: Node, side: Ros2Side, actions: NameFilter, rules: Rules, catalogue: Catalogue
     ) -> None:
-        self.links: dict[ActionLink, _OpenAction] = {}
-        self.refused: dict[ActionLink, str] = {}
         self._node = node
         self._side = side
         self._actions = actions
         self._types = _Types(side, rules, catalogue)
+        self._table: LinkTable[ActionLink, GoalsToRos1 | GoalsToRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:
         """Close all. Idempotent."""
-        for link in list(self.links):
-            await self._close_link(link)
+        await self._table.close()
 
-    def pairs(self, snapshot: Snapshot) -> list[ActionPair]:
+    def pairs(self, snapshot: Snapshot) -> list[Pair]:
         """Return what would be bridged, and why something is not."""
-        found = []
-        for link in self._wanted(snapshot):
-            try:
-                self._types.codec(link.ros1_type, link.ros2_type)
-            except TypesDiffer as error:
-                found.append(ActionPair(link, str(error)))
-            else:
-                found.append(ActionPair(link))
-        return found
+        return pairs(self._wanted(snapshot), self._codec)
 
     async def look(self, snapshot: Snapshot) -> bool:
         """Open and close actions as both sides are now; whether any changed."""
-        wanted = self._wanted(snapshot)
-        gone = [link for link in self.links if link not in wanted]
-        for link in gone:
-            await self._close_link(link)
-
-        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
-        new = [link for link in wanted if link not in self.links and link not in self.refused]
-        for link in new:
-            try:
-                await self._open_link(link)
-            except (TypesDiffer, ROSException, ValueError) as error:
-                self.refused[link] = str(error)
-                self._node.log.warning(
-                    "action %s is not bridged (%s): %s", link.action, link.direction.value, error
-                )
-        return bool(gone or new)
+        return await self._table.update(self._wanted(snapshot))
 
     def _wanted(self, snapshot: Snapshot) -> list[ActionLink]:
         found = action_links(snapshot, self._side.services(), self._types.partner)
         return [link for link in found if self._actions(link.action)]
 
-    async def _open_link(self, link: ActionLink) -> None:
-        codec = self._types.codec(link.ros1_type, link.ros2_type)
-        opened: _OpenAction
-        if link.direction is Direction.TO_ROS2:
-            opened = GoalsToRos2(self._node, self._side, link, codec)
-        else:
-            opened = GoalsToRos1(self._node, self._side, link, codec)
-        await opened.open()
-        self.links[link] = opened
-        self._node.log.info(
-            "bridging action %s (%s): [%s] and [%s]",
-            link.action,
-            link.direction.value,
-            link.ros1_type,
-            link.ros2_type,
-        )
+    def _codec(self, link: ActionLink) -> ActionCodec:
+        return self._types.codec(link.ros1_type, link.ros2_type)
 
-    async def _close_link(self, link: ActionLink) -> None:
-        await self.links.pop(link).close()
-        self._node.log.info("no longer bridging action %s (%s)", link.action, link.direction.value)
+    def _make(self, link: ActionLink) -> GoalsToRos1 | GoalsToRos2:
+        made = GoalsToRos2 if link.direction is Direction.TO_ROS2 else GoalsToRos1
+        return made(self._node, self._side, link, self._codec(link))

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
-from minirospy.bridge.ros2.actions import ActionBridge, ActionPair
+from minirospy.bridge.ros2.actions import ActionBridge
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, is_bridge, links, marker
 from minirospy.bridge.ros2.parameters import ParameterBridge
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules
-from minirospy.bridge.ros2.services import ServiceBridge, ServicePair
+from minirospy.bridge.ros2.services import ServiceBridge
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
 from minirospy.bridge.types import TypeTexts
 from minirospy.errors import (
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.ros2.interface import Ros2Handle, Ros2Publisher, Ros2Side
 
-__all__ = ["Pair", "Ros2Bridge", "Ros2Options"]
+__all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
 """Field of the connection header of what comes from ROS 2, so that no bridge to the same domain sends it back."""
@@ -71,14 +72,6 @@ class Ros2Options:
     call_seconds: float = 60.0
     rules: Rules = BUILT_IN
     slowest_look: float = 1.0
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A link, and why it is not open: nothing where it is."""
-
-    link: Link
-    reason: str = ""
 
 
 class _Types:
@@ -138,8 +131,7 @@ class Ros2Bridge:
         self.node = node
         self.side = side
         self.options = options
-        self.links: dict[Link, _OpenLink] = {}
-        self.refused: dict[Link, str] = {}
+        self.topics: LinkTable[Link, _ToRos1 | _ToRos2] = LinkTable(node.log, self._make)
         self.header = marker("")
         self.services = ServiceBridge(
             node, side, options.services, options.rules, catalogue, options.call_seconds
@@ -166,26 +158,18 @@ class Ros2Bridge:
         if watching:
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
-        for link in list(self.links):
-            await self._close_link(link)
+        await self.topics.close()
         await self.actions.close()
         await self.services.close()
         await self._parameters.close()
         await self._texts.close()
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
-    async def pairs(self) -> list[Pair | ServicePair | ActionPair]:
+    async def pairs(self) -> list[Pair]:
         """Return what would be bridged, and why something is not; opens nothing. Raises as :meth:`look`."""
-        found: list[Pair | ServicePair | ActionPair] = []
         snapshot = await self._snapshot()
-        for link in await self._wanted(snapshot):
-            try:
-                await self._converter(link)
-            except TypesDiffer as error:
-                found.append(Pair(link, str(error)))
-            else:
-                found.append(Pair(link))
-        return [*found, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
+        topics = pairs(await self._wanted(snapshot), self._converter)
+        return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Return when ``condition`` holds after a look."""
@@ -195,23 +179,12 @@ class Ros2Bridge:
     async def look(self) -> bool:
         """Open and close links as the graphs are now; whether any changed. Raises MasterUnreachableError, RpcError."""
         snapshot = await self._snapshot()
-        wanted = await self._wanted(snapshot)
-        gone = [link for link in self.links if link not in wanted]
-        for link in gone:
-            await self._close_link(link)
-        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
-        new = [link for link in wanted if link not in self.links and link not in self.refused]
-        for link in new:
-            try:
-                await self._open_link(link)
-            except (TypesDiffer, ROSException, ValueError) as error:
-                self.refused[link] = str(error)
-                self.node.log.warning("%s is not bridged (%s): %s", link.topic, link.direction.value, error)
-        has_changed = await self.services.look(snapshot.services)
+        has_changed = await self.topics.update(await self._wanted(snapshot))
+        has_changed |= await self.services.look(snapshot.services)
         has_changed |= await self.actions.look(snapshot)
         self._changed.set()
         self._changed = asyncio.Event()
-        return bool(gone or new) or has_changed
+        return has_changed
 
     async def _watch(self) -> None:
         pause = _FASTEST_LOOK
@@ -265,7 +238,7 @@ class Ros2Bridge:
     def _is_latched(self, topic: str, node: str) -> bool:
         return self._headers.get((topic, node), {}).get("latching") == "1"
 
-    async def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
+    def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
         """Return the functions of a link's types. Raise TypesDiffer."""
         texts = [
             header.get("message_definition", "")
@@ -279,51 +252,15 @@ class Ros2Bridge:
             spec, lookup = self._types.installed(link.ros1_type)
         return self._types.transcoder(spec, lookup, link.ros2_type), spec, lookup
 
-    async def _open_link(self, link: Link) -> None:
-        made, spec, lookup = await self._converter(link)
+    def _make(self, link: Link) -> _ToRos1 | _ToRos2:
+        made, spec, lookup = self._converter(link)
         depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
-        opened: _OpenLink
-
         if link.direction is Direction.TO_ROS2:
-            publisher = self.side.publisher(
-                link.topic, link.ros2_type, depth=1 if link.is_latched else depth, is_latched=link.is_latched
-            )
-            await self._joined(publisher)
-            opened = _ToRos2(self, link, made, publisher)
-        else:
-            interface = self._types.interface(spec, lookup)
-            ros1 = self.node.advertise(
-                link.topic,
-                raw_class(interface),
-                queue_size=_DEPTH_OF_LARGE if depth == _DEPTH_OF_LARGE else _ROS1_QUEUE,
-                latch=link.is_latched,
-                headers={_ORIGIN: self.side.domain},
-            )
-            await ros1._wait_for_expected()
-            opened = _ToRos1(self, link, made, ros1, depth)
-        self.links[link] = opened
-        self.node.log.info(
-            "bridging %s (%s): [%s] and [%s]",
-            link.topic,
-            link.direction.value,
-            link.ros1_type,
-            link.ros2_type,
-        )
-
-    @staticmethod
-    async def _joined(publisher: Ros2Publisher) -> None:
-        """Wait for the subscribers that are there: a message that is published before does not reach them."""
-        loop = asyncio.get_running_loop()
-        end = loop.time() + _JOIN_SECONDS
-        while not publisher.subscribers and loop.time() < end:
-            await asyncio.sleep(_JOIN_LOOK)
-
-    async def _close_link(self, link: Link) -> None:
-        await self.links.pop(link).close()
-        self.node.log.info("no longer bridging %s (%s)", link.topic, link.direction.value)
+            return _ToRos2(self, link, made, depth)
+        return _ToRos1(self, link, made, depth, self._types.interface(spec, lookup))
 
 
-class _OpenLink:
+class _Passing:
     """A link that passes messages; ``passed`` counts them."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
@@ -335,22 +272,33 @@ class _OpenLink:
         is_static = link.is_latched and link.ros1_type in TF_TYPES
         self._statics = StaticTransforms() if is_static else None
 
-    async def close(self) -> None:
-        raise NotImplementedError
-
     def _report(self, error: Exception) -> None:
         self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
 
 
-class _ToRos2(_OpenLink):
-    def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, publisher: Ros2Publisher) -> None:
+class _ToRos2(_Passing):
+    def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int) -> None:
         super().__init__(bridge, link, made)
-        self._publisher = publisher
-        self._subscription: RawSubscription = bridge.node.subscribe_raw(link.topic, self._deliver)
+        self._publisher: Ros2Publisher = bridge.side.publisher(
+            link.topic, link.ros2_type, depth=1 if link.is_latched else depth, is_latched=link.is_latched
+        )
+        self._subscription: RawSubscription | None = None
+
+    async def open(self) -> None:
+        await self._wait_for_subscribers()
+        self._subscription = self._bridge.node.subscribe_raw(self.link.topic, self._deliver)
 
     async def close(self) -> None:
-        await self._subscription.close()
+        if self._subscription:
+            await self._subscription.close()
         self._publisher.close()
+
+    async def _wait_for_subscribers(self) -> None:
+        """Wait for the subscribers that are there: a message that is published before does not reach them."""
+        loop = asyncio.get_running_loop()
+        end = loop.time() + _JOIN_SECONDS
+        while not self._publisher.subscribers and loop.time() < end:
+            await asyncio.sleep(_JOIN_LOOK)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
         bridge = self._bridge
@@ -366,23 +314,35 @@ class _ToRos2(_OpenLink):
             self.passed += 1
 
 
-class _ToRos1(_OpenLink):
+class _ToRos1(_Passing):
     def __init__(
-        self, bridge: Ros2Bridge, link: Link, made: Transcoder, publisher: Publisher[Message], depth: int
+        self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int, interface: InterfaceType
     ) -> None:
         super().__init__(bridge, link, made)
-        self._publisher = publisher
-        self._subscription: Ros2Handle = bridge.side.subscribe(
+        self._depth = _DEPTH if link.is_latched else depth
+        self._publisher: Publisher[Message] = bridge.node.advertise(
             link.topic,
-            link.ros2_type,
+            raw_class(interface),
+            queue_size=_DEPTH_OF_LARGE if depth == _DEPTH_OF_LARGE else _ROS1_QUEUE,
+            latch=link.is_latched,
+            headers={_ORIGIN: bridge.side.domain},
+        )
+        self._subscription: Ros2Handle | None = None
+
+    async def open(self) -> None:
+        await self._publisher._wait_for_expected()
+        self._subscription = self._bridge.side.subscribe(
+            self.link.topic,
+            self.link.ros2_type,
             self._deliver,
-            depth=_DEPTH if link.is_latched else depth,
-            is_reliable=link.is_reliable,
-            is_latched=link.is_latched,
+            depth=self._depth,
+            is_reliable=self.link.is_reliable,
+            is_latched=self.link.is_latched,
         )
 
     async def close(self) -> None:
-        self._subscription.close()
+        if self._subscription:
+            self._subscription.close()
         await self._publisher.close()
 
     def _deliver(self, data: bytes) -> None:

@@ -53,6 +53,11 @@ class Link:
     is_latched: bool = False
     is_reliable: bool = True
 
+    @property
+    def title(self) -> str:
+        """How messages to people name the link."""
+        return self.topic
+
 
 def is_bridge(node: str) -> bool:
     """Return whether a node is a bridge, by its name on either side."""

@@ -23,6 +23,11 @@ class ServiceLink:
     ros1_type: str
     ros2_type: str
 
+    @property
+    def title(self) -> str:
+        """How messages to people name the link."""
+        return f"service {self.service}"
+
 
 def is_bridged_type(type_: str) -> bool:
     """Return whether services of a type, ``pkg/Name`` of either side, are meant for other nodes."""

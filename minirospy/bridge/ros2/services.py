@@ -7,10 +7,11 @@ import contextlib
 from collections.abc import Awaitable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, call_raw, service_header
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction, is_bridge
 from minirospy.bridge.ros2.rules import Rules
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.interface import Ros2Client, Ros2Handle, Ros2Side
 
-__all__ = ["ServiceBridge", "ServiceCodec", "ServicePair"]
+__all__ = ["ServiceBridge", "ServiceCodec"]
 
 _PROBE_SECONDS = 1.0
 _PROBE_AGAIN_SECONDS = 10.0
@@ -43,14 +44,6 @@ _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MOST_UNDER_WAY = 8
 """Requests that a server of ROS 2 gets at a time: its queue has 10 places, and those beyond would be lost."""
-
-
-@dataclass(frozen=True)
-class ServicePair:
-    """A service, and why it is not bridged: nothing where it is."""
-
-    link: ServiceLink
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -136,51 +129,26 @@ class ServiceBridge:
         catalogue: Catalogue,
         call_seconds: float,
     ) -> None:
-        self.links: dict[ServiceLink, _OpenService] = {}
-        self.refused: dict[ServiceLink, str] = {}
         self._node = node
         self._side = side
         self._services = services
         self._types = _Types(side, rules, catalogue)
         self._call_seconds = call_seconds
         self._probes = _Probes(node)
+        self._table: LinkTable[ServiceLink, _InRos1 | _InRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:
         """Close all. Idempotent."""
-        for link in list(self.links):
-            await self._close_link(link)
+        await self._table.close()
         await self._probes.close()
 
-    async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServicePair]:
+    async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
         """Return what would be bridged of these services of ROS 1 and those of ROS 2, and why something is not."""
-        found = []
-        for link in await self._wanted(ros1):
-            try:
-                self._codec(link)
-            except TypesDiffer as error:
-                found.append(ServicePair(link, str(error)))
-            else:
-                found.append(ServicePair(link))
-        return found
+        return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
         """Open and close services as both sides are now; whether any changed."""
-        wanted = await self._wanted(ros1)
-        gone = [link for link in self.links if link not in wanted]
-        for link in gone:
-            await self._close_link(link)
-
-        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
-        new = [link for link in wanted if link not in self.links and link not in self.refused]
-        for link in new:
-            try:
-                await self._open_link(link)
-            except (TypesDiffer, ROSException, ValueError) as error:
-                self.refused[link] = str(error)
-                self._node.log.warning(
-                    "service %s is not bridged (%s): %s", link.service, link.direction.value, error
-                )
-        return bool(gone or new)
+        return await self._table.update(await self._wanted(ros1))
 
     async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
         ros1 = {name: nodes for name, nodes in ros1.items() if self._services(name)}
@@ -200,30 +168,9 @@ class ServiceBridge:
                 )
         return codec
 
-    async def _open_link(self, link: ServiceLink) -> None:
-        codec = self._codec(link)
-        opened: _OpenService
-        if link.direction is Direction.TO_ROS2:
-            opened = _InRos1(self._node, self._side, link, codec, self._call_seconds)
-            await opened.open()
-        else:
-            opened = _InRos2(self._node, self._side, link, codec, self._call_seconds)
-        self.links[link] = opened
-        self._node.log.info(
-            "bridging service %s (%s): [%s] and [%s]",
-            link.service,
-            link.direction.value,
-            link.ros1_type,
-            link.ros2_type,
-        )
-
-    async def _close_link(self, link: ServiceLink) -> None:
-        await self.links.pop(link).close()
-        self._node.log.info("no longer bridging service %s (%s)", link.service, link.direction.value)
-
-
-class _OpenService(Protocol):
-    async def close(self) -> None: ...
+    def _make(self, link: ServiceLink) -> _InRos1 | _InRos2:
+        made = _InRos1 if link.direction is Direction.TO_ROS2 else _InRos2
+        return made(self._node, self._side, link, self._codec(link), self._call_seconds)
 
 
 class _InRos1:
@@ -314,10 +261,15 @@ class _InRos2:
         self._call_seconds = call_seconds
         self._loop = asyncio.get_running_loop()
         self._calls: set[asyncio.Task[None]] = set()
-        self._server: Ros2Handle = side.serve(link.service, link.ros2_type, self._arrived)
+        self._side = side
+        self._server: Ros2Handle | None = None
+
+    async def open(self) -> None:
+        self._server = self._side.serve(self._link.service, self._link.ros2_type, self._arrived)
 
     async def close(self) -> None:
-        self._server.close()
+        if self._server:
+            self._server.close()
         for task in self._calls:
             task.cancel()
         await asyncio.gather(*self._calls, return_exceptions=True)
