@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import builtins
 import sys
 from collections.abc import Callable
 from io import BytesIO
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -305,8 +307,34 @@ def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.Monke
     assert (server.cancelled, len(client._callbacks)) == (1, 1)
 
 
-@pytest.mark.parametrize("type_", ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00"])
+@pytest.mark.parametrize(
+    "type_", ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00", "A_msgs/B", "a__b/C", "a_/B"]
+)
 def test_a_type_that_is_not_a_name_is_never_imported(type_: str) -> None:
     for found in (RclpySide._class, RclpySide._service_class, RclpySide._action_class):
         with pytest.raises(TypesDiffer):
             found(type_)
+
+
+def test_only_packages_of_interfaces_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("plain_tool", "fly_msgs"):
+        for folder in (tmp_path / package, tmp_path / package / "msg"):
+            folder.mkdir()
+            (folder / "__init__.py").write_text(f"import builtins\nbuiltins.imported_by_name.add({package!r})\n")
+    imported: set[str] = set()
+    monkeypatch.setattr(builtins, "imported_by_name", imported, raising=False)
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    for type_ in ("plain_tool/Fly", "fly_msgs/Fly", "antigravity/Fly", "this/Fly", "nothing_of_the_name/Fly"):
+        with pytest.raises(TypesDiffer):
+            RclpySide._class(type_)
+    assert not imported
+    assert "antigravity" not in sys.modules
+
+    (tmp_path / "fly_msgs" / "fly_msgs_s__rosidl_typesupport_c.so").write_text("")
+    with (tmp_path / "fly_msgs" / "msg" / "__init__.py").open("a") as file:
+        file.write("class Fly:\n    get_fields_and_field_types = lambda: {}\n")
+    assert RclpySide._class("fly_msgs/Fly").__name__ == "Fly"
+    assert imported == {"fly_msgs"}
+    for name in ("fly_msgs.msg", "fly_msgs"):
+        sys.modules.pop(name)

@@ -9,9 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib
+import importlib.util
 import logging
 import os
 import re
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -101,6 +103,7 @@ def require_rclpy() -> None:
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables that name a file with Fast DDS's settings: the second up to version 2, which _OLD_DISTRIBUTIONS have."""
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
+_PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
 
@@ -391,13 +394,26 @@ class _Subscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # A server of the other side has named it: a relative or dotted name is not a package's.
-    if not (_NAME.fullmatch(package) and _NAME.fullmatch(name)):
+    # A node of the other side has named it: an import runs what the module does.
+    if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name, None)
     except ImportError:
         return None
+
+
+def _is_interface_package(package: str) -> bool:
+    """Return whether a package holds what rosidl generates, without importing it: a library for its types."""
+    if package in sys.stdlib_module_names:
+        return False
+    try:
+        found = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        # ValueError: a module that was put into sys.modules by hand has no spec.
+        return False
+    folders = found.submodule_search_locations if found else None
+    return any(any(Path(folder).glob(f"{package}_s__rosidl_typesupport_*")) for folder in folders or ())
 
 
 def _short(type_: str) -> str:
