@@ -19,6 +19,7 @@ from minirospy.errors import (
 )
 from minirospy.idl.protocols import Message
 from minirospy.runtime.node.services import AsyncHandler, AsyncServiceClient, LoopServiceServer
+from minirospy.runtime.transport.sockets import HANDSHAKE_SECONDS
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
@@ -150,7 +151,7 @@ async def _connect(node: Node, service: str, md5sum: str, *, probe: bool = False
             md5sum,
             node.name,
             probe=probe,
-            timeout=PROBE_SECONDS,
+            timeout=PROBE_SECONDS if probe else HANDSHAKE_SECONDS,
             same_host=node._node.environment.same_host,
         )
     except HandshakeRefused as error:

@@ -308,7 +308,8 @@ def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    "type_", ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00", "A_msgs/B", "a__b/C", "a_/B"]
+    "type_",
+    ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00", "A_msgs/B", "a__b/C", "a_/B"],
 )
 def test_a_type_that_is_not_a_name_is_never_imported(type_: str) -> None:
     for found in (RclpySide._class, RclpySide._service_class, RclpySide._action_class):
@@ -320,7 +321,9 @@ def test_only_packages_of_interfaces_are_imported(tmp_path: Path, monkeypatch: p
     for package in ("plain_tool", "fly_msgs"):
         for folder in (tmp_path / package, tmp_path / package / "msg"):
             folder.mkdir()
-            (folder / "__init__.py").write_text(f"import builtins\nbuiltins.imported_by_name.add({package!r})\n")
+            (folder / "__init__.py").write_text(
+                f"import builtins\nbuiltins.imported_by_name.add({package!r})\n"
+            )
     imported: set[str] = set()
     monkeypatch.setattr(builtins, "imported_by_name", imported, raising=False)
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
 
 from minirospy import Node
+from minirospy.aio import raw
 from minirospy.aio.raw import RawService, call_raw, service_header
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
@@ -18,7 +20,8 @@ from minirospy.bridge.ros2.service_links import ServiceLink, service_links
 from minirospy.cli.ros2_bridge import main
 from minirospy.errors import BridgeError, ServiceException
 from minirospy.idl.load import service_class
-from minirospy.wire.header import Header
+from minirospy.wire.header import Header, serialize_header
+from minirospy.wire.service import serialize_response
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
@@ -216,3 +219,35 @@ def test_types_of_services_that_do_not_map_are_listed_with_the_reason() -> None:
 def test_a_time_limit_of_calls_that_is_no_time_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--call-timeout", "0"]) == 1
     assert "--call-timeout 0 is not a number of seconds above 0" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("master")
+def test_call_waits_longer_for_a_busy_server_than_a_probe(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hundreds of calls at the same time take their time: none of them may fail for that."""
+    monkeypatch.setattr(raw, "PROBE_SECONDS", 0.05)
+    answer = serialize_header({"callerid": "/n", "md5sum": "0" * 32, "type": "a/B"})
+
+    served: asyncio.Queue[bool] = asyncio.Queue()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readexactly(int.from_bytes(await reader.readexactly(4), "little"))
+        await asyncio.sleep(0.5)
+        writer.write(answer + serialize_response(b"done"))
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+        served.put_nowait(True)
+
+    async def run() -> None:
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        async with server, Node("caller", rosout=False) as node:
+            uri = f"rosrpc://127.0.0.1:{port}"
+            await node._node.master("registerService", "/late", uri, "http://127.0.0.1:1")
+            with pytest.raises(ServiceException, match="cannot be reached"):
+                await service_header(node, "/late")
+            await served.get()
+            assert await call_raw(node, "/late", "*", b"") == b"done"
+            await served.get()
+
+    asyncio.run(run())
