@@ -8,6 +8,8 @@ import subprocess
 from collections.abc import Callable
 from xmlrpc.client import ServerProxy
 
+from std_msgs.msg import String
+
 from minirospy.bridge.access import Access
 from tests.dashboard.conftest import Served
 from tests.interop.browser import Page
@@ -98,6 +100,28 @@ def test_reader_looks_and_kills_nothing(serve: Callable[..., Served], browse: Ca
     )
     page.click(".side button", "Ping")
     page.wait_text(".side [role=status]", "answered in")
+
+
+@needs_chromium
+def test_button_that_is_pressed_stays_until_its_click(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    node = served.node("mine")
+
+    async def advertise() -> None:
+        await node.advertise("/news", String)
+
+    page = browse(address(served, "nodes?node=/mine"))
+    page.wait_text(".side", "/rosout rosgraph_msgs/Log")
+    page.wait("document.querySelector('.side button').dataset.test = 'mine'; return true")
+    page.mouse("mousePressed", ".side button", "Ping")
+    served.run(advertise())
+    page.wait_text(ROW.format("/mine"), "2 out")
+    assert page.evaluate("document.querySelector('.side button').dataset.test") == "mine"
+    page.mouse("mouseReleased", ".side button", "Ping")
+    page.wait_text(".side [role=status]", "answered in")
+    page.wait_text(".side", "/news std_msgs/String")
 
 
 @needs_chromium

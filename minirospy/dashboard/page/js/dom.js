@@ -38,8 +38,47 @@ function append(element, children, isWorded = false) {
 
 /** Replace what is in an element. */
 export function fill(element, ...children) {
+  waiting.delete(element);
   element.replaceChildren();
   append(element, children);
+}
+
+// A button that is replaced between press and release loses its click.
+const waiting = new Map(); // element -> what draws it
+let pressed = null;
+
+/** Draw what is in an element anew, as new data come: after the release where something in it is pressed. */
+export function redraw(element, draw) {
+  if (pressed && element.contains(pressed)) {
+    waiting.set(element, draw);
+    return;
+  }
+  waiting.delete(element);
+  draw();
+}
+
+/** Replace what is in an element, as redraw() does. */
+export function refill(element, ...children) {
+  redraw(element, () => fill(element, ...children));
+}
+
+function release() {
+  pressed = null;
+  if (waiting.size) setTimeout(drawWaiting); // the click comes first
+}
+
+function drawWaiting() {
+  for (const [element, draw] of waiting) redraw(element, draw);
+}
+
+/** Notice what is pressed in a window, for redraw(). */
+export function watchPresses(window) {
+  window.addEventListener("pointerdown", ({ target, button }) => {
+    pressed = button === 0 ? target.closest("a, button, summary, label, input[type=checkbox], [role=button]") : null;
+  }, true);
+  // A list of choices or another window may take the release.
+  window.addEventListener("pointermove", ({ buttons }) => { if (pressed && !buttons) release(); }, true);
+  for (const name of ["pointerup", "pointercancel", "blur"]) window.addEventListener(name, release, true);
 }
 
 let uniqueIds = 0;

@@ -4,7 +4,7 @@ import { addressOf, fragmentOf } from "./address.js";
 import { listenForKeys, openHelp } from "./help.js";
 import { LANGUAGES, chooseLanguage, language, t } from "./texts.js";
 import { Link } from "./link.js";
-import { fill, h, setText } from "./dom.js";
+import { fill, h, setText, watchPresses } from "./dom.js";
 import { Actions } from "./views/actions.js";
 import { Bag } from "./views/bag.js";
 import { Board } from "./views/board.js";
@@ -173,6 +173,7 @@ function step(by) {
 }
 
 if (localStorage.getItem("theme")) document.documentElement.dataset.theme = localStorage.getItem("theme");
+watchPresses(window);
 document.getElementById("theme").addEventListener("click", switchTheme);
 document.getElementById("language").addEventListener("click", switchLanguage);
 document.getElementById("help").addEventListener("click", openHelp);

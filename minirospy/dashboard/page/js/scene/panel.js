@@ -1,6 +1,6 @@
 // The list of displays: what is shown, its status, and its settings under RViz's names.
 
-import { fill, h, setText } from "../dom.js";
+import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 import { CLASSES, classForType, classOf, getSetting, setSetting, topicKeyOf } from "./classes.js";
 import { fromHex, hexOf, rgbOf } from "./colors.js";
@@ -60,7 +60,7 @@ export class Panel {
   fill() {
     this.rows.clear();
     this.background.value = hexOf(this.view.config.background);
-    fill(this.list, this.view.config.displays().map(({ settings, depth, isOn }) => this.row(settings, depth, isOn)));
+    refill(this.list, this.view.config.displays().map(({ settings, depth, isOn }) => this.row(settings, depth, isOn)));
     this.isStale = true;
     this.look();
   }
@@ -200,7 +200,7 @@ export class Panel {
     const key = found.map(({ name, isShown }) => `${name} ${isShown}`).join("\n");
     if (element.dataset.key === key) return;
     element.dataset.key = key;
-    fill(element, found.map(({ name, isShown, set }) => h("label", { class: "part" },
+    refill(element, found.map(({ name, isShown, set }) => h("label", { class: "part" },
       h("input", { type: "checkbox", checked: isShown, onchange: ({ target }) => {
         set(target.checked);
         this.view.set(settings, "Frames");

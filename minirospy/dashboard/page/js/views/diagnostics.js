@@ -1,6 +1,6 @@
 // Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values on a click.
 
-import { fill, h, setText } from "../dom.js";
+import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
 const TYPE = "diagnostic_msgs/DiagnosticArray";
@@ -182,7 +182,7 @@ export class Diagnostics {
     const content = JSON.stringify([node.path, level, status?.message, status?.hardware, status?.values]);
     if (content === this.shown) return;
     this.shown = content;
-    fill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
+    refill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
       status?.hardware ? h("p", { class: "muted" }, t("hardware: "), status.hardware) : null,
       h("table", { class: "values" }, h("tbody", {}, (status?.values ?? []).map(({ key, value }) => h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value))))));
   }

@@ -1,7 +1,7 @@
 // Who sends to whom: nodes and topics, laid out by dagre and drawn as SVG. A click shows the details.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
-import { bandwidth, fill, h, setText, svg, uniqueId } from "../dom.js";
+import { bandwidth, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { elementsOf, groupsOf, trafficOf } from "../graph_elements.js";
 import { PanZoom } from "../panzoom.js";
 import { Rate } from "../rates.js";
@@ -67,8 +67,10 @@ export class Graph {
     const found = this.elements();
     const signature = JSON.stringify([[...found.nodes].sort(), [...found.topics].sort(), [...found.actions].sort(), found.edges, this.hasRates.checked, this.hasGroups.checked]);
     if (signature !== this.signature) {
-      this.signature = signature;
-      this.draw(found);
+      redraw(this.drawing, () => {
+        this.signature = signature;
+        this.draw(found);
+      });
     }
     this.empty.textContent = found.nodes.size ? "" : this.link.state === "open" ? t("No nodes yet. Start one: it appears here.") : "";
     if (this.selected) this.showDetails();
@@ -207,7 +209,6 @@ export class Graph {
     const name = this.selected.slice(1);
     const { published, subscribed, services } = this.link.graph;
     const names = (table) => [...table].filter(([, nodes]) => nodes.includes(name)).map(([each]) => each).sort();
-    // A button that is replaced between press and release loses its click.
     const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? "", this.report.mismatches[name] ?? "", this.report.nodes.find((node) => node.name === name)?.trouble ?? ""));
     if (content === this.shown) return;
     this.shown = content;
@@ -215,17 +216,17 @@ export class Graph {
       ? h("button", { type: "button", class: "link", onclick: () => { this.selected = null; this.select(kind + each); } }, each) : each)))] : []);
     if (this.selected[0] === "a") {
       const ends = (part, table) => table.get(`${name}/${part}`) ?? [];
-      fill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, t("goals, feedback and results"))),
+      refill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, t("goals, feedback and results"))),
         list("Servers", ends("status", published), "n"), list("Clients", [...new Set([...ends("goal", published), ...ends("cancel", published)])], "n"),
         list("Topics", ["goal", "cancel", "status", "feedback", "result"].map((part) => `${name}/${part}`)));
     } else if (this.selected[0] === "n") {
       const node = this.report.nodes.find((each) => each.name === name);
-      fill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}. What to do: {advice}.", { trouble: node.trouble, advice: node.advice })) : null,
+      refill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}. What to do: {advice}.", { trouble: node.trouble, advice: node.advice })) : null,
         h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, t("process and connections"))), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
     } else {
       const type = this.link.channels.get(name)?.type;
       this.rateText ??= h("span", { class: "muted" });
-      fill(this.details, h("h2", {}, name), h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
+      refill(this.details, h("h2", {}, name), h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
         h("p", {}, h("a", { href: `#/topics?open=${encodeURIComponent(name)}` }, t("live values"))),
         list("Publishers", published.get(name) ?? [], "n"), list("Subscribers", subscribed.get(name) ?? [], "n"),
         (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."), this.mismatch(name));

@@ -1,6 +1,6 @@
 // Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log lines.
 
-import { fill, h, setText } from "../dom.js";
+import { fill, h, refill, setText } from "../dom.js";
 import { Door } from "../door.js";
 import { t } from "../texts.js";
 
@@ -64,14 +64,14 @@ export class Launch {
     const words = this.filter.value.toLowerCase().split(/\s+/);
     const shown = this.files.filter(([name, file]) => words.every((word) => `${name}/${file}`.toLowerCase().includes(word)));
     const groups = Map.groupBy ? Map.groupBy(shown, ([name]) => name) : groupsOf(shown);
-    fill(this.list, [...groups].map(([name, files]) => h("details", { open: groups.size <= 12 || Boolean(this.filter.value.trim()) || name === this.chosen?.[0] },
+    refill(this.list, [...groups].map(([name, files]) => h("details", { open: groups.size <= 12 || Boolean(this.filter.value.trim()) || name === this.chosen?.[0] },
       h("summary", {}, h("span", { class: "name" }, name), " ", h("span", { class: "muted" }, String(files.length))),
       files.map(([, file]) => {
         const button = h("button", { type: "button", class: "link", onclick: () => this.describe(name, file) }, file);
         if (name === this.chosen?.[0] && file === this.chosen[1]) button.setAttribute("aria-current", "true");
         return button;
       }))));
-    if (!shown.length) fill(this.list, h("p", { class: "muted" }, this.files.length ? t("No launch file fits the filter.") : t("No package has a launch file.")));
+    if (!shown.length) refill(this.list, h("p", { class: "muted" }, this.files.length ? t("No launch file fits the filter.") : t("No package has a launch file.")));
     this.showEmpty();
   }
 

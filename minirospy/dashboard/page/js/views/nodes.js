@@ -1,6 +1,6 @@
 // Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after the dead.
 
-import { fill, h, setText } from "../dom.js";
+import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
 export class Nodes {
@@ -100,14 +100,13 @@ export class Nodes {
     const node = this.nodes.get(this.chosen);
     this.side.hidden = !node;
     if (!node) return;
-    // A button that is replaced between press and release loses its click.
     const content = JSON.stringify([{ ...node, milliseconds: 0 }, this.mayChange]);
     if (content === this.shown) return;
     this.shown = content;
     const topics = (title, list) => part(title, list.map(([topic, type]) => h("li", {}, h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic), " ", h("span", { class: "muted" }, type))));
     const killButton = h("button", { type: "button", class: "danger", disabled: !this.mayChange || node.name === this.link.node, onclick: () => this.askKill(node.name) }, "Kill …");
     this.pingText = h("span", { class: "muted", role: "status" }, this.pings.get(node.name) ?? "");
-    fill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}.", { trouble: node.trouble }), " ", h("br"), sentence(node.advice)) : null,
+    refill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}.", { trouble: node.trouble }), " ", h("br"), sentence(node.advice)) : null,
       h("table", { class: "values facts" }, h("tbody", {}, [["host", node.host], ["process", node.pid || ""], ["address", node.uri]].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, t(name)), h("td", {}, value))))),
       h("div", { class: "bar" }, h("button", { type: "button", onclick: () => this.ping(node.name) }, "Ping"), killButton, this.pingText,
         node.name === this.link.node ? h("span", { class: "muted" }, t("this page")) : this.mayChange ? null : h("span", { class: "muted" }, t("read-only"))),

@@ -1,7 +1,7 @@
 // State machines of smach, as smach_viewer shows them: containers in containers, active states, userdata; and where they start the next time.
 
 import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
-import { fill, h, setText, svg, uniqueId } from "../dom.js";
+import { fill, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { userdataOf } from "../pickle.js";
 import { layoutContainer, roots } from "../smach_layout.js";
 import { t } from "../texts.js";
@@ -129,8 +129,10 @@ export class Smach {
     setText(this.empty, this.structures.size ? "" : t("Waiting for the structure …"));
     const signature = JSON.stringify([[...this.structures.values()].map(({ header, ...rest }) => rest), [...this.folded]]);
     if (signature !== this.signature) {
-      this.signature = signature;
-      this.drawStructure();
+      redraw(this.drawing, () => {
+        this.signature = signature;
+        this.drawStructure();
+      });
     }
     this.highlight();
     this.showDetails();
@@ -221,11 +223,11 @@ export class Smach {
     if (content === this.shown) return;
     this.shown = content;
     if (!structure) {
-      fill(this.details, h("p", { class: "muted" }, t("A click on a state or a container shows its outcomes and its userdata.")));
+      refill(this.details, h("p", { class: "muted" }, t("A click on a state or a container shows its outcomes and its userdata.")));
       return;
     }
     const state = this.selected?.state ?? null;
-    fill(this.details, h("h2", {}, state === null ? path : `${path}/${state}`), this.facts(structure, status, state),
+    refill(this.details, h("h2", {}, state === null ? path : `${path}/${state}`), this.facts(structure, status, state),
       h("h3", {}, t("Userdata of {path}", { path })), this.userdata(status),
       h("h3", {}, "Last changes"), this.events.length ? h("ul", { class: "smach-events" }, this.events.slice(0, 30).map((event) => h("li", {}, h("span", { class: "muted num" }, new Date(event.seconds * 1000).toLocaleTimeString()), " ",
         h("span", { class: "muted" }, event.path), " → ", event.active.join(", ") || t("ended")))) : h("p", { class: "muted" }, t("none yet")));

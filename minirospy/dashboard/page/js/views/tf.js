@@ -1,7 +1,7 @@
 // The tree of frames: who is whose parent, how often and how lately each is published, and what is wrong.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
-import { fill, h, number, setText, svg } from "../dom.js";
+import { h, number, redraw, refill, setText, svg } from "../dom.js";
 import { Frames, eulerOf } from "../frames.js";
 import { PanZoom } from "../panzoom.js";
 import { t } from "../texts.js";
@@ -66,8 +66,10 @@ export class Tf {
     const names = this.frames.names();
     const signature = JSON.stringify(names.map((name) => [name, this.frames.frames.get(name)?.parent]));
     if (signature !== this.signature) {
-      this.signature = signature;
-      this.lay(names);
+      redraw(this.drawing, () => {
+        this.signature = signature;
+        this.lay(names);
+      });
     }
     let bad = 0;
     for (const [name, box] of this.boxes) bad += this.show(name, box, now);
@@ -164,7 +166,7 @@ export class Tf {
     const children = [...this.frames.frames.values()].filter(({ parent }) => parent === this.chosen).map(({ child }) => child).sort();
     if (children.length) add("children", children.join(", "));
     const problem = this.frames.problem(this.chosen, now);
-    fill(this.side, h("h2", {}, this.chosen), problem ? h("p", { class: "error" }, problem) : null, frame ? null : h("p", { class: "muted" }, t("The root of its tree: nobody publishes its parent.")),
+    refill(this.side, h("h2", {}, this.chosen), problem ? h("p", { class: "error" }, problem) : null, frame ? null : h("p", { class: "muted" }, t("The root of its tree: nobody publishes its parent.")),
       h("table", { class: "values facts" }, h("tbody", {}, rows)));
   }
 }
