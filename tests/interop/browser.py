@@ -51,6 +51,14 @@ new Promise((resolve, reject) => {
 })
 """
 
+_ARM = """
+window.clickedByTest = false;
+window.addEventListener("click", (event) => {
+  const e = %s;
+  window.clickedByTest = Boolean(e) && e.contains(event.target);
+}, { capture: true, once: true });
+"""
+
 
 class Page:
     """A tab. ``script`` is JavaScript; ``find`` is a selector of CSS."""
@@ -132,21 +140,19 @@ class Page:
         return str(self.wait(f"const e = {_finding(find, text)}; return e && e.textContent"))
 
     def click(self, find: str, text: str = "") -> None:
-        """Click the first element that is visible, has this text, once it is there; as a mouse does."""
-        for kind in ("mousePressed", "mouseReleased"):
-            self.mouse(kind, find, text)
+        """Click the first element that is visible, has this text, once it is there; as a mouse does.
 
-    def click_until(self, find: str, text: str, shown: str, shown_text: str) -> None:
-        """Click until a visible element has a text, as a person does where what is clicked has just moved away."""
+        What moves away between the look and the press is not hit: the press is repeated, as a person does.
+        """
         end = time.monotonic() + PATIENCE
         while True:
-            self.click(find, text)
-            again = time.monotonic() + 5
-            while time.monotonic() < again:
-                if self.evaluate(f"Boolean({_finding(shown, shown_text)})"):
-                    return
-                time.sleep(0.05)
-            assert time.monotonic() < end, f"{shown} does not show {shown_text!r}"
+            self.evaluate(_ARM % _finding(find, text))
+            for kind in ("mousePressed", "mouseReleased"):
+                self.mouse(kind, find, text)
+            # A page that was just loaded knows nothing of the click that loaded it.
+            if self.evaluate("window.clickedByTest !== false"):
+                return
+            assert time.monotonic() < end, f"the clicks do not reach {find} {text!r}"
 
     def mouse(self, kind: str, find: str, text: str = "") -> None:
         """Press (mousePressed) or release (mouseReleased) the mouse over an element."""
