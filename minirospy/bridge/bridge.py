@@ -8,6 +8,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 from minirospy.aio.node import Node
@@ -17,6 +18,7 @@ from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveO
 from minirospy.bridge.graph import Filters, SharedGraph
 from minirospy.bridge.rosbridge.client_topics import ClientTopics
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.video.pages import VideoPages
 from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
@@ -29,6 +31,9 @@ from minirospy.workspace.packages import Packages
 if TYPE_CHECKING:
     import ssl
 
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    from minirospy.aio.topics import Publisher
     from minirospy.bridge.rosapi.services import Rosapi
     from minirospy.bridge.tf_republisher.republisher import Republisher
 
@@ -244,9 +249,15 @@ class Bridge:
 
     async def _report(self) -> None:
         """Publish the state of the clients as diagnostics, every second while there are any."""
-        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+        from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)
+        faults = Faults(self.node.log, "publishing the state of the clients")
+        await keep_running(partial(self._publish_states, publisher), faults)
+
+    async def _publish_states(self, publisher: Publisher[DiagnosticArray]) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
         before: Mapping[str, int] = {}
         while True:
             await asyncio.sleep(_DIAGNOSTICS_SECONDS)

@@ -16,6 +16,7 @@ from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import ServiceTypes, TypeTexts
 from minirospy.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.idl.protocols import Message
@@ -199,6 +200,7 @@ class SharedGraph:
         self._listeners: list[GraphListener] = []
         self._publishers: dict[str, _SharedPublisher] = {}
         self._look_soon = asyncio.Event()
+        self._faults = Faults(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._probing = asyncio.Semaphore(_PROBES)
@@ -227,7 +229,7 @@ class SharedGraph:
         if self._watching is None:
             self.snapshot = Snapshot()
             self._is_first_look = True
-            self._watching = asyncio.ensure_future(self._watch())
+            self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
         self._look_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
@@ -252,7 +254,10 @@ class SharedGraph:
         is_first, self._is_first_look = self._is_first_look, False
         if changes or is_first or before.types != after.types:
             for listener in tuple(self._listeners):
-                listener(changes)
+                try:
+                    listener(changes)
+                except Exception as error:  # noqa: BLE001 - of one client: the others are notified
+                    self._faults.report(error)
 
     async def _watch(self) -> None:
         pause = FASTEST_LOOK
@@ -287,6 +292,9 @@ class SharedGraph:
                     header = await service_header(self.node, name)
                 except ServiceException as error:
                     _log.debug("service %s: %s", name, error)
+                    self.service_types.failed(name, nodes)
+                except Exception as error:  # noqa: BLE001 - of one service: the others are looked up
+                    self._faults.report(error)
                     self.service_types.failed(name, nodes)
                 else:
                     self.service_types.found(name, nodes, header)
@@ -366,6 +374,8 @@ class SharedGraph:
                 await work
             except (MasterUnreachableError, RpcError, ServiceException, BridgeError) as error:
                 _log.warning("%s", error)
+            except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+                self._faults.report(error)
 
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from types import TracebackType
 
 from minirospy.aio.node import Node
@@ -10,6 +11,7 @@ from minirospy.bridge.addresses import links
 from minirospy.bridge.bridge import Bridge, BridgeOptions
 from minirospy.bridge.foxglove import serializing
 from minirospy.bridge.foxglove.protocol import PlaybackCommand, PlaybackControl, PlaybackState, PlaybackStatus
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.recording.player import Player
 from minirospy.runtime.transport.loop import LoopThread
 
@@ -95,7 +97,8 @@ class PlayerBridge:
             f"open in Foxglove:   {found.foxglove}",
             f"open in Lichtblick: {found.lichtblick}",
         ]
-        self._ticking = asyncio.ensure_future(self._tick(self._bridge))
+        faults = Faults(self._node.log, "the timeline of the bag")
+        self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), faults))
 
     async def _tick(self, bridge: Bridge) -> None:
         """Send the bag's time, and the player's state when that changes, whether by a client or by a key."""

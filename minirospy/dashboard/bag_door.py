@@ -22,6 +22,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.bag_player import GraphStage, OpenBag
 from minirospy.dashboard.recording import Recording
@@ -138,8 +139,9 @@ class BagSession:
             "density": self._density,
             "thumbnails": self._request_thumbnails,
         }
+        self._faults = Faults(_log, "serving bags")
         self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(_report)
+        self.task.add_done_callback(self._faults.of_task)
 
     # --- from the connection
 
@@ -171,24 +173,27 @@ class BagSession:
     # --- the session's task
 
     async def _run(self) -> None:
-        loop = asyncio.get_running_loop()
         self._send("writes", self._client.is_owner)
         if not self._client.is_owner:
             self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
-        looked = -math.inf
         try:
-            while True:
-                while not self._operations.empty():
-                    await self._handle(self._operations.get_nowait())
-                if loop.time() - looked >= _RECORDING_SECONDS and self._client.is_owner:
-                    looked = loop.time()
-                    self._send_recording()
-                if self._bag:
-                    await self._follow(self._bag)
-                await asyncio.sleep(0.0 if self._thumbnails else _LOOK_SECONDS)
+            await keep_running(self._serve, self._faults)
         finally:
             await asyncio.shield(self._close_bag())
             self._thread.shutdown(wait=False)
+
+    async def _serve(self) -> None:
+        loop = asyncio.get_running_loop()
+        looked = -math.inf
+        while True:
+            while not self._operations.empty():
+                await self._handle(self._operations.get_nowait())
+            if loop.time() - looked >= _RECORDING_SECONDS and self._client.is_owner:
+                looked = loop.time()
+                self._send_recording()
+            if self._bag:
+                await self._follow(self._bag)
+            await asyncio.sleep(0.0 if self._thumbnails else _LOOK_SECONDS)
 
     async def _handle(self, fields: _Fields) -> None:
         """Carry out an operation."""
@@ -198,6 +203,9 @@ class BagSession:
             self._send_error(str(error))
         except (ValueError, TypeError, LookupError, OverflowError) as error:
             self._send_error(f"not an operation on bags: {fields['op']}: {error!r}")
+        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
+            self._faults.report(error)
+            self._send_error(f"the dashboard failed on this operation: {type(error).__name__}")
 
     async def _in_thread(self, work: Callable[[], _T]) -> _T:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
@@ -438,8 +446,3 @@ def _number(value: object) -> float:
     if not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r:.40} is not a number")
     return float(value)
-
-
-def _report(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _log.error("bags cannot be served: %s", error, exc_info=error)

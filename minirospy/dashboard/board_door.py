@@ -15,6 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from minirospy.bridge.tasks import Faults
 from minirospy.errors import BoardError
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import BUTTONS, LEDS, Function
@@ -66,8 +67,9 @@ class BoardSession:
         self._pressed: set[int] = set()
         self._work: asyncio.Queue[Callable[[Board], None]] = asyncio.Queue(_MOST_WAITING)
         self._thread = ThreadPoolExecutor(1, "board-session")
+        self._faults = Faults(_log, "serving the board")
         self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(_report)
+        self.task.add_done_callback(self._faults.of_task)
 
     def received_text(self, text: str) -> None:
         """Take over an operation."""
@@ -119,6 +121,9 @@ class BoardSession:
             await self._mirror(board)
         except BoardError as error:
             self._send_error(str(error))
+        except Exception as error:  # noqa: BLE001 - the page would wait for a board that nobody mirrors
+            self._faults.report(error)
+            self._send_error(f"the dashboard failed to show the board: {type(error).__name__}")
         finally:
             await loop.run_in_executor(self._thread, _leave, opening, self._pressed)
             self._thread.shutdown(wait=False)
@@ -176,8 +181,3 @@ def _leave(opening: Future[Board], pressed: set[int]) -> None:
         _log.warning("a button could not be released: %s", error)
     finally:
         board.close()
-
-
-def _report(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _log.error("the board cannot be served: %s", error)

@@ -14,8 +14,10 @@ import logging
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
 from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
 
     from minirospy.aio.node import Node
-    from minirospy.aio.topics import Publisher, Subscription
+    from minirospy.aio.topics import Publisher
     from minirospy.bridge.graph import SharedGraph
     from minirospy.bridge.web.client import WebClient
 
@@ -66,6 +68,7 @@ class JointDoor:
         self._publisher: Publisher[JointState] | None = None
         self._working: asyncio.Task[None] | None = None
         self._sources: list[asyncio.Task[None]] = []
+        self._faults = Faults(_log, "following and publishing joints")
 
     # --- Door
 
@@ -105,8 +108,7 @@ class JointDoor:
         """Follow the parameters, and publish where wanted, from now on, while there is somebody who wants that."""
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
-            self._working = asyncio.ensure_future(self._work())
-            self._working.add_done_callback(_report)
+            self._working = asyncio.ensure_future(keep_running(self._work, self._faults))
 
     async def _work(self) -> None:
         loop = asyncio.get_running_loop()
@@ -171,7 +173,8 @@ class JointDoor:
         for task in self._sources:
             task.cancel()
 
-        async def follow(subscription: Subscription[JointState]) -> None:
+        async def follow(topic: str) -> None:
+            subscription = self.node.subscribe(topic, JointState)
             try:
                 async for state in subscription:
                     if self.joints:
@@ -180,7 +183,7 @@ class JointDoor:
                 await subscription.close()
 
         self._sources = [
-            asyncio.ensure_future(follow(self.node.subscribe(topic, JointState))) for topic in topics
+            asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)) for topic in topics
         ]
 
     async def _publish(self) -> None:
@@ -269,8 +272,8 @@ class JointSession:
             "publish": self._publish,
             "reload": self._reload,
         }
-        self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(_report)
+        faults = Faults(_log, "serving joints")
+        self.task = asyncio.ensure_future(keep_running(self._run, faults))
 
     def received_text(self, text: str) -> None:
         """Carry out an operation."""
@@ -343,8 +346,3 @@ def _kinds(description: str) -> tuple[str, dict[str, str]]:
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")
     }
     return root.attributes.get("name", ""), kinds
-
-
-def _report(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _log.error("joints cannot be served: %s", error, exc_info=error)

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.dashboard.launch_run import LaunchRun
 from minirospy.environment import Environment
@@ -142,8 +143,9 @@ class LaunchSession:
             "end": self._end_node,
             "follow": self._follow,
         }
+        self._faults = Faults(_log, "serving launch files")
         self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(_report)
+        self.task.add_done_callback(self._faults.of_task)
 
     # --- from the connection
 
@@ -179,15 +181,18 @@ class LaunchSession:
         if not self._client.is_owner:
             self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
         try:
-            while True:
-                while not self._operations.empty():
-                    await self._handle(self._operations.get_nowait())
-                if self._client.is_owner:
-                    self._send_launches()
-                    await self._send_log()
-                await asyncio.sleep(_LOOK_SECONDS)
+            await keep_running(self._serve, self._faults)
         finally:
             self._thread.shutdown(wait=False)
+
+    async def _serve(self) -> None:
+        while True:
+            while not self._operations.empty():
+                await self._handle(self._operations.get_nowait())
+            if self._client.is_owner:
+                self._send_launches()
+                await self._send_log()
+            await asyncio.sleep(_LOOK_SECONDS)
 
     async def _handle(self, fields: _Fields) -> None:
         try:
@@ -196,6 +201,9 @@ class LaunchSession:
             self._send_error(str(error))
         except (ValueError, TypeError, LookupError) as error:
             self._send_error(f"not an operation on launch files: {fields['op']}: {error!r}")
+        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
+            self._faults.report(error)
+            self._send_error(f"the dashboard failed on this operation: {type(error).__name__}")
 
     async def _in_thread(self, work: Callable[[], _T]) -> _T:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
@@ -284,8 +292,3 @@ def _args(fields: _Fields) -> dict[str, str]:
     if not isinstance(args, dict):
         raise TypeError("args is an object")
     return {str(name): str(value) for name, value in args.items()}
-
-
-def _report(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _log.error("launch files cannot be served: %s", error, exc_info=error)

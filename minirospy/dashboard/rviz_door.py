@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from minirospy.bridge.tasks import Faults
 from minirospy.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
 from minirospy.errors import BridgeError, RvizFileError
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["SUBPROTOCOL", "RvizDoor", "RvizSession", "read_file"]
 
 SUBPROTOCOL = "minirospy.rviz.v1"
+
+_log = logging.getLogger(__name__)
 
 _MOST_WAITING = 20
 
@@ -64,6 +68,7 @@ class RvizSession:
         self._door = door
         self._turn = asyncio.Lock()
         self._waiting = 0
+        self._faults = Faults(_log, "an operation on an .rviz file")
 
     def received_text(self, text: str) -> None:
         """Carry out an operation, and send its answer."""
@@ -95,6 +100,9 @@ class RvizSession:
                 answer = {"error": str(error)[:500]}
             except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
                 answer = {"error": f"not an operation on .rviz files: {error}"[:500]}
+            except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
+                self._faults.report(error)
+                answer = {"error": f"the dashboard failed on this operation: {type(error).__name__}"}
             self._send(answer)
 
     def _operate(self, text: str) -> dict[str, object]:

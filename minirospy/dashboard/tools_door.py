@@ -15,6 +15,7 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import installed_type
 from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.introspect.configurations import parameter_values
@@ -75,8 +76,8 @@ class ToolsDoor:
         self._watching.add(session)
         if self._reporting is None or self._reporting.done():
             self._last = None
-            self._reporting = asyncio.ensure_future(self._report())
-            self._reporting.add_done_callback(_log_error)
+            faults = Faults(_log, "the report of the nodes")
+            self._reporting = asyncio.ensure_future(keep_running(self._report, faults))
         elif self._last:
             session.report(describe(self._last))
 
@@ -115,6 +116,7 @@ class ToolsSession:
         self._door = door
         self._client = client
         self._running: set[asyncio.Task[None]] = set()
+        self._faults = Faults(_log, "a request of a page")
 
     def received_text(self, text: str) -> None:
         """Take over a request."""
@@ -153,6 +155,11 @@ class ToolsSession:
             result = await method(self, fields)
         except (MinirospyError, LookupError, ValueError, TypeError) as error:
             self._send({"id": number, "error": str(error)[:500]})
+        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
+            self._faults.report(error)
+            self._send(
+                {"id": number, "error": f"the dashboard failed on this request: {type(error).__name__}"}
+            )
         else:
             self._send({"id": number, "result": result})
 
@@ -240,8 +247,3 @@ class ToolsSession:
         "type": _type,
         "yaml": _yaml,
     }
-
-
-def _log_error(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _log.error("the nodes cannot be reported: %s", error, exc_info=error)

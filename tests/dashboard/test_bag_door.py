@@ -20,7 +20,8 @@ from websockets.typing import Subprotocol
 from minirospy.bag.timeline import Timeline
 from minirospy.bridge.access import Access
 from minirospy.dashboard import bag_door
-from minirospy.dashboard.bag_door import SUBPROTOCOL
+from minirospy.dashboard.bag_door import SUBPROTOCOL, BagSession
+from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.bag_player import OpenBag
 from minirospy.dashboard.recording import Recording
 from minirospy.errors import BagFormatError
@@ -401,3 +402,28 @@ def test_who_has_no_token_neither_records_nor_opens(client: Callable[..., Client
     assert page.next("writes") is False
     page.send("open", name="a.bag")
     assert "only who has the token may record or open bags" in json_error(page)
+
+
+def test_session_goes_on_after_a_fault(
+    client: Callable[..., Client], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults = iter([ZeroDivisionError])
+    follow = BagSession._follow
+
+    async def failing(session: BagSession, bag: OpenBag) -> None:
+        for fault in faults:
+            raise fault
+        await follow(session, bag)
+
+    def bags(_: BagFolder) -> list[object]:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(BagSession, "_follow", failing)
+    monkeypatch.setattr(BagFolder, "bags", bags)
+    make_bag(folder / "one.bag")
+    page = client()
+    page.send("list")
+    assert json_error(page) == "the dashboard failed on this operation: ZeroDivisionError"
+    page.send("open", name="one.bag")
+    page.next("bag")
+    page.next("state")

@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
+from minirospy.dashboard import board_door
 from minirospy.dashboard.board_door import SUBPROTOCOL
 from minirospy.gpio.board import Board
 
@@ -92,3 +93,15 @@ def test_read_only_client_presses_nothing(serve: Callable[..., Served]) -> None:
         assert state(socket, lambda each: "leds" in each)["writes"] is False
         socket.send('{"press": 11}')
         assert "read-only" in state(socket, lambda each: "error" in each)["error"]
+
+
+def test_board_that_cannot_be_shown_has_its_error(
+    serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: Board) -> dict[str, object]:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(board_door, "state_of", fail)
+    with opened(serve()) as socket:
+        found = state(socket, lambda each: "error" in each)
+    assert found["error"] == "the dashboard failed to show the board: ZeroDivisionError"

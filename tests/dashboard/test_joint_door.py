@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
-from minirospy.dashboard.joint_door import SUBPROTOCOL
+from minirospy.dashboard.joint_door import SUBPROTOCOL, JointDoor
 from minirospy.introspect.snapshot import fetch
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
@@ -253,3 +253,20 @@ def test_node_of_launch_files_publishes_without_a_page(master: str) -> None:
         node.terminate()
         node.communicate(timeout=60)
     assert node.returncode == 0 or sys.platform == "win32"
+
+
+def test_joints_are_followed_after_a_fault(
+    serve: Callable[..., Served], client: Callable[..., Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    faults = iter([ZeroDivisionError])
+    load = JointDoor.load
+
+    async def failing(door: JointDoor, *, is_forced: bool = False) -> None:
+        for fault in faults:
+            raise fault
+        await load(door, is_forced=is_forced)
+
+    monkeypatch.setattr(JointDoor, "load", failing)
+    assert client(served).next("joints", bool)["rows"]

@@ -16,6 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
+from minirospy.dashboard import launch_door
 from minirospy.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSession
 from minirospy.dashboard.launch_run import RunState
 from tests.dashboard.conftest import TOKEN
@@ -243,3 +244,26 @@ def test_launch_that_is_added_while_launches_are_reported() -> None:
 
     asyncio.run(work())
     assert len(json.loads(sent[0])["launches"]) == 1
+
+
+def test_session_goes_on_after_a_fault(
+    client: Callable[..., Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults = iter([ZeroDivisionError])
+    tail = LaunchSession._send_log
+
+    async def failing(session: LaunchSession) -> None:
+        for fault in faults:
+            raise fault
+        await tail(session)
+
+    def describe(*_: object) -> list[object]:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(LaunchSession, "_send_log", failing)
+    monkeypatch.setattr(launch_door, "resolved_arg_docs", describe)
+    page = client()
+    page.send("describe", **FILE, args={})
+    assert page.error() == "the dashboard failed on this operation: ZeroDivisionError"
+    page.send("list")
+    assert page.next(lambda found: "files" in found)["files"]

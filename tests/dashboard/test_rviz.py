@@ -17,6 +17,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.cli import dashboard as command
+from minirospy.dashboard import rviz_door
 from minirospy.dashboard.rviz_door import SUBPROTOCOL, RvizDoor
 from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
 from minirospy.errors import RvizFileError
@@ -189,3 +190,16 @@ def test_rviz_names_a_file_that_it_cannot_read(capsys: pytest.CaptureFixture[str
     file.write_text("a: [", encoding="utf-8")
     assert command.rviz(["-d", str(file), "--no-browser"]) == 1
     assert f"{file}:1: not YAML" in capsys.readouterr().err
+
+
+def test_operation_that_fails_is_answered(
+    opened: Callable[..., Callable[[object], Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> str:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(rviz_door, "format_rviz", fail)
+    send = opened(None)
+    failed = {"error": "the dashboard failed on this operation: ZeroDivisionError"}
+    assert send({"format": {}}) == failed
+    assert send({"format": {}}) == failed

@@ -17,9 +17,12 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
+from minirospy.dashboard import tools_door
 from minirospy.dashboard.tools_door import SUBPROTOCOL
 
 if TYPE_CHECKING:
+    from minirospy.introspect.graph import Graph
+    from minirospy.introspect.survey import Survey
     from tests.dashboard.conftest import Served
 
 
@@ -183,3 +186,28 @@ def test_definition_of_a_type_is_that_of_the_packages(serve: Callable[..., Serve
         found = tools.request(do="type", name="actionlib_tutorials/FibonacciActionGoal")["result"]
         assert "MSG: actionlib_tutorials/FibonacciGoal" in found["definition"]
         assert "no_such/Type" in tools.request(do="type", name="no_such/Type")["error"]
+
+
+def test_request_that_fails_is_answered_and_reports_go_on(
+    serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served = serve()
+    served.node("talker")
+    faults = iter([ZeroDivisionError])
+    survey = tools_door.survey
+
+    def failing(graph: Graph) -> Survey:
+        for fault in faults:
+            raise fault
+        return survey(graph)
+
+    def ping(*_: object) -> float:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(tools_door, "survey", failing)
+    monkeypatch.setattr(tools_door, "ping_node", ping)
+    with Tools(served) as tools:
+        failed = "the dashboard failed on this request: ZeroDivisionError"
+        assert tools.request(do="ping", node="/talker")["error"] == failed
+        tools.request(do="watch")
+        report(tools, lambda each: node_in(each, "/talker"))

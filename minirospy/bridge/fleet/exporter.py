@@ -33,6 +33,7 @@ from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.outbound import OutboundTopic
 from minirospy.bridge.fleet.rules import Export, GatewayRules, exported_services, exported_topics, holder
 from minirospy.bridge.fleet.sender import Intake, Sender
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ServiceException
 from minirospy.introspect.snapshot import fetch
 from minirospy.wire.header import Header
@@ -90,6 +91,7 @@ class Exporter:
         self._claims = {claim}
         self._probing = asyncio.Semaphore(_PROBES)
         self._flows = Intake.flows(_MOST_IN_FLOWS)
+        self._faults = Faults(_log, "the watch of the robot's graph")
         self._watching: asyncio.Task[None] | None = None
         self._declared: list[Later] = []
 
@@ -106,7 +108,7 @@ class Exporter:
             network.watch_tokens(f"{ROOT}/robot/{self.claim.name}/**", self._claim_changed),
             network.declare_token(claim_key(self.claim)),
         ]
-        self._watching = asyncio.ensure_future(self._watch())
+        self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
 
     async def close(self) -> None:
         """Withdraw all. Idempotent."""

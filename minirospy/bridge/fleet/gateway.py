@@ -21,6 +21,7 @@ from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, is_robot_name, p
 from minirospy.bridge.fleet.network import FleetNetwork, Later, NetworkOptions, QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
+from minirospy.bridge.tasks import Faults
 from minirospy.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class Gateway:
         self._intake: Intake | None = None
         self._declared: list[Later] = []
         self._tasks: set[asyncio.Task[None]] = set()
+        self._faults = Faults(_log, "a task of the gateway")
 
     async def start(self) -> None:
         """Connect to the fleet, and pass on until :meth:`close`.
@@ -231,6 +233,8 @@ class Gateway:
                 await work
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
                 _log.warning("%s", error)
+            except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+                self._faults.report(error)
 
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)

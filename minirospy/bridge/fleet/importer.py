@@ -17,6 +17,7 @@ from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key
 from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.header import Header
@@ -30,6 +31,8 @@ __all__ = ["ImportedRobot", "Importer"]
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
 _LOOK_SECONDS = 1.0
+_AGAIN_SECONDS = 5.0
+"""After this a robot that could not be shown is tried again."""
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
@@ -80,6 +83,7 @@ class Importer:
         self._is_reconciling = False
         self._is_full = False
         self._is_closed = False
+        self._faults = Faults(_log, "showing the fleet's robots")
         self._watching: asyncio.Task[None] | None = None
         self._declared: list[Later] = []
 
@@ -94,7 +98,7 @@ class Importer:
             self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
             for kind in ("robot", "topic", "service")
         ]
-        self._watching = asyncio.ensure_future(self._watch())
+        self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
 
     async def close(self) -> None:
         """Remove all robots. Idempotent."""
@@ -146,7 +150,10 @@ class Importer:
             if robot is None or robot.claim != shown.robot.claim:
                 del self.robots[name]
                 _log.info("robot [%s] has left", name)
-                await self._remove(shown)
+                try:
+                    await self._remove(shown)
+                except Exception as error:  # noqa: BLE001 - of one robot: the others are removed
+                    self._faults.report(error)
         for name, robot in robots.items():
             known = self.robots.get(name)
             if known is None:
@@ -159,7 +166,11 @@ class Importer:
                     name,
                 )
             known.robot = robot
-            await self._update(known)
+            try:
+                await self._update(known)
+            except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
+                self._faults.report(error)
+                self._soon(_AGAIN_SECONDS)
 
     async def _update(self, shown: ImportedRobot) -> None:
         robot = shown.robot

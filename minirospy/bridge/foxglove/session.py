@@ -333,6 +333,10 @@ class FoxgloveSession:
             response = await self._graph.call(name, md5sum, event.payload)
         except (ServiceException, BridgeError) as error:
             self._call_failed(event, str(error))
+        except Exception:
+            # Logged by the task; the client waits for the answer.
+            self._call_failed(event, "the bridge failed on this call")
+            raise
         else:
             self.client.send_binary(
                 serializing.service_response_head(event.service_id, event.call_id), response

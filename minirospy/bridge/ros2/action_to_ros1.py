@@ -16,6 +16,7 @@ from minirospy.bridge.ros2.action_messages import (
     parse_statuses,
 )
 from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
+from minirospy.bridge.tasks import Faults
 from minirospy.errors import BridgeError, DeserializationError, ROSException
 from minirospy.graph.goals import TERMINAL, GoalState
 from minirospy.idl.cdr import CDR_HEADER
@@ -84,6 +85,7 @@ class GoalsToRos1:
         self._goals: dict[str, _Goal] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._number = 0
+        self._faults = Faults(node.log, f"action {link.action}")
         self._heard = asyncio.Event()
         self._server: Ros2Handle | None = None
 
@@ -141,6 +143,9 @@ class GoalsToRos1:
         except asyncio.CancelledError:
             accepted.cancel()
             raise
+        except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
+            self._faults.report(error)
+            accepted.set_exception(BridgeError(f"the bridge failed: {type(error).__name__}"))
 
     async def _sent(self, data: bytes, feedback: Callable[[bytes], None]) -> GoalOfRos1 | None:
         body = self._codec.goal.to_ros1(data)

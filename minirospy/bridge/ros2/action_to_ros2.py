@@ -16,6 +16,7 @@ from minirospy.bridge.ros2.action_messages import (
     statuses_message,
 )
 from minirospy.bridge.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import BridgeError, DeserializationError, ROSException
 from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
 from minirospy.idl.cdr import CDR_HEADER
@@ -63,6 +64,10 @@ class _Goal:
         if state is not None:
             self.status = Status(self.status.goal, int(state), text)
 
+    def fail(self, text: str) -> None:
+        """End it with a reason. Before it was accepted it cannot be aborted."""
+        self.step(GoalEvent.REJECT if self.there is None else GoalEvent.ABORT, text)
+
 
 class GoalsToRos2:
     """The server in ROS 1. On the node's loop."""
@@ -93,7 +98,8 @@ class GoalsToRos2:
             node.subscribe_raw(f"{link.action}/goal", self._take_goal),
             node.subscribe_raw(f"{link.action}/cancel", self._take_cancel),
         ]
-        self._telling = asyncio.ensure_future(self._publish_statuses())
+        self._faults = Faults(node.log, f"action {link.action}")
+        self._telling = asyncio.ensure_future(keep_running(self._publish_statuses, self._faults))
 
     async def open(self) -> None:
         """Wait for the server in ROS 2, then until the master knows it."""
@@ -173,9 +179,10 @@ class GoalsToRos2:
         except asyncio.TimeoutError:
             goal.step(GoalEvent.REJECT, f"the server in ROS 2 has not answered within {_ACCEPT_SECONDS:g} s")
         except (BridgeError, DeserializationError) as error:
-            # Before it was accepted it cannot be aborted.
-            is_known = goal.there is not None
-            goal.step(GoalEvent.ABORT if is_known else GoalEvent.REJECT, " ".join(str(error).split()))
+            goal.fail(" ".join(str(error).split()))
+        except Exception as error:  # noqa: BLE001 - the client waits for the goal's end, whatever happened here
+            self._faults.report(error)
+            goal.fail(f"the bridge failed: {type(error).__name__}")
 
         goal.ended_at = self._loop.time()
         self._changed.set()

@@ -20,6 +20,7 @@ from minirospy.bridge.ros2.parameters import ParameterBridge
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules
 from minirospy.bridge.ros2.services import ServiceBridge
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import TypeTexts
 from minirospy.errors import (
     DefinitionError,
@@ -149,7 +150,8 @@ class Ros2Bridge:
         """Bridge until :meth:`close`. Raises MasterUnreachableError, RpcError."""
         await self._parameters.start()
         await self.look()
-        self._watching = asyncio.ensure_future(self._watch())
+        faults = Faults(self.node.log, "the watch of both graphs")
+        self._watching = asyncio.ensure_future(keep_running(self._watch, faults))
 
     async def close(self) -> None:
         """Close all links, and the side of ROS 2. Idempotent."""

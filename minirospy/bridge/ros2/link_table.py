@@ -11,7 +11,9 @@ from minirospy.bridge.ros2.action_links import ActionLink
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import Link
 from minirospy.bridge.ros2.service_links import ServiceLink
-from minirospy.errors import ROSException
+from minirospy.bridge.tasks import Faults
+from minirospy.errors import MinirospyError, ROSException
+from minirospy.escape import escaped
 
 __all__ = ["LinkTable", "OpenLink", "Pair", "pairs"]
 
@@ -55,6 +57,7 @@ class LinkTable(Generic[_L, _O]):
         self.links: dict[_L, _O] = {}
         self.refused: dict[_L, str] = {}
         self._log = log
+        self._faults = Faults(log, "closing a link")
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
@@ -69,8 +72,11 @@ class LinkTable(Generic[_L, _O]):
             try:
                 await self._open(link)
             except (TypesDiffer, ROSException, ValueError) as error:
-                self.refused[link] = str(error)
-                self._log.warning("%s is not bridged (%s): %s", link.title, link.direction.value, error)
+                self._refuse(link, str(error))
+            except MinirospyError:
+                raise  # of the master: it is tried again
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
+                self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)
 
     async def close(self) -> None:
@@ -94,6 +100,13 @@ class LinkTable(Generic[_L, _O]):
             link.ros2_type,
         )
 
+    def _refuse(self, link: _L, reason: str) -> None:
+        self.refused[link] = reason
+        self._log.warning("%s is not bridged (%s): %s", link.title, link.direction.value, escaped(reason))
+
     async def _close(self, link: _L) -> None:
-        await self.links.pop(link).close()
+        try:
+            await self.links.pop(link).close()
+        except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are closed
+            self._faults.report(error)
         self._log.info("no longer bridging %s (%s)", link.title, link.direction.value)

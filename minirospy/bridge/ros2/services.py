@@ -15,6 +15,7 @@ from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction, is_bridge
 from minirospy.bridge.ros2.rules import Rules
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
+from minirospy.bridge.tasks import Faults
 from minirospy.errors import (
     BridgeError,
     DefinitionError,
@@ -320,6 +321,7 @@ class _Probes:
         self._headers: dict[tuple[str, str], Header] = {}
         self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
         self._again: dict[tuple[str, str], float] = {}
+        self._faults = Faults(node.log, "the query for a service's type")
 
     async def types(self, services: Mapping[str, str]) -> dict[str, str]:
         """Return the types of services, which are given with their nodes; those that do not answer are left out."""
@@ -355,6 +357,8 @@ class _Probes:
                 return
         except ServiceException:
             pass
+        except Exception as error:  # noqa: BLE001 - of one server: it is tried again, as those that do not answer
+            self._faults.report(error)
         finally:
             del self._tasks[key]
         self._again[key] = asyncio.get_running_loop().time() + _PROBE_AGAIN_SECONDS

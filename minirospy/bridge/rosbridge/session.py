@@ -20,6 +20,7 @@ from minirospy.bridge.rosbridge.services import ClientService, call
 from minirospy.bridge.rosbridge.subscription import Fragments
 from minirospy.bridge.rosbridge.topic import ClientTopic
 from minirospy.bridge.rosbridge.types import message_class
+from minirospy.bridge.tasks import Faults
 from minirospy.errors import (
     BridgeError,
     MessageException,
@@ -89,6 +90,7 @@ class RosbridgeSession:
         self._subscribed: dict[str, ClientTopic] = {}
         self._published: dict[str, _Published] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._faults = Faults(_log, "a client's call of a service")
         self._calls = 0
         self._inbox: deque[str | bytes] = deque()
         self._inbox_size = 0
@@ -385,6 +387,9 @@ class RosbridgeSession:
         except _REFUSALS as error:
             values, result = str(error), False
             self._door.log.warning("[Client %s] call_service %s: %s", self.client.name, event.service, error)
+        except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
+            values, result = "the bridge failed on this call", False
+            self._faults.report(error)
         fields = protocol.service_response(event.service, values, event.id, result=result)
         self.send(fields, event.compression, event.fragment_size)
 

@@ -18,6 +18,7 @@ from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionServer, ServerGoal
 from minirospy.aio.node import Node
+from minirospy.bridge.tasks import Faults
 from minirospy.bridge.tf_republisher.pairs import FramePair, pairs_of
 from minirospy.errors import ServiceException, TransformException
 from minirospy.frames.aio import Buffer
@@ -42,6 +43,7 @@ class Republisher:
         self._ids = itertools.count()
         self._closing: list[Any] = []
         self._requests: set[asyncio.Task[None]] = set()
+        self._faults = Faults(node.log, "republishing transforms")
 
     async def start(self) -> None:
         """Listen to transforms, and serve."""
@@ -82,6 +84,7 @@ class Republisher:
         task = asyncio.ensure_future(self._serve(request, topic))
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
+        task.add_done_callback(self._faults.of_task)
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
 

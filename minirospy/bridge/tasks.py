@@ -1,0 +1,56 @@
+"""Tasks that run for long: an error that nobody foresaw is reported in one line, and the work goes on.
+
+asyncio reports what a task raised only when the task is collected, which is never for one that its owner keeps.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import traceback
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+__all__ = ["Faults", "keep_running"]
+
+PAUSE_SECONDS = 1.0
+_MOST_CHARACTERS = 500
+
+
+class Faults:
+    """Reports the unforeseen errors of a piece of work: one line every ten seconds, with a count of the others."""
+
+    def __init__(self, log: logging.Logger, work: str) -> None:
+        """``work``: how the line names it, such as "the watch of the graph"."""
+        self._log = log
+        self._lines = RateLimitedLogger(log)
+        self._work = work
+
+    def report(self, error: BaseException) -> None:
+        """Log what was raised and where; the traceback is logged for who debugs."""
+        last = traceback.extract_tb(error.__traceback__)[-1:]
+        where = "".join(f" at {Path(frame.filename).name}:{frame.lineno}" for frame in last)
+        text = " ".join(traceback.format_exception_only(type(error), error)[-1].split())
+        self._lines.error("%s failed%s: %s", self._work, where, text[:_MOST_CHARACTERS])
+        self._log.debug("%s failed", self._work, exc_info=error)
+
+    def of_task(self, task: asyncio.Future[None]) -> None:
+        """Report what a task has raised: a callback for ``add_done_callback``."""
+        if not task.cancelled() and (error := task.exception()):
+            self.report(error)
+
+
+async def keep_running(
+    work: Callable[[], Awaitable[object]], faults: Faults, *, pause: float = PAUSE_SECONDS
+) -> None:
+    """Run ``work`` until it returns or is cancelled; where it raises, report that and start it again after ``pause`` seconds."""
+    while True:
+        try:
+            await work()
+        except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+            faults.report(error)
+        else:
+            return
+        await asyncio.sleep(pause)
