@@ -23,6 +23,7 @@ from minirospy.bridge.fleet.keys import (
     parse_definition,
     want_key,
 )
+from minirospy.bridge.fleet.network import _CONTROL_QUERIES, _QUERIES
 from minirospy.bridge.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.bridge.fleet.rules import GatewayRules, Lane
 from minirospy.bridge.fleet.sender import _MOST_OUTLETS, Intake, Sender
@@ -193,9 +194,9 @@ def test_a_query_is_answered_whatever_its_handler_raises() -> None:
             await asyncio.Event().wait()
             return b""
 
-        await network._answer(query, fails)
+        await network._answer(query, fails, network._calls)
         assert (replies, dropped) == ([b"the gateway failed: ZeroDivisionError"], [1])
-        network._start_answer(query, hangs)
+        network._start_answer(query, hangs, network._calls)
         await asyncio.sleep(0)
         await network.close()
         assert dropped == [1, 1]
@@ -266,3 +267,69 @@ def test_an_answer_that_is_too_long_is_named_as_such() -> None:
 
     assert zenoh.handlers.Callback
     asyncio.run(check())
+
+
+def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
+    pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
+    from minirospy.bridge.fleet.network import FleetNetwork
+
+    class Query:
+        """A query of a peer; ``answer`` is what it gets."""
+
+        key_expr, payload = "a/b", None
+
+        def __init__(self) -> None:
+            self.answer: asyncio.Future[bytes] = loop.create_future()
+
+        def reply(self, _: object, data: bytes) -> None:
+            loop.call_soon_threadsafe(self.answer.set_result, data)
+
+        def reply_err(self, data: bytes) -> None:
+            self.reply(None, data)
+
+        def drop(self) -> None:
+            pass
+
+    async def check() -> None:
+        nonlocal loop
+        loop = asyncio.get_running_loop()
+        arrived: dict[str, Any] = {}
+
+        def declare_queryable(key: str, handler: Any, **_: object) -> Any:
+            arrived[key] = handler.callback
+            return stub(undeclare=lambda: None)
+
+        network = FleetNetwork(stub(close=lambda: None, declare_queryable=declare_queryable), loop)
+
+        async def hangs(_: str, __: bytes) -> bytes:
+            await asyncio.Event().wait()
+            return b""
+
+        async def pong(_: str, __: bytes) -> bytes:
+            return b"pong"
+
+        network.answer("call", hangs)
+        network.answer("ping", pong, is_control=True)
+        network.answer("status", hangs, is_control=True)
+        while len(arrived) < 3:
+            await asyncio.sleep(0.001)
+
+        queries = [Query() for _ in range(_QUERIES + 1)]
+        for query in queries:
+            arrived["call"](query)
+        assert await queries[-1].answer == f"the gateway is answering {_QUERIES} other queries".encode()
+        ping = Query()
+        arrived["ping"](ping)
+        assert await ping.answer == b"pong"
+
+        # Nor do pings and reports take the place of calls.
+        queries = [Query() for _ in range(_CONTROL_QUERIES + 1)]
+        for query in queries:
+            arrived["status"](query)
+        assert (
+            await queries[-1].answer == f"the gateway is answering {_CONTROL_QUERIES} other queries".encode()
+        )
+        await network.close()
+
+    loop: asyncio.AbstractEventLoop
+    asyncio.run(asyncio.wait_for(check(), 60))

@@ -84,9 +84,9 @@ class Gateway:
         sender = self._sender = Sender(network, options.clock)
         intake = self._intake = Intake()
         self._declared = [
-            network.answer(f"{ROOT}/ping/{self.id}", self._pong),
-            network.answer(f"{ROOT}/status/{self.id}", self._status),
-            network.answer(f"{ROOT}/definition/{self.id}/*/*", self._definition),
+            network.answer(f"{ROOT}/ping/{self.id}", self._pong, is_control=True),
+            network.answer(f"{ROOT}/status/{self.id}", self._status, is_control=True),
+            network.answer(f"{ROOT}/definition/{self.id}/*/*", self._definition, is_control=True),
         ]
         if options.imports:
             self.importer = Importer(

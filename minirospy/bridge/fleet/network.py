@@ -17,7 +17,7 @@ import logging
 import os
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -54,7 +54,9 @@ pool, 1 to 7 s with 32. Why is inferred, not known: a thread that closes a dead 
 _CONNECT_MS = 3000
 _RETRY_SECONDS = 1.0
 _QUERIES = 200
-"""Queries that are answered at the same time; more are refused."""
+"""Calls of services and parameters that are answered at the same time; more are refused."""
+_CONTROL_QUERIES = 50
+"""The same of pings, reports and definitions, which calls that wait must not hold up."""
 
 
 # --- what is used of zenoh, which has no types where it is not installed
@@ -207,6 +209,8 @@ class FleetNetwork:
         # One thread: what is declared first is known first on the other side.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
+        self._calls = _Share(_QUERIES)
+        self._control = _Share(_CONTROL_QUERIES)
         self._is_closed = False
 
     @classmethod
@@ -322,11 +326,17 @@ class FleetNetwork:
 
     # --- queries
 
-    def answer(self, pattern: str, handler: Callable[[str, bytes], Awaitable[bytes]]) -> Later:
-        """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason."""
+    def answer(
+        self, pattern: str, handler: Callable[[str, bytes], Awaitable[bytes]], *, is_control: bool = False
+    ) -> Later:
+        """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
+
+        ``is_control``: of the fleet itself: its handler waits for no node of a user.
+        """
+        share = self._control if is_control else self._calls
 
         def arrived(query: _Query) -> None:
-            self._soon(self._start_answer, query, handler)
+            self._soon(self._start_answer, query, handler, share)
 
         return self._declare(
             lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True)
@@ -398,17 +408,22 @@ class FleetNetwork:
         """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
-    def _start_answer(self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]]) -> None:
-        task = asyncio.ensure_future(self._answer(query, handler))
-        self._answering.add(task)
-        task.add_done_callback(self._answering.discard)
+    def _start_answer(
+        self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+    ) -> None:
+        task = asyncio.ensure_future(self._answer(query, handler, share))
+        for tasks in (self._answering, share.tasks):
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
 
-    async def _answer(self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]]) -> None:
+    async def _answer(
+        self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+    ) -> None:
         key, payload = str(query.key_expr), query.payload
         reply: Callable[[], object] | None = None
         try:
-            if len(self._answering) > _QUERIES:
-                raise QueryFailed(f"the gateway is answering {_QUERIES} other queries")
+            if len(share.tasks) > share.limit:
+                raise QueryFailed(f"the gateway is answering {share.limit} other queries")
             if payload is not None and len(payload) > MOST_TEXT:
                 raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
             body = await handler(key, payload.to_bytes() if payload is not None else b"")
@@ -432,6 +447,14 @@ class FleetNetwork:
         """Call a function on the loop, from any thread."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(function, *arguments)
+
+
+@dataclass(eq=False)
+class _Share:
+    """Queries of one kind that are being answered."""
+
+    limit: int
+    tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Later:
