@@ -13,6 +13,7 @@ import yaml
 from minirospy.bridge.fleet import inquiry
 from minirospy.bridge.fleet.exporter import _MOST_READERS, _MOST_WANTED, Exporter
 from minirospy.bridge.fleet.imported_topic import ImportedTopic
+from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inbound import InboundTopic
 from minirospy.bridge.fleet.keys import (
     Claim,
@@ -21,6 +22,7 @@ from minirospy.bridge.fleet.keys import (
     Want,
     definition_key,
     parse_definition,
+    topic_key,
     want_key,
 )
 from minirospy.bridge.fleet.network import _CONTROL_QUERIES, _QUERIES
@@ -333,3 +335,17 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
 
     loop: asyncio.AbstractEventLoop
     asyncio.run(asyncio.wait_for(check(), 60))
+
+
+def test_names_that_are_left_out_are_reported_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("minirospy.bridge.fleet.contents.MOST_TOKENS", 0)
+    made = Importer(
+        stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), lambda _: None, lambda: 0
+    )
+    for number in range(100):
+        made._changed(topic_key(TOKEN._replace(topic=f"/t{number}")), True)
+    assert [record.getMessage() for record in caplog.records] == [
+        "what a gateway announces is not shown: the fleet announces more than 0 topics and services"
+    ]

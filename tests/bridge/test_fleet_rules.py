@@ -227,6 +227,28 @@ def test_a_gateway_has_a_limit_of_names() -> None:
     assert fleet.refused == 10
 
 
+def test_all_gateways_together_have_a_limit_of_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.fleet.contents.MOST_TOKENS", 10)
+    fleet = FleetContents(lambda _: True)
+    tokens = [SCAN._replace(robot=f"robot{number}") for number in range(13)]
+    for token in tokens:
+        fleet.add(keys.topic_key(token))
+    fleet.add(keys.service_key(ServiceToken("robot1", GATEWAY, "/add", SCAN.type, SCAN.md5sum)))
+    assert fleet.refused == 4
+    assert "more than 10 topics and services" in fleet.refusal
+    assert len(fleet._gateways) == 10
+
+    # One that leaves makes room, and a flag that changes needs none.
+    assert fleet.add(keys.topic_key(tokens[0]._replace(is_subscribed=True)))
+    assert fleet.remove(keys.topic_key(tokens[1]))
+    assert fleet.add(keys.topic_key(tokens[12]))
+    assert not fleet.add(keys.topic_key(tokens[11]))
+    assert not fleet.remove(keys.topic_key(tokens[11]))
+    for token in tokens[2:]:
+        fleet.remove(keys.topic_key(token))
+    assert fleet._count == 1
+
+
 # --- queues
 
 

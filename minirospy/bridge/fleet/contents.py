@@ -22,11 +22,13 @@ from minirospy.bridge.fleet.rules import holder
 
 _Token = TypeVar("_Token", TopicToken, ServiceToken)
 
-__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "FleetContents", "Robot"]
+__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "MOST_TOKENS", "FleetContents", "Robot"]
 
 MOST_GATEWAYS = 5_000
 MOST_NAMES = 2_000
 """Topics, and as many services, that one gateway may announce."""
+MOST_TOKENS = 200_000
+"""Topics and services of all gateways together: some 100 MiB."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,10 @@ class _Gateway:
     topics: dict[str, TopicToken] = field(default_factory=dict)
     services: dict[str, ServiceToken] = field(default_factory=dict)
 
+    @property
+    def is_empty(self) -> bool:
+        return not (self.claim or self.topics or self.services)
+
 
 class FleetContents:
     """The tokens that are there."""
@@ -53,6 +59,9 @@ class FleetContents:
         """``allows(robot)``: which robots are of interest."""
         self.refused = 0
         """How many tokens were left out."""
+        self.refusal = ""
+        """Why the last of these was."""
+        self._count = 0
         self._allows = allows
         self._gateways: dict[tuple[str, str], _Gateway] = {}
 
@@ -60,23 +69,25 @@ class FleetContents:
         """Add a token; return whether it changes anything."""
         token = parse_claim(key) or parse_topic(key) or parse_service(key)
         if token is None:
-            self.refused += 1
-            return False
+            return self._refuse("a key is not that of a robot, a topic or a service")
         name = token.name if isinstance(token, Claim) else token.robot
         if not self._allows(name):
             return False
-        gateway = self._gateways.get((name, token.gateway))
-        if gateway is None:
-            if len(self._gateways) >= MOST_GATEWAYS:
-                self.refused += 1
-                return False
-            gateway = self._gateways[name, token.gateway] = _Gateway()
+        at = (name, token.gateway)
+        if at not in self._gateways and len(self._gateways) >= MOST_GATEWAYS:
+            return self._refuse(f"the fleet has more than {MOST_GATEWAYS} gateways")
+
+        gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
-            gateway.claim = token
-            return True
-        if isinstance(token, TopicToken):
-            return self._put(gateway.topics, token.topic, token)
-        return self._put(gateway.services, token.service, token)
+            gateway.claim, changed = token, True
+        elif isinstance(token, TopicToken):
+            changed = self._put(gateway.topics, token.topic, token)
+        else:
+            changed = self._put(gateway.services, token.service, token)
+        # Not one whose only name was left out: nothing would remove it.
+        if not gateway.is_empty:
+            self._gateways[at] = gateway
+        return changed
 
     def remove(self, key: str) -> bool:
         """Remove a token; return whether it changes anything."""
@@ -95,11 +106,13 @@ class FleetContents:
             if gateway.topics.get(token.topic) != token:
                 return False
             del gateway.topics[token.topic]
+            self._count -= 1
         else:
             if gateway.services.get(token.service) != token:
                 return False
             del gateway.services[token.service]
-        if not (gateway.claim or gateway.topics or gateway.services):
+            self._count -= 1
+        if gateway.is_empty:
             del self._gateways[at]
         return True
 
@@ -119,9 +132,19 @@ class FleetContents:
         return found
 
     def _put(self, table: dict[str, _Token], name: str, token: _Token) -> bool:
-        if name not in table and len(table) >= MOST_NAMES:
-            self.refused += 1
-            return False
+        if name not in table:
+            if len(table) >= MOST_NAMES:
+                return self._refuse(
+                    f"robot [{token.robot}] announces more than {MOST_NAMES} topics or services"
+                )
+            if self._count >= MOST_TOKENS:
+                return self._refuse(f"the fleet announces more than {MOST_TOKENS} topics and services")
+            self._count += 1
         changed = table.get(name) != token
         table[name] = token
         return changed
+
+    def _refuse(self, reason: str) -> bool:
+        self.refused += 1
+        self.refusal = reason
+        return False

@@ -20,6 +20,7 @@ from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
@@ -82,6 +83,7 @@ class Importer:
         self._reconciling: asyncio.TimerHandle | None = None
         self._is_reconciling = False
         self._is_full = False
+        self._left_out = RateLimitedLogger(_log)
         self._is_closed = False
         self._faults = Faults(_log, "showing the fleet's robots")
         self._watching: asyncio.Task[None] | None = None
@@ -116,7 +118,10 @@ class Importer:
         await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
 
     def _changed(self, key: str, is_there: bool) -> None:
+        refused = self.contents.refused
         changed = self.contents.add(key) if is_there else self.contents.remove(key)
+        if self.contents.refused != refused:
+            self._left_out.warning("what a gateway announces is not shown: %s", self.contents.refusal)
         if changed:
             self._soon(_SETTLE_SECONDS)
 
