@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceInfo", "ServiceTypes", "TypeTexts", "installed_type", "type_of_text"]
 
+_MOST_NAMES = 2_000
+"""Types that are remembered, also those that are not installed: a peer may name any number."""
 _AGAIN_SECONDS = 10.0
 """After this a service that did not answer is tried again."""
 
@@ -63,10 +65,16 @@ class TypeTexts:
 
     async def installed(self, name: str) -> InterfaceType | None:
         """Return an installed type, None where there is none of the name."""
-        if name not in self._installed:
-            loop = asyncio.get_running_loop()
-            self._installed[name] = await loop.run_in_executor(None, installed_type, name)
-        return self._installed[name]
+        if name in self._installed:
+            return self._installed[name]
+
+        loop = asyncio.get_running_loop()
+        found = await loop.run_in_executor(None, installed_type, name)
+        while len(self._installed) >= _MOST_NAMES:
+            # The oldest: dictionaries keep their order.
+            del self._installed[next(iter(self._installed))]
+        self._installed[name] = found
+        return found
 
     async def _from_publishers(self, topic: str, publishers: tuple[str, ...]) -> InterfaceType | None:
         for publisher in publishers:

@@ -10,14 +10,14 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.bridge.access import NameFilter
-from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
+from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.link_table import Pair
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
@@ -564,6 +564,56 @@ def test_a_type_that_only_its_publisher_knows_is_bridged() -> None:
         publisher.publish_raw(struct.pack("b", -3))
         await side.publishers["/t"].arrived.wait()
         assert side.publishers["/t"].sent[0][4:] == b"\xfd"
+
+    bridged(scene)
+
+
+def test_static_transforms_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.ros2.statics.MOST_FRAMES", 3)
+    statics = StaticTransforms()
+    assert statics.merged(transforms("a", "b")) == transforms("a", "b")
+    assert statics.merged(transforms("c", "d", "a")) == transforms("a", "b", "c")
+    assert statics.left_out == 1
+    assert statics.merged(transforms("b")) == transforms("a", "b", "c")
+    assert statics.left_out == 1
+
+    monkeypatch.setattr("minirospy.bridge.ros2.statics.MOST_BYTES", 1000)
+    statics = StaticTransforms()
+    long = "x" * 800
+    assert statics.merged(transforms(long)) == transforms(long)
+    assert statics.merged(transforms("a" * 200)) == transforms(long)
+    assert statics.merged(transforms("a")) == transforms(long, "a")
+    assert statics.left_out == 1
+
+
+@pytest.mark.usefixtures("master")
+def test_static_transforms_over_the_limit_are_reported(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("minirospy.bridge.ros2.statics.MOST_FRAMES", 1)
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        link = Link("/tf_static", Direction.TO_ROS2, "tf2_msgs/TFMessage", "tf2_msgs/TFMessage", True)
+        passing = _Passing(bridge, link, cast("Any", None))
+        for _ in range(3):
+            assert passing._with_statics(transforms("a", "b")) == transforms("a")
+
+    bridged(scene)
+    lines = [each.getMessage() for each in caplog.records]
+    assert len([each for each in lines if "new frames are not passed on" in each]) == 1
+
+
+@pytest.mark.usefixtures("master")
+def test_types_that_peers_make_up_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.types._MOST_NAMES", 10)
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        texts = bridge._texts
+        for number in range(25):
+            assert await texts.installed(f"made_up_msgs/Type{number}") is None
+            assert len(texts._installed) <= 10
+        assert await texts.installed("std_msgs/Int8")
+        assert "std_msgs/Int8" in texts._installed
 
     bridged(scene)
 

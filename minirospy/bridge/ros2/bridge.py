@@ -19,7 +19,7 @@ from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, is_bridge, l
 from minirospy.bridge.ros2.parameters import ParameterBridge
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules
 from minirospy.bridge.ros2.services import ServiceBridge
-from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
+from minirospy.bridge.ros2.statics import MOST_BYTES, MOST_FRAMES, TF_TYPES, StaticTransforms
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import TypeTexts
 from minirospy.errors import (
@@ -274,6 +274,22 @@ class _Passing:
         is_static = link.is_latched and link.ros1_type in TF_TYPES
         self._statics = StaticTransforms() if is_static else None
 
+    def _with_statics(self, message: Frame) -> Frame:
+        """Return a message with the static transforms that are known, where it has such."""
+        if self._statics is None:
+            return message
+        left_out = self._statics.left_out
+        merged = self._statics.merged(message)
+        if self._statics.left_out != left_out:
+            self._misfits.warning(
+                "%s (%s): more than %d frames or %d bytes of static transforms: new frames are not passed on",
+                self.link.topic,
+                self.link.direction.value,
+                MOST_FRAMES,
+                MOST_BYTES,
+            )
+        return merged
+
     def _report(self, error: Exception) -> None:
         self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
 
@@ -307,8 +323,7 @@ class _ToRos2(_Passing):
         if header.get("callerid") == bridge.node.name or header.get(_ORIGIN) == bridge.side.domain:
             return
         try:
-            if self._statics:
-                frame = self._statics.merged(frame)
+            frame = self._with_statics(frame)
             self._publisher.publish(self._made.to_cdr(frame, bridge.header))
         except DeserializationError as error:
             self._report(error)
@@ -352,10 +367,7 @@ class _ToRos1(_Passing):
         if data[2:4] == self._bridge.header[2:4]:
             return  # sent by the bridge: the same graph of ROS 1 has it
         try:
-            body = self._made.to_ros1(data)
-            if self._statics:
-                body = self._statics.merged(body)
-            self._publisher.publish_raw(body)
+            self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:
             self._report(error)
         except ROSException:

@@ -10,7 +10,7 @@ import struct
 
 from minirospy.errors import DeserializationError
 
-__all__ = ["TF_TYPES", "StaticTransforms"]
+__all__ = ["MOST_BYTES", "MOST_FRAMES", "TF_TYPES", "StaticTransforms"]
 
 TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
@@ -18,13 +18,18 @@ _LENGTH = struct.Struct("<I")
 _STAMP = 12
 _NUMBERS = 56
 """Bytes of a header's number and time, and of a translation and rotation."""
+MOST_FRAMES = 10_000
+MOST_BYTES = 8 << 20
 
 
 class StaticTransforms:
-    """Keeps the newest transform to each frame, as bytes."""
+    """Keeps the newest transform to each frame, as bytes: at most :data:`MOST_FRAMES`, of :data:`MOST_BYTES` together."""
 
     def __init__(self) -> None:
+        self.left_out = 0
+        """How many transforms to new frames were over the limit."""
         self._by_child: dict[bytes, bytes] = {}
+        self._bytes = 0
 
     def merged(self, data: bytes | memoryview) -> bytes:
         """Return a message of ROS 1 with all transforms so far, those of this one included.
@@ -42,10 +47,19 @@ class StaticTransforms:
                 end += _NUMBERS
                 if end > len(data):
                     raise DeserializationError("the message ends too early")
-                self._by_child[child] = data[start:end]
+                self._keep(child, data[start:end])
         except struct.error as error:
             raise DeserializationError("the message ends too early") from error
         return _LENGTH.pack(len(self._by_child)) + b"".join(self._by_child.values())
+
+    def _keep(self, child: bytes, transform: bytes) -> None:
+        before = self._by_child.get(child)
+        size = self._bytes + len(transform) - (len(before) if before else 0)
+        if size > MOST_BYTES or (before is None and len(self._by_child) >= MOST_FRAMES):
+            self.left_out += 1
+            return
+        self._by_child[child] = transform
+        self._bytes = size
 
 
 def _text(data: bytes, start: int) -> tuple[bytes, int]:
