@@ -36,7 +36,7 @@ from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, Go
 from minirospy.bridge.ros2.rclpy_actions import ActionClient as Ros2ActionClient
 from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.side import RclpySide
-from minirospy.errors import DeserializationError
+from minirospy.errors import BridgeError, DeserializationError
 from minirospy.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from tests.bridge.ros2_definitions import catalogue
@@ -341,3 +341,53 @@ def test_only_packages_of_interfaces_are_imported(tmp_path: Path, monkeypatch: p
     assert imported == {"fly_msgs"}
     for name in ("fly_msgs.msg", "fly_msgs"):
         sys.modules.pop(name)
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros1_at_a_time_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.ros2.action_to_ros2.MOST_GOALS", 2)
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        side.offered = SEND_GOAL
+        await bridge.look()
+        async with ActionClient(node, "/fly", FibonacciAction) as client:
+            await client.wait_for_server()
+            kept = [client.send(FibonacciGoal(order=number)) for number in (1, 2)]
+            handles = [(await sent(side, number))[2] for number in (0, 1)]
+
+            late = client.send(FibonacciGoal(order=3))
+            assert await end_of(late) == (GoalState.REJECTED, [])
+            assert late.text == "the bridge passes on 2 goals of action /fly already"
+            assert len(side.action_clients["/fly"].goals) == 2
+
+            for number, handle in enumerate(handles):
+                handle.ended.set_result((SUCCEEDED, cdr(number)))
+            assert [list((await goal).sequence) for goal in kept] == [[0], [1]]
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros2_at_a_time_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.ros2.action_to_ros1.MOST_GOALS", 1)
+
+    async def execute(_: Any) -> dict[str, list[int]]:
+        await asyncio.sleep(LIMIT)
+        return {"sequence": []}
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        server = await ActionServer(node, "/fly", FibonacciAction, execute, concurrent=True)
+        await bridge.look()
+        accept = side.action_servers["/fly"].accept
+        goal = b"\0\1\0\0\1\0\0\0"
+        first = await asyncio.wrap_future(accept(goal, lambda _: None))
+        assert first
+        with pytest.raises(BridgeError, match="passes on 1 goals already"):
+            await asyncio.wrap_future(accept(goal, lambda _: None))
+        first.cancel()
+        await asyncio.wrap_future(first.ended)
+        again = accept(goal, lambda _: None)
+        assert await asyncio.wrap_future(again)
+        await server.close()
+
+    bridged(scene)

@@ -32,10 +32,12 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.interface import Ros2Handle, Ros2Side
     from minirospy.idl.protocols import Message
 
-__all__ = ["GoalsToRos1"]
+__all__ = ["MOST_GOALS", "GoalsToRos1"]
 
 _SERVER_SECONDS = 5.0
 """How long a server of ROS 1 may take to be connected, and to name a goal in its list of statuses."""
+MOST_GOALS = 1_000
+"""Goals that are passed on at a time: more are refused."""
 _PENDING_SECONDS = 0.5
 """After this a goal that is still pending counts as accepted: ROS 2 has no such state."""
 _ENDS = {
@@ -127,6 +129,10 @@ class GoalsToRos1:
     def _start(
         self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
     ) -> None:
+        # Those that are being accepted, and those that run.
+        if len(self._tasks) + len(self._goals) >= MOST_GOALS:
+            accepted.set_exception(BridgeError(f"the bridge passes on {MOST_GOALS} goals already"))
+            return
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

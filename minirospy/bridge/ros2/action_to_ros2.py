@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.interface import Ros2Side
     from minirospy.idl.protocols import Message
 
-__all__ = ["GoalsToRos2"]
+__all__ = ["MOST_GOALS", "GoalsToRos2"]
 
 _T = TypeVar("_T")
 _STATUS_SECONDS = 0.2
@@ -46,6 +46,8 @@ _ACK_SECONDS = 1e-3
 _QUEUE = 50
 _MOST_SENT = 4
 """Goals that wait for their acceptance at a time: a server's queue has 10 places, and those beyond would be lost."""
+MOST_GOALS = 1_000
+"""Goals that are kept at a time, also those that ended a moment ago: more are refused."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
 
@@ -136,10 +138,20 @@ class GoalsToRos2:
             id = GoalId(f"{self._node.name}-{self._number}-{secs}.{nsecs}", id.secs, id.nsecs)
         if id.id in self._goals or self._ended.is_set():
             return
+        if len(self._goals) >= MOST_GOALS:
+            self._refuse(id)
+            return
         goal = self._goals[id.id] = _Goal(id)
         task = asyncio.ensure_future(self._run(goal, request))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+    def _refuse(self, id: GoalId) -> None:
+        text = f"the bridge passes on {MOST_GOALS} goals of action {self._link.action} already"
+        self._misfits.error("a goal is refused: %s", text)
+        status = Status(id, int(GoalState.REJECTED), text)
+        with contextlib.suppress(ROSException):
+            self._result.publish_raw(status_and_body(*self._now(), status, self._codec.empty_result))
 
     def _take_cancel(self, frame: Frame, _: Header) -> None:
         try:

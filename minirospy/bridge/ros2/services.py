@@ -43,6 +43,8 @@ _PROBE_SECONDS = 1.0
 _PROBE_AGAIN_SECONDS = 10.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
+_MOST_CALLS = 1_000
+"""Calls of a service that are passed to ROS 1 at a time: more are answered with the reason."""
 _MOST_UNDER_WAY = 8
 """Requests that a server of ROS 2 gets at a time: its queue has 10 places, and those beyond would be lost."""
 
@@ -282,6 +284,9 @@ class _InRos2:
         return answered
 
     def _start(self, request: bytes, answered: Future[bytes]) -> None:
+        if len(self._calls) >= _MOST_CALLS:
+            answered.set_exception(BridgeError(f"the bridge passes on {_MOST_CALLS} calls already"))
+            return
         task = asyncio.ensure_future(_pass_on(self._answer(request), answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
