@@ -125,8 +125,10 @@ class BoardSession:
             self._faults.report(error)
             self._send_error(f"the dashboard failed to show the board: {type(error).__name__}")
         finally:
-            await loop.run_in_executor(self._thread, _leave, opening, self._pressed)
+            # In any case: a page that is closed meanwhile would cancel what waits for the thread.
+            leaving = loop.run_in_executor(self._thread, _leave, opening, self._pressed)
             self._thread.shutdown(wait=False)
+            await asyncio.shield(leaving)
 
     async def _mirror(self, board: Board) -> None:
         """Carry out what the client sends, and send what has changed, until cancelled."""

@@ -103,5 +103,6 @@ def test_board_that_cannot_be_shown_has_its_error(
 
     monkeypatch.setattr(board_door, "state_of", fail)
     with opened(serve()) as socket:
+        # Closed as soon as it comes: the board is left nevertheless, which a fixture checks.
         found = state(socket, lambda each: "error" in each)
     assert found["error"] == "the dashboard failed to show the board: ZeroDivisionError"
