@@ -58,7 +58,12 @@ class Catalogue:
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        self._definitions = {package: tuple(files) for package, files in (definitions or {}).items()}
+        # By package and kind: a package may have hundreds, and each is looked up by its name.
+        self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
+        for package, files in (definitions or {}).items():
+            kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
+            for path in sorted(files):
+                kinds[path.suffix[1:]][path.stem] = path
         self._specs: dict[str, MessageSpec] = {}
 
     @classmethod
@@ -71,14 +76,11 @@ class Catalogue:
                     found.setdefault(folder.name, folder)
         return cls(found)
 
-    def files(self, package: str, kind: str) -> dict[str, Path]:
+    def files(self, package: str, kind: str) -> Mapping[str, Path]:
         """Return a package's definitions of a kind (msg, srv, action): name -> file."""
-        found: Iterable[Path]
         if package in self._definitions:
-            found = (path for path in self._definitions[package] if path.suffix == f".{kind}")
-        else:
-            found = (self.packages[package] / kind).glob(f"*.{kind}")
-        return {path.stem: path for path in sorted(found)}
+            return self._definitions[package][kind]
+        return {path.stem: path for path in sorted((self.packages[package] / kind).glob(f"*.{kind}"))}
 
     def message(self, full_name: str) -> MessageSpec:
         """Return the spec of ``pkg/Name``. Raise NotFoundError, DefinitionError."""
@@ -107,15 +109,18 @@ class Catalogue:
 
     def actions(self, package: str) -> list[ActionSpec]:
         """Return all actions of a package, by name."""
+        return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
+
+    def action(self, full_name: str) -> ActionSpec:
+        """Return the spec of the action ``pkg/Name``. Raise KeyError where no file defines it, DefinitionError."""
         from minirospy.idl.parse import parse_action
 
-        found = []
-        for name, path in self.files(package, "action").items():
-            action = parse_action(read_definition(path), package, name, str(path))
-            for message in action.messages:
-                self._specs.setdefault(message.full_name, message)
-            found.append(action)
-        return found
+        package, _, name = full_name.partition("/")
+        path = self.files(package, "action")[name]
+        action = parse_action(read_definition(path), package, name, str(path))
+        for message in action.messages:
+            self._specs.setdefault(message.full_name, message)
+        return action
 
     def _parse_message(self, full_name: str) -> MessageSpec:
         from minirospy.idl.parse import parse_message

@@ -365,12 +365,9 @@ class _Builder:
         if file.suffix == ".msg":
             return [self._catalogue.message(f"{plan.name}/{file.stem}")]
         if file.suffix == ".srv":
-            services = self._catalogue.services(plan.name)
-            return [
-                part for each in services if each.name == file.stem for part in (each.request, each.response)
-            ]
-        actions = self._catalogue.actions(plan.name)
-        return [message for action in actions if action.name == file.stem for message in action.messages]
+            service = self._catalogue.service(f"{plan.name}/{file.stem}")
+            return [service.request, service.response]
+        return list(self._catalogue.action(f"{plan.name}/{file.stem}").messages)
 
     def _check_fields(self, plan: Plan, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
         for field in spec.fields:

@@ -13,6 +13,8 @@ import pytest
 from minirospy.cli.catkin.make import catkin_make, catkin_make_isolated
 from minirospy.cli.catkin.tool import catkin
 from minirospy.errors import BuildError, DefinitionError, ManifestError, SourceError
+from minirospy.idl import load
+from minirospy.idl.load import read_definition
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
 from minirospy.workspace.packages import Packages, built_in_roots
 
@@ -559,6 +561,25 @@ def test_warnings(scene: Scene) -> None:
         f"{folder / 'srv' / 'Left.srv'} is not built: no add_service_files() names it",
         f"{folder / 'package.xml'}: messages of [p] contain types of [geometry_msgs]: add <depend>geometry_msgs</depend>",
     )
+
+
+def test_large_package_reads_each_definition_a_few_times(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drivers of arms have hundreds of services: the steps grow with their number, not with its square."""
+    files = {f"srv/S{number}.srv": "---\n" for number in range(30)}
+    files |= {f"action/A{number}.action": "---\n---\n" for number in range(10)}
+    scene.messages("arm", files, "std_msgs actionlib_msgs")
+    reads: dict[str, int] = {}
+
+    def counted(path: Path) -> str:
+        reads[path.name] = reads.get(path.name, 0) + 1
+        return read_definition(path)
+
+    monkeypatch.setattr(load, "read_definition", counted)
+    assert scene.build()["arm"].made == "30 services, 10 actions"
+    assert {path.partition("/")[2] for path in files} <= reads.keys()
+    assert max(reads.values()) <= 4
 
 
 def test_package_xml_that_catkin_would_refuse_is_a_warning(scene: Scene) -> None:
