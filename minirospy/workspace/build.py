@@ -25,6 +25,7 @@ from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_pyt
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
+from minirospy.workspace.unlisted import with_unlisted
 
 __all__ = [
     "PROVIDED",
@@ -129,7 +130,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
                 f"{plans[plan.name].folder}; an empty file CATKIN_IGNORE in one of the folders hides it",
             )
         plans[plan.name] = plan
-    return _ordered(plans)
+    return _ordered(with_unlisted(plans))
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:

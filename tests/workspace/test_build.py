@@ -563,6 +563,38 @@ def test_warnings(scene: Scene) -> None:
     )
 
 
+def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
+    """By its own package and by others, also where it uses another one; as in ROS, which makes no class of it."""
+    first = (
+        "find_package(catkin REQUIRED COMPONENTS rospy message_generation)\nadd_message_files(FILES A.msg)\n"
+    )
+    texts = {"A": "B[2] b # two\n", "B": "C c\nint8 D=1\n", "C": "int8 x\n", "D": "int8 D\n"}
+    folder = scene.package(
+        "p",
+        f"{first}generate_messages()",
+        "std_msgs",
+        {f"msg/{name}.msg": text for name, text in texts.items()},
+    )
+    scene.messages("q", {"msg/A.msg": "p/D[] many\n"}, "p")
+    warnings = scene.build()["p"].warnings
+    assert warnings == tuple(
+        f"{folder / 'msg' / name}.msg: no add_message_files() names it, but {user} has it: ROS would make no class of it"
+        for name, user in (
+            ("B", folder / "msg/A.msg"),
+            ("C", folder / "msg/B.msg"),
+            ("D", scene.source / "q/msg/A.msg"),
+        )
+    )
+    said = python(scene, "import p.msg, q.msg; print(p.msg.A().b[1].c.x, q.msg.A([p.msg.D(3)]).many[0].D)")
+    assert said == "0 3\n"
+
+    # It counts as a source of the others.
+    assert not scene.build()["p"].changed
+    (folder / "msg" / "C.msg").write_text("int8 y\n")
+    assert scene.build()["p"].changed
+    assert python(scene, "import p.msg; print(p.msg.A().b[1].c.y)") == "0\n"
+
+
 def test_large_package_reads_each_definition_a_few_times(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,56 @@
+"""Messages that no add_message_files() names, but another definition has as a field: plans in, plans with them out.
+
+Real catkin finds such a file when it computes the md5sum of the one that has it, and builds. It makes no class of it, so that no
+message of the other type can be made in Python; here it is made, with a warning.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+
+from minirospy.idl.load import read_definition
+from minirospy.workspace.plan import Plan
+
+__all__ = ["with_unlisted"]
+
+_FIELD = re.compile(
+    r"^[ \t]*((?:\w+/)?[A-Za-z]\w*)(?:\[\d*\])?[ \t]+\w+[ \t]*(?:#|$)", re.ASCII | re.MULTILINE
+)
+
+
+def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
+    """Return the plans; messages that are used and not listed are among their definitions. Raises DefinitionError."""
+    # Which exist: a workspace seldom has any, and then no definition is read.
+    unlisted = {
+        f"{plan.name}/{path.stem}": path
+        for plan in plans.values()
+        if plan.definitions
+        for path in sorted((plan.folder / "msg").glob("*.msg"))
+        if path not in plan.definitions
+    }
+    used: dict[str, tuple[Path, Path]] = {}
+    waiting = deque((plan.name, path) for plan in plans.values() if unlisted for path in plan.definitions)
+    while waiting:
+        package, user = waiting.popleft()
+        for name in _FIELD.findall(read_definition(user)):
+            full_name = name if "/" in name else f"{package}/{name}"
+            if full_name in unlisted and full_name not in used:
+                used[full_name] = (unlisted[full_name], user)
+                waiting.append((full_name.partition("/")[0], unlisted[full_name]))
+
+    found = dict(plans)
+    for full_name, (path, user) in sorted(used.items()):
+        plan = found[full_name.partition("/")[0]]
+        others = tuple(warning for warning in plan.warnings if not warning.startswith(f"{path} is not built"))
+        found[plan.name] = plan._replace(
+            definitions=(*plan.definitions, path),
+            not_installed=plan.not_installed | {path},
+            warnings=(
+                *others,
+                f"{path}: no add_message_files() names it, but {user} has it: ROS would make no class of it",
+            ),
+        )
+    return found
