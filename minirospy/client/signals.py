@@ -155,12 +155,13 @@ class SignalWatchdog:
         with receiving, contextlib.suppress(ConnectionError):
             while True:
                 started = time.monotonic()
-                receiving.settimeout(_TICK_SECONDS if machine.signals or deferral.pending else None)
+                is_ticking = machine.signals or deferral.pending
+                receiving.settimeout(_TICK_SECONDS if is_ticking else None)
                 with contextlib.suppress(TimeoutError):
                     if not (numbers := receiving.recv(64)):
                         return
                     self._arrived += sum(map(self._is_handled, numbers))
-                step = min(time.monotonic() - started, _MAX_STEP)
+                step = min(time.monotonic() - started, _MAX_STEP) if is_ticking else 0.0
                 now += step
 
                 machine.main_ends_by_itself |= not threading.main_thread().is_alive()

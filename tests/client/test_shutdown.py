@@ -318,6 +318,19 @@ class System:
         pass
 
 
+@pytest.mark.parametrize("writes", [True, False])
+def test_a_signal_is_dispatched_fifty_milliseconds_after_it_has_come(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog, monkeypatch: pytest.MonkeyPatch, *, writes: bool
+) -> None:
+    """However long nothing happened before: until then the main thread's next call of rospy dispatches it."""
+    system = System(watchdog, [1000.0], writes=writes, handles=True)
+    system.install(monkeypatch)
+    lifecycle.machine.main_ends_by_itself = True
+    system.watch()
+    assert system.nudged == [pytest.approx(1000.05, abs=0.011)]
+    assert lifecycle.is_shutdown()
+
+
 @pytest.mark.parametrize(
     ("writes", "handles"), [(True, True), (True, False), (False, True)], ids=["both", "descriptor", "handler"]
 )
