@@ -7,6 +7,7 @@ import signal
 import socket
 import sys
 import threading
+from collections.abc import Callable
 from typing import cast
 
 import pytest
@@ -240,6 +241,22 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     lifecycle.deferral.poll()
     assert ran == ["other"]
     assert lifecycle.left.is_set()
+
+
+def test_a_signal_while_a_hook_is_added_does_not_lose_the_hook(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    ran: list[str] = []
+
+    class Interrupted(list[Callable[[], object]]):
+        def append(self, hook: Callable[[], object]) -> None:
+            watchdog._is_nudge = True
+            watchdog._on_signal(signal.SIGINT, None)
+            super().append(hook)
+
+    lifecycle.hooks = Interrupted()
+    lifecycle.add_hook(lambda: ran.append("hook"))
+    assert ran == ["hook"]
 
 
 def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycle) -> None:
