@@ -11,7 +11,7 @@ import logging
 import sys
 from collections.abc import Callable, Mapping
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy import times
 from minirospy.client.session import current_session
@@ -105,7 +105,7 @@ def write(
     msg: object,
     args: tuple[object, ...],
     *,
-    exc_info: Any = None,
+    exc_info: object = None,
     extra: Mapping[str, object] | None = None,
     stack_info: bool = False,
     stacklevel: int = 1,
@@ -118,17 +118,16 @@ def write(
     if "self" in at.f_code.co_varnames or "self" in at.f_code.co_freevars:
         with contextlib.suppress(KeyError):
             function = f"{type(at.f_locals['self']).__name__}.{function}"
+    error = exc_info if isinstance(exc_info, tuple) else sys.exc_info() if exc_info else None
     if isinstance(exc_info, BaseException):
-        exc_info = (type(exc_info), exc_info, exc_info.__traceback__)
-    elif exc_info and not isinstance(exc_info, tuple):
-        exc_info = sys.exc_info()
+        error = (type(exc_info), exc_info, exc_info.__traceback__)
     stack = None
     if stack_info:
         import traceback
 
         stack = "Stack (most recent call last):\n" + "".join(traceback.format_stack(at)).rstrip("\n")
     place = at.f_code.co_filename, at.f_lineno
-    record = logger.makeRecord(logger.name, level, *place, msg, args, exc_info, function, extra, stack)
+    record = logger.makeRecord(logger.name, level, *place, msg, args, error, function, extra, stack)
     with current_session().lifecycle.deferral:
         logger.handle(record)
 

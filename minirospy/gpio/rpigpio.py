@@ -15,7 +15,6 @@ import time
 import warnings
 import weakref
 from collections.abc import Sequence
-from typing import Any
 
 from minirospy.errors import BoardError
 from minirospy.gpio.events import Callback, CallbackThread, Detector, Slope
@@ -391,12 +390,12 @@ class Gpio:
             else:
                 self._writable.pop(channel, None)
 
-    def _output_several(self, channel: object, value: Any) -> None:
+    def _output_several(self, channel: object, value: object) -> None:
         if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
             return
         channels = _channels(channel)
         several = isinstance(value, (list, tuple))
-        values = list(value) if several else [value] * len(channels)
+        values = list(value) if isinstance(value, (list, tuple)) else [value] * len(channels)
         if len(channels) != len(values) or (several and not isinstance(channel, (list, tuple))):
             raise RuntimeError("Number of channels != number of values")
 

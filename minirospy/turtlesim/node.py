@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from geometry_msgs.msg import Twist
 from std_srvs.srv import Empty, EmptyResponse
@@ -95,7 +95,7 @@ class Simulator:
         # One change of the set of turtles at a time; the world goes on meanwhile.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
-        self._services: list[rospy.Service[Any]] = []
+        self._services: list[rospy.Service[object]] = []
 
     def start(self) -> None:
         """Offer the services, and add the first turtle."""
@@ -210,7 +210,7 @@ class _Ends:
         self._poses = rospy.Publisher(join(space, "pose"), PoseMessage, queue_size=1)
         self._colors = rospy.Publisher(join(space, "color_sensor"), ColorMessage, queue_size=1)
         self._commands = rospy.Subscriber(join(space, "cmd_vel"), Twist, self._command, queue_size=1)
-        self._services: list[rospy.Service[Any]] = [
+        self._services: list[rospy.Service[object]] = [
             rospy.Service(join(space, "set_pen"), SetPen, self._set_pen),
             rospy.Service(join(space, "teleport_relative"), TeleportRelative, self._teleport_relative),
             rospy.Service(join(space, "teleport_absolute"), TeleportAbsolute, self._teleport_absolute),

@@ -52,14 +52,14 @@ def pack_in_steps(value: object) -> Iterator[bytes]:
     yield packer.bytes()
 
 
-def _pack_in_steps(value: Any, packer: msgpack.Packer) -> Iterator[bytes]:
+def _pack_in_steps(value: object, packer: msgpack.Packer) -> Iterator[bytes]:
     if type(value) is list:
         packer.pack_array_header(len(value))
         items: Iterable[object] = value
     elif type(value) is dict:
         packer.pack_map_header(len(value))
         items = chain.from_iterable(value.items())
-    elif type(value) in (str, bytes) and len(value) > _STEP_BYTES:
+    elif (type(value) is str or type(value) is bytes) and len(value) > _STEP_BYTES:
         yield from _pack_long(value, packer)
         return
     else:

@@ -7,8 +7,8 @@ import contextlib
 import json
 import logging
 import time
-from collections.abc import Callable, Collection, Coroutine
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Collection, Coroutine, Mapping
+from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.aio.raw import call_raw, service_header
 from minirospy.bridge.fleet.definitions import Definitions
@@ -50,6 +50,8 @@ _PROBES = 8
 _MOST_IN_FLOWS = 1_000
 _MOST_WANTED, _MOST_READERS = 10_000, 1_000
 """Topics that readers may want, and readers of each, which peers choose."""
+
+_Key = TypeVar("_Key", bound=tuple[str, object])
 
 
 class Exporter:
@@ -246,7 +248,7 @@ class Exporter:
 
         await asyncio.gather(*(probe(*key) for key in self._due(present - self._service_types.keys())))
 
-    def _due(self, keys: set[tuple[str, Any]]) -> list[tuple[str, Any]]:
+    def _due(self, keys: set[_Key]) -> list[_Key]:
         now = time.monotonic()
         self._not_before = {key: until for key, until in self._not_before.items() if until > now}
         return [key for key in keys if key not in self._not_before]
@@ -393,9 +395,9 @@ class Exporter:
             value = self._allowed(name, value)
         return json.dumps(value, default=str).encode()
 
-    def _allowed(self, name: str, tree: dict[str, Any]) -> dict[str, Any]:
+    def _allowed(self, name: str, tree: Mapping[str, object]) -> dict[str, object]:
         """Return the part of a namespace that may be read."""
-        found: dict[str, Any] = {}
+        found: dict[str, object] = {}
         for key, value in tree.items():
             full = f"{name.rstrip('/')}/{key}"
             if isinstance(value, dict):

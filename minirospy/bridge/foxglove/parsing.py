@@ -199,7 +199,7 @@ def _sized_text(view: memoryview, length: int) -> tuple[str, memoryview]:
     return bytes(view[:length]).decode(), view[length:]
 
 
-def _entries(fields: _Fields, key: str) -> list[Any]:
+def _entries(fields: _Fields, key: str) -> list[object]:
     found = fields.get(key)
     if not isinstance(found, list):
         raise BridgeProtocolError(f"'{key}' is not an array")
@@ -210,9 +210,10 @@ def _entries(fields: _Fields, key: str) -> list[Any]:
 
 def _objects(fields: _Fields, key: str) -> list[_Fields]:
     found = _entries(fields, key)
-    if not all(isinstance(entry, dict) for entry in found):
+    objects: list[_Fields] = [entry for entry in found if isinstance(entry, dict)]
+    if len(objects) < len(found):
         raise BridgeProtocolError(f"'{key}' is not an array of objects")
-    return found
+    return objects
 
 
 def _ids(fields: _Fields, key: str) -> tuple[int, ...]:
@@ -240,9 +241,10 @@ def _text(fields: _Fields, key: str, default: str | None = None) -> str:
 
 def _names(fields: _Fields) -> tuple[str, ...]:
     found = _entries(fields, "parameterNames")
-    if not all(isinstance(entry, str) for entry in found):
+    names = tuple(entry for entry in found if isinstance(entry, str))
+    if len(names) < len(found):
         raise BridgeProtocolError("'parameterNames' is not an array of strings")
-    return tuple(found)
+    return names
 
 
 def _request_id(fields: _Fields) -> str | None:

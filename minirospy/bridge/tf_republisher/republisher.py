@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from typing import Any
+from typing import Protocol
 
 from geometry_msgs.msg import TransformStamped
 from tf2_web_republisher.msg import (
@@ -32,6 +32,12 @@ _MOST_RATE = 1000.0
 _MOST_REQUESTS = 1000
 
 
+class _Closing(Protocol):
+    """A part that is closed with the republisher."""
+
+    async def close(self) -> None: ...
+
+
 class Republisher:
     """Looks transforms up for its clients. On the node's loop."""
 
@@ -41,16 +47,14 @@ class Republisher:
         self._name = name
         self._buffer = Buffer(node)
         self._ids = itertools.count()
-        self._closing: list[Any] = []
+        self._closing: list[_Closing] = []
         self._requests: set[asyncio.Task[None]] = set()
         self._faults = Faults(node.log, "republishing transforms")
 
     async def start(self) -> None:
         """Listen to transforms, and serve."""
         await self._buffer.start()
-        server: Any = ActionServer(
-            self.node, self._name, TFSubscriptionAction, self._execute, concurrent=True
-        )
+        server = ActionServer(self.node, self._name, TFSubscriptionAction, self._execute, concurrent=True)
         self._closing.append(server)
         self._closing.append(await self.node.serve("/republish_tfs", RepublishTFs, self._republish))
         await server

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.bridge.video.options import Picture
 from minirospy.errors import BridgeError
@@ -89,7 +89,7 @@ def _by_opencv(image: Pixels, encoding: str) -> Pixels:
         return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
     # OpenCV names a pattern by the pixels of its second row and column.
     name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
-    found: Any = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
+    found: Pixels = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
     return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
 
 

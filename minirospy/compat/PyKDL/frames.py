@@ -203,7 +203,7 @@ class Rotation:
     @overload
     def Inverse(self, arg: _T) -> _T: ...
 
-    def Inverse(self, arg: Any = None) -> Any:
+    def Inverse(self, arg: Vector | Twist | Wrench | None = None) -> object:
         """Return the inverse, or a vector, twist or wrench that it turns back."""
         m = self._m
         inverse = Rotation(m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
@@ -214,7 +214,7 @@ class Rotation:
     @overload
     def __mul__(self, other: _T) -> _T: ...
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: object) -> object:
         m = self._m
         if isinstance(other, Vector):
             x, y, z = other._v
@@ -322,7 +322,7 @@ class Frame:
     @overload
     def Inverse(self, arg: _T) -> _T: ...
 
-    def Inverse(self, arg: Any = None) -> Any:
+    def Inverse(self, arg: object = None) -> object:
         """Return the inverse, or a point, twist or wrench as seen from this frame."""
         back = self.M.Inverse()
         if arg is None:
@@ -340,7 +340,7 @@ class Frame:
     @overload
     def __mul__(self, other: _T) -> _T: ...
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: object) -> object:
         if isinstance(other, Vector):
             return self.M * other + self.p
         if isinstance(other, Frame):

@@ -23,9 +23,10 @@ def dot(a: Vector | Twist | Wrench, b: Vector | Twist | Wrench) -> float:
     raise TypeError("dot() takes two Vectors, or a Twist and a Wrench")
 
 
-def Equal(a: Any, b: Any, eps: float = EPSILON) -> bool:
+def Equal(a: object, b: object, eps: float = EPSILON) -> bool:
     """Return whether two objects of a type differ in no number by ``eps`` or more. Raise TypeError."""
-    if type(a) is not type(b) or not isinstance(a, Vector | Rotation | Frame | Screw):
+    kinds = Vector | Rotation | Frame | Screw
+    if type(a) is not type(b) or not isinstance(a, kinds) or not isinstance(b, kinds):
         raise TypeError("Equal() takes two objects of one type: Vector, Rotation, Frame, Twist or Wrench")
     return are_near(_numbers(a), _numbers(b), eps)
 
@@ -89,7 +90,7 @@ def refusal(name: str) -> type:
     )
 
 
-def _numbers(value: Any) -> list[float]:
+def _numbers(value: Vector | Rotation | Frame | Screw) -> list[float]:
     if isinstance(value, Vector):
         return value._v
     if isinstance(value, Rotation):

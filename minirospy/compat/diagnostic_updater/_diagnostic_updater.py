@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 Status = DiagnosticStatusWrapper
-Fill = Callable[[Status], Any]
+Fill = Callable[[Status], Status]
 
 _PERIOD_CHECK = 0.25
 """Seconds between two looks at ~diagnostic_period."""
@@ -58,8 +58,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
     def run(self, stat: Status) -> Status:
         """Call the function with the status; return what it returns."""
-        result: Status = self.fn(stat)
-        return result
+        return self.fn(stat)
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
@@ -99,8 +98,7 @@ class DiagnosticTaskVector:
         def run(self, stat: Status) -> Status:
             """Name the status, and fill it."""
             stat.name = self.name
-            result: Status = self.fn(stat)
-            return result
+            return self.fn(stat)
 
     def __init__(self) -> None:
         self.tasks: list[DiagnosticTaskVector.DiagnosticTaskInternal] = []

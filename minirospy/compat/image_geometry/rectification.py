@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Values: TypeAlias = NDArray[Any]
-    Distortion: TypeAlias = Sequence[float] | NDArray[Any]
+    Distortion: TypeAlias = Sequence[float] | Values
     """k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or nothing."""
     Calibration: TypeAlias = tuple[Values, Distortion, Values, Values]
     """K, D, R and P."""

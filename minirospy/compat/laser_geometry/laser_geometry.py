@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import genpy
+    import numpy
     from geometry_msgs.msg import TransformStamped
     from numpy.typing import NDArray
     from sensor_msgs.msg import LaserScan
@@ -164,7 +165,7 @@ def _cloud(scan: LaserScan, columns: Sequence[tuple[str, int, Values | int]], co
     return cloud
 
 
-def _dtype(cloud: PointCloud2) -> Any:
+def _dtype(cloud: PointCloud2) -> numpy.dtype[numpy.void]:
     import numpy as np
 
     return np.dtype([(field.name, "<i4" if field.datatype == _INT32 else "<f4") for field in cloud.fields])

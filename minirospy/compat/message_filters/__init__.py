@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, MutableMapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from minirospy import client as rospy
 from minirospy.client.session import current_session
 from minirospy.client.time import is_wallclock
 from minirospy.compat.message_filters.stamps import StampQueue, closest_stamps
+from minirospy.idl.protocols import Message
 from minirospy.times import Duration, Time
 
 __all__ = ["ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer"]
@@ -60,7 +61,7 @@ class Subscriber(SimpleFilter):
         super().__init__()
         self.topic = args[0] if args else kwargs["name"]
         kwargs["callback"] = self.callback
-        self.sub: rospy.Subscriber[Any] = rospy.Subscriber(*args, **kwargs)  # type: ignore[arg-type]
+        self.sub: rospy.Subscriber[Message] = rospy.Subscriber(*args, **kwargs)  # type: ignore[arg-type]
 
     def callback(self, msg: object) -> None:
         """Pass a message on."""

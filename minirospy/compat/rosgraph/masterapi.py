@@ -99,9 +99,10 @@ class Master:
         """Return the URI that the master reports."""
         return str(self._call("getUri"))
 
-    def getSystemState(self) -> Any:
+    def getSystemState(self) -> list[list[tuple[str, list[str]]]]:
         """Return [publishers, subscribers, services], each a list of [name, [nodes]]."""
-        return self._call("getSystemState")
+        tables: list[list[tuple[str, list[str]]]] = self._call("getSystemState")
+        return tables
 
     def getPublishedTopics(self, subgraph: str) -> list[list[str]]:
         """Return [[topic, type]] of the published topics."""
@@ -143,7 +144,7 @@ class Master:
         """Return the names of all parameters."""
         return self._list("getParamNames")
 
-    def subscribeParam(self, caller_api: str, key: str) -> Any:
+    def subscribeParam(self, caller_api: str, key: str) -> object:
         """Subscribe to a parameter's changes; return its value."""
         return self._call("subscribeParam", caller_api, key)
 

@@ -59,7 +59,7 @@ class ServerProxy:
     def __repr__(self) -> str:
         return f"<ServerProxy for {self._uri}>"
 
-    def _call(self, method: str, args: tuple[object, ...]) -> Any:
+    def _call(self, method: str, args: tuple[object, ...]) -> object:
         try:
             return self._client.call(method, *args)
         except RpcUnreachable as error:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import copy
 import traceback
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from minirospy import client as rospy
 from minirospy.actionlib.simple_server import SimpleActionServer
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
 from minirospy.compat.smach.user_data import Remapper, UserData
-from minirospy.idl.protocols import Message
+from minirospy.idl.protocols import Action, Message
 
 __all__ = ["ActionServerWrapper"]
 
@@ -23,7 +22,7 @@ class ActionServerWrapper:
     def __init__(
         self,
         server_name: str,
-        action_spec: Any,
+        action_spec: type[Action],
         wrapped_container: Container,
         succeeded_outcomes: Iterable[str] = (),
         aborted_outcomes: Iterable[str] = (),

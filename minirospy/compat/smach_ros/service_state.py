@@ -44,7 +44,7 @@ class ServiceState(State):
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._service_name = service_name
         self._service_spec = service_spec
-        self._proxy: rospy.ServiceProxy[Any] | None = None
+        self._proxy: rospy.ServiceProxy[Message] | None = None
         self._request = service_spec._request_class() if request is None else request
         self._request_key, self._request_slots = request_key, request_slots
         self._response_key, self._response_slots = response_key, response_slots

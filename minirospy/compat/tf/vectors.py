@@ -51,18 +51,22 @@ def unit_vector(data: ArrayLike, axis: int | None = None, *, out: NDArray[numpy.
 def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) -> None: ...
 
 
-def unit_vector(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
+def unit_vector(
+    data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None
+) -> NDArray[numpy.float64] | None:
     """Return vectors divided by their lengths; with ``out``, put them there and return None."""
     import numpy
 
     vectors = numpy.array(data, dtype=numpy.float64)
     if out is None and vectors.ndim == 1:
-        return vectors / math.sqrt(numpy.dot(vectors, vectors))
+        unit: NDArray[numpy.float64] = vectors / math.sqrt(numpy.dot(vectors, vectors))
+        return unit
     length = numpy.atleast_1d(numpy.sqrt(numpy.square(vectors).sum(axis)))
     if axis is not None:
         length = numpy.expand_dims(length, axis)
     if out is None:
-        return vectors / length
+        units: NDArray[numpy.float64] = vectors / length
+        return units
     numpy.divide(vectors, length, out)
     return None
 

@@ -5,9 +5,10 @@ Importing it registers the types with tf2_ros. Objects to transform need a ``hea
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from geometry_msgs.msg import Point, PointStamped, TransformStamped
+from std_msgs.msg import Header
 
 from minirospy.compat import PyKDL
 from minirospy.compat.tf2_geometry_msgs.tf2_geometry_msgs import transform_to_kdl
@@ -25,6 +26,14 @@ __all__ = [
 ]
 
 _G = TypeVar("_G", PyKDL.Vector, PyKDL.Frame, PyKDL.Twist, PyKDL.Wrench)
+
+
+class _StampedVector(Protocol):
+    """What tf2_ros.Stamped makes of a Vector."""
+
+    header: Header
+
+    def __getitem__(self, index: int) -> float: ...
 
 
 def do_transform_vector(vector: PyKDL.Vector, transform: TransformStamped) -> PyKDL.Vector:
@@ -47,7 +56,7 @@ def do_transform_wrench(wrench: PyKDL.Wrench, transform: TransformStamped) -> Py
     return _moved(wrench, transform)
 
 
-def to_msg_vector(vector: Any) -> PointStamped:
+def to_msg_vector(vector: _StampedVector) -> PointStamped:
     """Return a stamped Vector as a PointStamped."""
     return PointStamped(vector.header, Point(vector[0], vector[1], vector[2]))
 
@@ -58,9 +67,10 @@ def from_msg_vector(msg: PointStamped) -> PyKDL.Vector:
     return Stamped(vector, msg.header.stamp, msg.header.frame_id)
 
 
-def convert_vector(vector: Any) -> PyKDL.Vector:
+def convert_vector(vector: _StampedVector) -> PyKDL.Vector:
     """Return a copy of a stamped Vector."""
-    return Stamped(PyKDL.Vector(vector), vector.header.stamp, vector.header.frame_id)
+    copy = PyKDL.Vector(vector[0], vector[1], vector[2])
+    return Stamped(copy, vector.header.stamp, vector.header.frame_id)
 
 
 def _moved(value: _G, transform: TransformStamped) -> _G:

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/tf_conversions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 from geometry_msgs.msg import Point, Pose, Quaternion
 
@@ -15,6 +15,12 @@ from minirospy.compat.PyKDL import Frame, Rotation, Vector
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import NDArray
+
+    class _OpenCV(Protocol):
+        """The (old) module cv."""
+
+        def Rodrigues2(self, src: NDArray[numpy.floating], dst: NDArray[numpy.floating]) -> object: ...
+
 
 __all__ = ["fromCameraParams", "fromMatrix", "fromMsg", "fromTf", "toMatrix", "toMsg", "toTf"]
 
@@ -61,7 +67,7 @@ def toMatrix(f: Frame) -> NDArray[numpy.float64]:
     return numpy.array([*([f[row, column] for column in range(4)] for row in range(3)), [0.0, 0.0, 0.0, 1.0]])
 
 
-def fromCameraParams(cv: Any, rvec: Any, tvec: Any) -> Frame:
+def fromCameraParams(cv: _OpenCV, rvec: NDArray[numpy.floating], tvec: NDArray[numpy.floating]) -> Frame:
     """Return the Frame of OpenCV's rotation and translation vectors; ``cv`` is its (old) module."""
     import numpy
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from minirospy import client as rospy
 from minirospy.client.topics import Publisher, SubscribeListener
+from minirospy.idl.protocols import Message
 
 __all__ = ["LazyTransport", "MetaLazyTransport"]
 
@@ -34,7 +35,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
 
     def __init__(self) -> None:
         super().__init__()
-        self._publishers: list[Publisher[Any]] = []
+        self._publishers: list[Publisher[Message]] = []
         self._connection_status: bool | None = None
         """Whether it is subscribed; None: it has never been."""
         self._changing = threading.RLock()
@@ -59,12 +60,12 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         """Unregister the subscribers of the inputs. A derived class writes it."""
         raise NotImplementedError("Please overwrite this method")
 
-    def peer_subscribe(self, *args: Any, **kwargs: Any) -> None:
+    def peer_subscribe(self, *args: object, **kwargs: object) -> None:
         """Subscribe when one of its topics gets a subscriber."""
         rospy.logdebug(f"[{args[0]}] is subscribed")
         self._subscribe_once()
 
-    def peer_unsubscribe(self, *args: Any, **kwargs: Any) -> None:
+    def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
         """Unsubscribe when none of its topics has a subscriber left."""
         rospy.logdebug(f"[{args[0]}] is unsubscribed")
         if not rospy.get_param("~lazy", True):
@@ -75,7 +76,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
                 self.unsubscribe()
                 self._connection_status = False
 
-    def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Any]:
+    def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Message]:
         """Return a publisher, with the arguments of ``rospy.Publisher`` but ``subscriber_listener``, which is this object."""
         assert len(args) < 3 or args[2] is None, "subscriber_listener is this object"
         assert kwargs.get("subscriber_listener") is None, "subscriber_listener is this object"
@@ -84,7 +85,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         else:
             args = (*args[:2], self, *args[3:])
 
-        publisher: Publisher[Any] = Publisher(*args, **kwargs)
+        publisher: Publisher[Message] = Publisher(*args, **kwargs)
         self._publishers.append(publisher)
         return publisher
 

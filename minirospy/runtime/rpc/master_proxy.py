@@ -172,7 +172,7 @@ class MasterProxy:
         """Return the names of all parameters."""
         return list(self.call("getParamNames"))
 
-    def subscribe_param(self, caller_api: str, key: str) -> Any:
+    def subscribe_param(self, caller_api: str, key: str) -> object:
         """Subscribe to changes at or below ``key``; return its present value."""
         return self.call("subscribeParam", caller_api, key)
 

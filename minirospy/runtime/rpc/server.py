@@ -19,7 +19,6 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from itertools import islice
-from typing import Any
 
 from minirospy.runtime.rpc.connection import Connection
 from minirospy.runtime.rpc.turns import Turns
@@ -60,7 +59,7 @@ _MOST_READS, _READS_SECONDS = 256, 0.01
 """Connections in one iteration of the loop, and how long that may take; the others come first in the next one."""
 
 
-Dispatch = Callable[[str, list[Any]], object]
+Dispatch = Callable[[str, list[object]], object]
 """Method name and arguments in, value out, or an awaitable of it, or steps that return it; raises RpcFault."""
 
 

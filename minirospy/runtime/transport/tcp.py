@@ -13,7 +13,6 @@ import logging
 import socket
 import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from typing import Any
 
 from minirospy.errors import WireError
 from minirospy.runtime.transport import sockets
@@ -263,7 +262,7 @@ def _bind(host: str, port: int) -> socket.socket:
     return sock
 
 
-async def _addresses(host: str, port: int) -> Sequence[tuple[int, Any]]:
+async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | int | bytes, ...]]]:
     """(family, address) of a host; an address or "localhost" needs no resolver. Raises OSError.
 
     IPv4 comes first: there the servers of ROS 1 listen, and many resolvers name IPv6 first.
