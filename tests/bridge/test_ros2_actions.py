@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import builtins
 import sys
+import threading
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -281,21 +282,42 @@ class LateServer:
         self.cancelled += 1
 
 
-def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
-    server = LateServer()
+def rclpy_client(monkeypatch: pytest.MonkeyPatch, class_: type) -> Ros2ActionClient:
+    """Return the bridge's client over a class in place of rclpy's."""
     monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
-    monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionClient=lambda *_, **__: server))
+    monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionClient=class_))
     uuids = SimpleNamespace(UUID=lambda **_: None)
     monkeypatch.setitem(sys.modules, "unique_identifier_msgs", SimpleNamespace())
     monkeypatch.setitem(sys.modules, "unique_identifier_msgs.msg", uuids)
+
     node = SimpleNamespace(create_subscription=lambda *_, **__: None)
     executor = SimpleNamespace(create_task=lambda function, *words: function(*words))
-    options = {"callback_group": None, "qos_profile": None}
     calls: Any = SimpleNamespace(
-        node=node, executor=executor, options=options, deserialize=lambda data, _: data
+        node=node,
+        executor=executor,
+        options={"callback_group": None, "qos_profile": None},
+        deserialize=lambda data, _: data,
     )
-    class_: Any = SimpleNamespace(Impl=SimpleNamespace(FeedbackMessage=None), Goal=None)
-    client = Ros2ActionClient(calls, "/fly", class_)
+    fibonacci: Any = SimpleNamespace(Impl=SimpleNamespace(FeedbackMessage=None), Goal=None)
+    return Ros2ActionClient(calls, "/fly", fibonacci)
+
+
+def test_client_of_rclpy_that_the_executor_sees_too_early_has_a_lock(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Early:
+        _lock: threading.Lock
+
+        def __init__(self, *_: object, **__: object) -> None:
+            # As rclpy does: from here on the executor's thread calls it.
+            with self._lock:
+                pass
+            self._lock = threading.Lock()
+
+    assert rclpy_client(monkeypatch, Early)
+
+
+def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    client = rclpy_client(monkeypatch, LateServer)
+    server: Any = client._client
 
     accepted = client.send(b"", lambda _: None)
     server.answered.pop()(SimpleNamespace(result=lambda: server))

@@ -31,6 +31,12 @@ from rclpy.task import Future
 SAYING = threading.Lock()
 
 
+class LockedActionClient(ActionClient):
+    """rclpy's, which shows itself to the executor's thread before it has made its lock."""
+
+    _lock = threading.Lock()
+
+
 def profile(command):
     return QoSProfile(
         depth=command.get("depth", 100),
@@ -193,7 +199,7 @@ class Peer:
     def goal(self, topic, command):
         class_ = class_of(command["type"], "action")
         if topic not in self.action_clients:
-            self.action_clients[topic] = ActionClient(self.node, class_, topic)
+            self.action_clients[topic] = LockedActionClient(self.node, class_, topic)
         client = self.action_clients[topic]
         client.wait_for_server()
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import threading
 import uuid
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, InvalidStateError
@@ -136,8 +137,7 @@ class ActionClient:
         self._calls = calls
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
-        made = importlib.import_module("rclpy.action").ActionClient
-        self._client: _RclpyActionClient = made(
+        self._client: _RclpyActionClient = _client_class()(
             calls.node,
             class_,
             name,
@@ -209,6 +209,16 @@ class ActionClient:
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
+
+
+def _client_class() -> Callable[..., _RclpyActionClient]:
+    """Return rclpy's client of actions, with a lock from the start.
+
+    Its constructor shows it to the executor before it makes its lock: the executor's thread would fail on that.
+    """
+    return type(
+        "ActionClient", (importlib.import_module("rclpy.action").ActionClient,), {"_lock": threading.Lock()}
+    )
 
 
 # --- goals of ROS 2 in ROS 1
