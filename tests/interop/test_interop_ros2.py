@@ -9,6 +9,7 @@ import json
 import os
 import queue
 import shlex
+import socket
 import subprocess
 import sys
 import textwrap
@@ -38,6 +39,8 @@ _T = TypeVar("_T")
 HERE = Path(__file__).parent
 LIMIT = 90.0
 """Seconds after which a wait for a state fails: far more than a busy machine takes."""
+
+DOMAIN_PORTS = 28_000
 
 pytestmark = [
     pytest.mark.skipif(not STAMP.exists(), reason="ROS 2 is not installed: tests/interop/install_ros2.py"),
@@ -211,12 +214,21 @@ class Scene:
         self.run(asyncio.wait_for(wait(), LIMIT))
 
 
+def reserved_domain(parts: contextlib.ExitStack) -> str:
+    """Return a domain of ROS 2 that no other test on this machine has until ``parts`` are closed: a port reserves it."""
+    for number in range(1, 101):
+        sock = parts.enter_context(socket.socket())
+        with contextlib.suppress(OSError):
+            sock.bind(("127.0.0.1", DOMAIN_PORTS + number))
+            return str(number)
+    raise AssertionError("all domains of ROS 2 are in use")
+
+
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
     with contextlib.ExitStack() as parts:
         uri = parts.enter_context(running_master("ours"))
-        # A domain that no other test has: from the port, which is this test's alone.
-        domain = str(1 + int(uri.rpartition(":")[2]) % 100)
+        domain = reserved_domain(parts)
         environment = {
             # With minirospy's packages of ROS 1 on it, those of ROS 2 could not be imported.
             **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
