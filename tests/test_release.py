@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from hatch_build import ADDRESS_VARIABLE, project_urls, readme_of_wheel
+from tools import release
 from tools.release import MOST_BYTES, faults_of_metadata, faults_of_wheel
 
 ROOT = Path(__file__).parents[1]
@@ -157,3 +158,33 @@ def test_every_link_of_the_readme_leads_to_a_file() -> None:
     named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]
     assert len(named) > 20
     assert [name for name in named if not (ROOT / name.partition("#")[0]).is_file()] == []
+
+
+def test_both_builds_are_of_one_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where somebody commits between them."""
+    repository = tmp_path / "repository"
+    repository.mkdir()
+    environ = {**os.environ, "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
+
+    def git(*words: str) -> str:
+        identity = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        command = ["git", *identity, *words]
+        done = subprocess.run(
+            command, cwd=repository, env=environ, check=True, capture_output=True, text=True
+        )
+        return done.stdout.strip()
+
+    git("init", "--quiet")
+    git("commit", "--quiet", "--allow-empty", "--message", "empty")
+    for text in ("first", "second"):
+        (repository / "text").write_text(text)
+        git("add", "text")
+        git("commit", "--quiet", "--message", text)
+    monkeypatch.setattr(release, "ROOT", repository)
+    # What is built is not looked at here, but what is built from.
+    monkeypatch.setattr(release, "_run", lambda *_, **__: "")
+
+    (tmp_path / "build" / "dist").mkdir(parents=True)
+    assert release._build(tmp_path / "build", git("rev-parse", "HEAD~1"), "0") == []
+
+    assert (tmp_path / "build" / "minirospy" / "text").read_text() == "first"

@@ -52,14 +52,15 @@ def main() -> int:
             raise ReleaseError(
                 f"not all is committed, but a release is built from the last commit:\n{changed}"
             )
-        epoch = _run("git", "log", "-1", "--format=%ct").strip()
+        # One commit for both builds, also where somebody commits meanwhile.
+        commit, epoch = _run("git", "log", "-1", "--format=%H %ct").split()
         dist = ROOT / "dist"
         with tempfile.TemporaryDirectory() as scratch:
-            built = _build(Path(scratch, "first"), epoch)
-            _compare(built, _build(Path(scratch, "second in another folder"), epoch, elsewhere=True))
+            built = _build(Path(scratch, "first"), commit, epoch)
+            _compare(built, _build(Path(scratch, "second in another folder"), commit, epoch, elsewhere=True))
             _run(sys.executable, "-m", "twine", "check", "--strict", *map(str, built))
             (wheel,) = (path for path in built if path.suffix == ".whl")
-            tracked = _run("git", "ls-files", "-z").split("\0")
+            tracked = _run("git", "ls-tree", "-r", "-z", "--name-only", commit).split("\0")
             if faults := faults_of_wheel(_contents(wheel), wheel.stat().st_size, tracked):
                 raise ReleaseError("\n".join(f"{wheel.name}: {fault}" for fault in faults))
             if faults := faults_of_metadata(_metadata(wheel), urls):
@@ -163,13 +164,13 @@ def _metadata(wheel: Path) -> str:
         return archive.read(name).decode()
 
 
-def _build(folder: Path, epoch: str, *, elsewhere: bool = False) -> list[Path]:
-    """Build the last commit, the wheel out of the unpacked sdist; return both files.
+def _build(folder: Path, commit: str, epoch: str, *, elsewhere: bool = False) -> list[Path]:
+    """Build a commit, the wheel out of the unpacked sdist; return both files.
 
     ``elsewhere``: as in the shell of somebody else, with another time zone, language, file mode and order of sets.
     """
     source = folder / "minirospy"
-    archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
+    archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
         tar.extractall(source)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
