@@ -95,7 +95,9 @@ class Run:
         self.process.kill()
         self.process.wait()
         # Closed by the last that has it: what a launcher has started, too.
-        self._reader.join()
+        self._reader.join(SECONDS)
+        if self._reader.is_alive():
+            pytest.fail(f"what it started still has its output:\n{self.said}")
         assert self.process.stdout
         self.process.stdout.close()
 
