@@ -46,7 +46,8 @@ interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pip install -q foxglove-sdk || echo "foxglove-sdk cannot be installed: its server is not compared"
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop --ignore=tests/interop/test_interop_ros2.py
-	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck" tests/workspace
+	@$(BIN)/python -m pip install -q tree-sitter tree-sitter-powershell || echo "the grammar of PowerShell cannot be installed"
+	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck or grammar" tests/workspace
 
 # The environment is kept in build/windows; tests that need no Unix run in there, too.
 WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/test_child_lifetime.py tests/test_signal_dispatch.py \

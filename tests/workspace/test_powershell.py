@@ -69,6 +69,16 @@ def test_brackets_are_closed(text: str) -> None:
         assert code.count(opened) == code.count(closed) > 0
 
 
+@pytest.mark.parametrize("text", [*FILES.values(), ROS_PS1.read_text(), shell_text("powershell", SETUP)])
+def test_grammar_of_powershell_parses_the_text(text: str) -> None:
+    parsing = pytest.importorskip("tree_sitter", reason="`make interop` installs the grammar")
+    powershell = pytest.importorskip("tree_sitter_powershell", reason="`make interop` installs the grammar")
+    parser = parsing.Parser(parsing.Language(powershell.language()))
+
+    assert parser.parse(b"function x { if ($a { } }").root_node.has_error
+    assert not parser.parse(text.encode()).root_node.has_error
+
+
 def test_variables_that_are_set_are_kept() -> None:
     text = shell_text("powershell", SETUP)
     assert "if (-not $env:ROS_DISTRO) { $env:ROS_DISTRO = 'noetic' }\n" in text
