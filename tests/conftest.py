@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import uuid
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Generator, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,19 @@ def pytest_configure() -> None:
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
         # Nothing happens here; a new process starts with the system's default.
         signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Write surrogates of what a test has printed or logged as escapes: pytest-xdist cannot send them."""
+    report = yield
+    report.sections = [(name, escaped_surrogates(text)) for name, text in report.sections]
+    return report
+
+
+def escaped_surrogates(text: str) -> str:
+    """Return a text that UTF-8 can encode."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def write_files(folder: Path, texts: Mapping[str, str], executable: Collection[str] = ()) -> None:
