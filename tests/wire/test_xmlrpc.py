@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import sysconfig
 import xmlrpc.client
 from collections import OrderedDict
 from datetime import date, datetime
@@ -180,6 +181,8 @@ def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
     # To join 60 MiB at their end would take 50 ms.
     if sys.gettrace() and kind != "base64":
         pytest.skip("Python copies more where it is traced")
+    if sysconfig.get_config_var("Py_GIL_DISABLED") and sys.version_info < (3, 14) and kind != "base64":
+        pytest.skip("without the GIL, Python 3.13 never adds to a text in place")
     text = "QUJD" * 1_000_000
     body = {
         "value": f"<value>{text}</value>",
