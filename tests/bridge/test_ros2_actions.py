@@ -10,7 +10,7 @@ from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from actionlib_msgs.msg import GoalStatusArray
@@ -35,6 +35,7 @@ from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
 from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos2
 from minirospy.bridge.ros2.rclpy_actions import ActionClient as Ros2ActionClient
+from minirospy.bridge.ros2.rclpy_actions import ActionServer as Ros2ActionServer
 from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.side import RclpySide
 from minirospy.errors import BridgeError, DeserializationError
@@ -313,6 +314,27 @@ def test_client_of_rclpy_that_the_executor_sees_too_early_has_a_lock(monkeypatch
             self._lock = threading.Lock()
 
     assert rclpy_client(monkeypatch, Early)
+
+
+def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Early:
+        _logger: Any
+
+        def __init__(self, *_: object, **__: object) -> None:
+            # As rclpy does: from here on the executor's thread calls it.
+            self._logger.debug("a goal")
+
+    monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionServer=Early))
+    monkeypatch.setitem(sys.modules, "rclpy.qos", SimpleNamespace(QoSProfile=lambda **_: None))
+    lines: list[str] = []
+    node = SimpleNamespace(get_logger=lambda: SimpleNamespace(debug=lines.append))
+    calls: Any = SimpleNamespace(node=node, options={"callback_group": None, "qos_profile": None})
+    server: Any = Ros2ActionServer(calls, "/fly", cast("Any", None), cast("Any", None))
+    assert server
+    assert lines == ["a goal"]
 
 
 def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:

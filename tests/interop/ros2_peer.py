@@ -14,11 +14,13 @@ with "waits" each goal ends when it is cancelled
 {"op": "close", "topic": ...}: its publisher, subscription, service, action and clients
 """
 
+import concurrent.futures
 import importlib
 import json
 import sys
 import threading
 import time
+import traceback
 
 import rclpy
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
@@ -29,12 +31,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.task import Future
 
 SAYING = threading.Lock()
-
-
-class LockedActionClient(ActionClient):
-    """rclpy's, which shows itself to the executor's thread before it has made its lock."""
-
-    _lock = threading.Lock()
 
 
 def profile(command):
@@ -93,6 +89,26 @@ class Peer:
             self.executor.spin()
         except ExternalShutdownException:
             pass
+        except Exception:  # noqa: BLE001 - whatever rclpy raises
+            # A test that waits for a message fails now, and not when its time is over.
+            traceback.print_exc()
+            say(op="ended")
+
+    def in_executor(self, work):
+        """Return what a function returns in the executor's thread: what it waits for may not come or go meanwhile.
+
+        In rclpy an action is shown to the executor before it is complete, and ended while the executor uses it.
+        """
+        done = concurrent.futures.Future()
+
+        def run():
+            try:
+                done.set_result(work())
+            except Exception as error:  # noqa: BLE001 - raised where it is waited for
+                done.set_exception(error)
+
+        self.executor.create_task(run)
+        return done.result()
 
     def end(self):
         self.executor.shutdown()
@@ -186,20 +202,22 @@ class Peer:
                 handle.succeed()
             return result
 
-        self.action_servers[topic] = ActionServer(
-            self.node,
-            class_,
-            topic,
-            execute,
-            goal_callback=lambda goal: GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-            callback_group=ReentrantCallbackGroup(),
+        self.action_servers[topic] = self.in_executor(
+            lambda: ActionServer(
+                self.node,
+                class_,
+                topic,
+                execute,
+                goal_callback=lambda goal: GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT,
+                cancel_callback=lambda _: CancelResponse.ACCEPT,
+                callback_group=ReentrantCallbackGroup(),
+            )
         )
 
     def goal(self, topic, command):
         class_ = class_of(command["type"], "action")
         if topic not in self.action_clients:
-            self.action_clients[topic] = LockedActionClient(self.node, class_, topic)
+            self.action_clients[topic] = self.in_executor(lambda: ActionClient(self.node, class_, topic))
         client = self.action_clients[topic]
         client.wait_for_server()
 
@@ -223,6 +241,9 @@ class Peer:
         self.goals[topic].cancel_goal_async()
 
     def close(self, topic, _):
+        self.in_executor(lambda: self.destroy(topic))
+
+    def destroy(self, topic):
         for parts in (self.action_servers, self.action_clients):
             if topic in parts:
                 parts.pop(topic).destroy()

@@ -275,7 +275,9 @@ class ActionServer:
         self._accept = accept
         self._goals: dict[int, tuple[Message, GoalOfRos1, Feedback]] = {}
         self._module = importlib.import_module("rclpy.action")
-        self._server: _Closable = self._module.ActionServer(
+        # Its constructor shows it to the executor, which may have a goal for it, before it has a logger.
+        named = {"_logger": calls.node.get_logger()}
+        self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,
             class_,
             name,
