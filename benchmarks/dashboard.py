@@ -1,8 +1,10 @@
-"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients]`: what the dashboard's page draws, and what its server costs.
+"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients] [soak]`: what the page draws, and what its server costs.
 
 page: a layout in headless chromium with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and the
 topics with the scan open; frames a second by requestAnimationFrame. clients: ten programs that speak what the page speaks, on
 50 topics in fast motion: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
+soak: ten such clients and two pages in chromium, on 50 topics, a scan, and frames that move, each in fast motion: the default
+of 100 Hz for 360 s is an hour of 10 Hz; memory of the server and of the pages at the start, in the middle, at the end.
 CPU is that of a process, in percent of one core.
 """
 
@@ -20,6 +22,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import quote
 
 import psutil
 from websockets.exceptions import ConnectionClosed
@@ -61,6 +64,34 @@ while not rospy.is_shutdown():
         each.publish(message)
     rate.sleep()
 """
+
+MOVING = """
+import math, sys
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+rospy.init_node("moving")
+scans = rospy.Publisher("/scan", LaserScan, queue_size=10)
+frames = rospy.Publisher("/tf", TFMessage, queue_size=10)
+rate = rospy.Rate(float(sys.argv[1]))
+count = 0
+while not rospy.is_shutdown():
+    count += 1
+    moved = TransformStamped(child_frame_id="laser")
+    moved.header.frame_id = "map"
+    moved.header.stamp = rospy.Time.now()
+    moved.transform.translation.x = math.sin(count / 100)
+    moved.transform.rotation.w = 1
+    frames.publish(TFMessage([moved]))
+    scan = LaserScan(angle_increment=0.01, range_max=9, ranges=[3 + math.sin(count / 50 + beam / 30) for beam in range(628)])
+    scan.header = moved.header
+    scan.header.frame_id = "laser"
+    scans.publish(scan)
+    rate.sleep()
+"""
+
+HEAP = "(() => { gc(); return performance.memory.usedJSHeapSize })()"
 
 FRAMES = """
 new Promise(resolve => {
@@ -219,17 +250,75 @@ def measure_clients(seconds: float, rate: float) -> None:
     )
 
 
+def measure_soak(seconds: float, rate: float) -> None:
+    """Print memory over a long run with ten clients and two pages."""
+    from tests.interop.browser import Page
+
+    opened = "&".join(f"open=%2Fmany%2Ft{index}" for index in range(50))
+    plots = "&".join(f"path=%2Fmany%2Ft{index}%2Fdata[0]" for index in range(4))
+    trees = (f"row(topics?{opened},console)", f"row(3d,column(plot?{plots},graph))")
+    with graph() as (server, port), contextlib.ExitStack() as stack:
+        pages = []
+        for tree in trees:
+            pages.append(
+                Page(
+                    f"http://localhost:{port}/#/layout?tree={quote(tree)}", flags=("--js-flags=--expose-gc",)
+                )
+            )
+            stack.callback(pages[-1].close)
+        start(stack, sys.executable, "-c", MANY, str(rate))
+        start(stack, sys.executable, "-c", MOVING, str(rate))
+        clients = [Client(port) for _ in range(10)]
+        for each in clients:
+            stack.callback(each.close)
+            each.start()
+        pages[0].wait("return document.querySelectorAll('.topics [aria-expanded=true]').length >= 50")
+        pages[1].wait("return Number(document.querySelector('canvas.stage')?.dataset.drawn) > 10")
+        time.sleep(20)
+
+        spent, started = cpu(server), time.monotonic()
+        counts = [(each.messages, each.bytes) for each in clients]
+        print("soak: seconds  server  clients  page 1: heap, processes  page 2: heap, processes  (MB)")
+        for step in range(13):
+            time.sleep(max(0.0, started + seconds * step / 12 - time.monotonic()))
+            row = [memory_of(server), memory_of(psutil.Process())]
+            for page in pages:
+                row += [page.evaluate(HEAP) / 1e6, sum(memory_of(each) for each in page.processes())]
+            print(
+                f"soak: {time.monotonic() - started:7.0f}  " + "  ".join(f"{each:7.1f}" for each in row),
+                flush=True,
+            )
+        used, elapsed = cpu(server) - spent, time.monotonic() - started
+        messages = [each.messages - count for each, (count, _) in zip(clients, counts, strict=True)]
+        drawn = pages[1].evaluate("document.querySelector('canvas.stage').dataset.drawn")
+    print(
+        f"soak: {elapsed:.0f} s; each client had {min(messages)} to {max(messages)} messages of 50 topics, "
+        f"as in {min(messages) / (50 * 10 * 3600):.2f} hours at 10 Hz; server {used / elapsed * 100:.0f} % CPU; "
+        f"{drawn} pictures of the 3D view; errors of the pages: {[page.errors for page in pages]}"
+    )
+
+
+def memory_of(process: psutil.Process) -> float:
+    """Return what a process has for itself, in MB; 0 where it has ended."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        full = process.memory_full_info()
+        return float(getattr(full, "uss", full.rss)) / 1e6
+    return 0.0
+
+
 def main() -> None:
     """Measure what the words name, by default all."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients"])
-    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients", "soak"])
+    parser.add_argument("--seconds", type=float, help="of the measurement: 10, of the soak 360")
     parser.add_argument("--rate", type=float, default=100.0, help="of each of the 50 topics, in Hz")
     words = parser.parse_args()
     if "page" in words.what:
-        measure_page(words.seconds)
+        measure_page(words.seconds or 10.0)
     if "clients" in words.what:
-        measure_clients(words.seconds, words.rate)
+        measure_clients(words.seconds or 10.0, words.rate)
+    if "soak" in words.what:
+        measure_soak(words.seconds or 360.0, words.rate)
 
 
 if __name__ == "__main__":

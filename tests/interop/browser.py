@@ -63,13 +63,22 @@ window.addEventListener("click", (event) => {
 class Page:
     """A tab. ``script`` is JavaScript; ``find`` is a selector of CSS."""
 
-    def __init__(self, url: str, *, width: int = 1200, height: int = 760, dark: bool = False) -> None:
+    def __init__(
+        self,
+        url: str,
+        *,
+        width: int = 1200,
+        height: int = 760,
+        dark: bool = False,
+        flags: tuple[str, ...] = (),
+    ) -> None:
         assert CHROMIUM
         self._folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
             [
                 CHROMIUM,
                 *_FLAGS,
+                *flags,
                 f"--user-data-dir={self._folder.name}",
                 f"--window-size={width},{height}",
                 "about:blank",
