@@ -20,6 +20,7 @@ libbondcpp-dev
 libdiagnostic-aggregator-dev
 libdiagnostic-aggregator-tools
 libdynamic-reconfigure-config-init-mutex-dev
+libgl1-mesa-dri
 liblaser-geometry-dev
 libroscpp-dev
 libroslib-dev
@@ -93,10 +94,12 @@ ros-topic-tools-srvs
 ros-trajectory-msgs
 ros-visualization-msgs
 rosbash
+rviz
 shellcheck
 tf-tools
 tf2-tools
 topic-tools
+xvfb
 zsh
 "
 missing=""

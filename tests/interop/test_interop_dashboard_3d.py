@@ -264,18 +264,18 @@ def test_displays_are_added_set_hidden_and_removed(serve: Serve, browse: Browse)
     page.choose("[data-name='PointCloud2 /cloud'] select[aria-label='Color Transformer']", "FlatColor")
     page.evaluate(
         "(() => { const e = document.querySelector(\"[data-name='PointCloud2 /cloud'] input[type=color]\");"
-        "e.value = '#00ff00'; e.dispatchEvent(new Event('change')) })()"
+        "e.value = '#00ffff'; e.dispatchEvent(new Event('change')) })()"
     )
     page.type("[data-name='PointCloud2 /cloud'] input[aria-label='Size (m)']", "0.3")
     page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
-    page.wait("return Boolean(localStorage.getItem('3d')?.includes('0; 255; 0'))")
-    assert is_near(colors(page), (0, 255, 0), 0)
+    page.wait("return Boolean(localStorage.getItem('3d')?.includes('0; 255; 255'))")
+    assert is_near(colors(page), (0, 255, 255), 0)
     page.click("[data-name='PointCloud2 /cloud'] input[type=checkbox]")
     page.wait("return document.querySelector(\"[data-name='PointCloud2 /cloud']\").classList.contains('off')")
     page.call("Page.reload")
     page.wait("return document.querySelector(\"[data-name='PointCloud2 /cloud']\").classList.contains('off')")
     drawn(page)
-    assert not is_near(colors(page), (0, 255, 0), 0)
+    assert not is_near(colors(page), (0, 255, 255), 0)
     page.click("[data-name='PointCloud2 /cloud'] .display-name")
     page.click("[data-name='PointCloud2 /cloud'] button", "Remove")
     page.wait("return !document.querySelector(\"[data-name='PointCloud2 /cloud']\")")

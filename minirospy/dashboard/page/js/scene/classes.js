@@ -11,9 +11,9 @@ const frame = { kind: "frame" };
 const isStyle = (...styles) => (settings) => styles.includes(settings.Style);
 const isColored = (transformer) => (settings) => settings["Color Transformer"] === transformer;
 
-const POINTS = (usualColors, usualSize = 0.02) => [
-  ["Style", scheme(["Points", "Squares", "Flat Squares", "Spheres"]), "Flat Squares"],
-  ["Size (m)", number, usualSize, (settings) => settings.Style !== "Points"],
+const POINTS = (usualColors) => [
+  ["Style", scheme(["Points", "Squares", "Flat Squares", "Spheres", "Boxes"]), "Flat Squares"],
+  ["Size (m)", number, 0.01, (settings) => settings.Style !== "Points"],
   ["Size (Pixels)", number, 3, isStyle("Points")],
   ["Alpha", number, 1],
   ["Decay Time", number, 0],
@@ -32,6 +32,8 @@ const POINTS = (usualColors, usualSize = 0.02) => [
   ["Autocompute Value Bounds/Max Value", number, 10, (settings) => isColored("AxisColor")(settings) && settings["Autocompute Value Bounds"]?.Value === false],
   ["Color", color, "255; 255; 255", isColored("FlatColor")]];
 
+const isPosed = (style) => (settings) => settings["Pose Style"] === style;
+const isShape = (shape) => (settings) => settings.Shape === shape;
 const isArrow = (settings) => settings.Shape !== "Axes";
 const isAxes = (settings) => settings.Shape === "Axes";
 const ARROW = [
@@ -50,7 +52,7 @@ export const CLASSES = {
   RobotModel: { settings: [
     ["Robot Description", text, "robot_description"], ["TF Prefix", text, ""], ["Visual Enabled", bool, true], ["Collision Enabled", bool, false], ["Alpha", number, 1],
     ["Joint States", { kind: "topic", types: ["sensor_msgs/JointState"] }, "/joint_states"]] },
-  LaserScan: { types: ["sensor_msgs/LaserScan"], settings: [["Topic", topic, ""], ...POINTS("Intensity", 0.04)] },
+  LaserScan: { types: ["sensor_msgs/LaserScan"], settings: [["Topic", topic, ""], ...POINTS("Intensity")] },
   PointCloud2: { types: ["sensor_msgs/PointCloud2"], settings: [["Topic", topic, ""], ...POINTS("")] },
   PointCloud: { types: ["sensor_msgs/PointCloud"], settings: [["Topic", topic, ""], ...POINTS("")] },
   Map: { types: ["nav_msgs/OccupancyGrid"], settings: [
@@ -60,14 +62,17 @@ export const CLASSES = {
   Path: { types: ["nav_msgs/Path"], settings: [
     ["Topic", topic, ""], ["Line Style", scheme(["Lines", "Billboards"]), "Lines"], ["Line Width", number, 0.03, (settings) => settings["Line Style"] === "Billboards"],
     ["Color", color, "25; 255; 0"], ["Alpha", number, 1], ["Buffer Length", number, 1],
-    ["Pose Style", scheme(["None", "Axes", "Arrows"]), "None"], ["Length", number, 0.3, (settings) => settings["Pose Style"] === "Axes"],
-    ["Shaft Length", number, 0.1, (settings) => settings["Pose Style"] === "Arrows"]] },
+    ["Offset/X", number, 0], ["Offset/Y", number, 0], ["Offset/Z", number, 0], ["Pose Style", scheme(["None", "Axes", "Arrows"]), "None"],
+    ["Length", number, 0.3, isPosed("Axes")], ["Radius", number, 0.03, isPosed("Axes")], ["Pose Color", color, "255; 85; 255", isPosed("Arrows")],
+    ["Shaft Length", number, 0.1, isPosed("Arrows")], ["Head Length", number, 0.2, isPosed("Arrows")],
+    ["Shaft Diameter", number, 0.1, isPosed("Arrows")], ["Head Diameter", number, 0.3, isPosed("Arrows")]] },
   Pose: { types: ["geometry_msgs/PoseStamped"], settings: [["Topic", topic, ""], ["Shape", scheme(["Arrow", "Axes"]), "Arrow"], ...ARROW] },
   PoseWithCovariance: { types: ["geometry_msgs/PoseWithCovarianceStamped"], settings: [
     ["Topic", topic, ""], ["Shape", scheme(["Arrow", "Axes"]), "Arrow"], ...ARROW, ["Covariance/Position/Value", bool, true]] },
   PoseArray: { types: ["geometry_msgs/PoseArray"], settings: [
     ["Topic", topic, ""], ["Shape", scheme(["Arrow (Flat)", "Arrow (3D)", "Axes"]), "Arrow (Flat)"], ["Color", color, "255; 25; 0", isArrow], ["Alpha", number, 1, isArrow],
-    ["Arrow Length", number, 0.3, isArrow], ["Axes Length", number, 0.3, isAxes], ["Axes Radius", number, 0.01, isAxes]] },
+    ["Arrow Length", number, 0.3, isShape("Arrow (Flat)")], ["Head Radius", number, 0.03, isShape("Arrow (3D)")], ["Head Length", number, 0.07, isShape("Arrow (3D)")],
+    ["Shaft Radius", number, 0.01, isShape("Arrow (3D)")], ["Shaft Length", number, 0.23, isShape("Arrow (3D)")], ["Axes Length", number, 0.3, isAxes], ["Axes Radius", number, 0.01, isAxes]] },
   Odometry: { types: ["nav_msgs/Odometry"], settings: [
     ["Topic", topic, ""], ["Keep", number, 100], ["Position Tolerance", number, 0.1], ["Angle Tolerance", number, 0.1],
     ["Shape", { kind: "choice", options: ["Arrow", "Axes"] }, "Arrow"], ...ARROW, ["Covariance/Position/Value", bool, true]] },
@@ -78,7 +83,7 @@ export const CLASSES = {
   GridCells: { types: ["nav_msgs/GridCells"], settings: [["Topic", topic, ""], ["Color", color, "25; 255; 0"], ["Alpha", number, 1]] },
   WrenchStamped: { types: ["geometry_msgs/WrenchStamped"], settings: [
     ["Topic", topic, ""], ["Force Color", color, "204; 51; 51"], ["Torque Color", color, "204; 204; 51"], ["Alpha", number, 1],
-    ["Force Arrow Scale", number, 2], ["Torque Arrow Scale", number, 2], ["Arrow Width", number, 0.5]] },
+    ["Force Arrow Scale", number, 2], ["Torque Arrow Scale", number, 2], ["Arrow Width", number, 0.5], ["Hide Small Values", bool, true]] },
   Image: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", isLinked: true, settings: [["Image Topic", topic, ""]] },
   Camera: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", isLinked: true, settings: [["Image Topic", topic, ""]] },
 };

@@ -6,6 +6,7 @@ import { h, setText } from "../dom.js";
 
 const LINE = 15; // pixels
 const MOST = 400;
+const TEXT_SIZE = 0.91; // of RViz's letters: a marker's scale.z is more than their em
 
 export class Labels {
   constructor() {
@@ -53,7 +54,7 @@ export class Labels {
       let top = y;
       if (label.metres !== null) {
         const far = stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(label.place);
-        label.span.style.fontSize = `${Math.min(300, Math.max(3, (label.metres * stage.pixelsPerMetre) / far))}px`;
+        label.span.style.fontSize = `${Math.min(300, Math.max(3, (TEXT_SIZE * label.metres * stage.pixelsPerMetre) / far))}px`;
       } else {
         const covers = (other) => Math.abs(other.top - top) < LINE && x < other.x + other.width && other.x < x + label.width;
         for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++) top = other.top + LINE;

@@ -47,6 +47,13 @@ async function read(link, uri) {
 
 function readStl(bytes) {
   const geometry = new STLLoader().parse(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength));
+  // Some programs write no normals, but zeros.
+  const { array } = geometry.getAttribute("normal");
+  for (let index = 0; index < array.length; index += 9) {
+    if (Math.hypot(array[index], array[index + 1], array[index + 2]) > 0.03) continue;
+    geometry.computeVertexNormals();
+    break;
+  }
   return new Mesh(geometry, bodyMaterial([200, 200, 200]));
 }
 

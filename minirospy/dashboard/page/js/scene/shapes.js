@@ -1,8 +1,8 @@
 // Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are shared.
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Group, LineBasicMaterial, LineMaterial, LineSegments,
-  LineSegments2, LineSegmentsGeometry, Mesh, MeshLambertMaterial, Points, Quaternion, ShaderMaterial, SphereGeometry, Vector3 } from "../../vendor/three/three.min.js";
+  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Group, InstancedBufferAttribute, InstancedMesh, LineBasicMaterial, LineMaterial, LineSegments,
+  LineSegments2, LineSegmentsGeometry, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, Points, Quaternion, ShaderMaterial, SphereGeometry, Vector3 } from "../../vendor/three/three.min.js";
 
 const X_AXIS = new Vector3(1, 0, 0);
 // Cylinder and cone along x from 0 to 1, of diameter 1: an arrow's parts, scaled.
@@ -11,11 +11,21 @@ const HEAD = new ConeGeometry(0.5, 1, 20).rotateZ(-Math.PI / 2).translate(0.5, 0
 export const BOX = new BoxGeometry(1, 1, 1);
 export const BALL = new SphereGeometry(0.5, 24, 16);
 export const ROLL = new CylinderGeometry(0.5, 0.5, 1, 28).rotateX(Math.PI / 2); // along z
-const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL]);
+// Boxes of lists and clouds have the same light from everywhere: by their sides, +x, -x, +y, -y, +z, -z, as measured in RViz.
+const CRATE = new BoxGeometry(1, 1, 1);
+CRATE.setAttribute("color", new BufferAttribute(Float32Array.from([0.6, 0.6, 0.4, 1, 0.9, 0.5].flatMap((light) => Array(12).fill(light))), 3));
+const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL, CRATE]);
 
 /** Return the material of a body: color [r, g, b] of 0 to 255. */
 export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
   const material = new MeshLambertMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: alpha >= 0.9998, ...options });
+  material.color.setRGB(r / 255, g / 255, b / 255);
+  return material;
+}
+
+/** Return the material of what no light changes: color [r, g, b] of 0 to 255. */
+export function plainMaterial([r, g, b], alpha = 1, options = {}) {
+  const material = new MeshBasicMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: alpha >= 0.9998, ...options });
   material.color.setRGB(r / 255, g / 255, b / 255);
   return material;
 }
@@ -39,14 +49,14 @@ export function directed(object, from, to) {
   return object;
 }
 
-const AXES = [[255, 40, 40], [40, 200, 40], [60, 90, 255]].map((rgb) => bodyMaterial(rgb));
+const AXES = [[255, 0, 0], [0, 255, 0], [0, 0, 255]].map((rgb) => bodyMaterial(rgb));
 
-/** Return axes as RViz's: x red, y green, z blue. */
+/** Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is here. */
 export function axes(length, radius) {
   const group = new Group();
   AXES.forEach((material, index) => {
     const bar = new Mesh(SHAFT, material);
-    bar.scale.set(length, radius * 2, radius * 2);
+    bar.scale.set(length, radius, radius);
     if (index === 1) bar.rotation.z = Math.PI / 2;
     if (index === 2) bar.rotation.y = -Math.PI / 2;
     group.add(bar);
@@ -55,7 +65,7 @@ export function axes(length, radius) {
 }
 
 /** Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three numbers of 0 to 1 each. */
-export function segments(positions, { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 2, metres = null } = {}) {
+export function segments(positions, { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 1.5, metres = null } = {}) {
   const geometry = new LineSegmentsGeometry();
   geometry.setPositions(positions);
   const material = new LineMaterial({ linewidth: metres ?? pixels, worldUnits: metres !== null, transparent: alpha < 0.9998, opacity: alpha });
@@ -92,7 +102,7 @@ attribute vec3 rgb; varying vec3 shade;
 void main() {
   shade = isFlat > 0.5 ? flatColor : rgb;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 2.0, 128.0) : size;
+  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 1.0, 128.0) : size;
 }`;
 const POINT_FRAGMENT = `
 uniform float opacity; uniform float isRound; varying vec3 shade;
@@ -102,7 +112,7 @@ void main() {
     vec2 at = gl_PointCoord * 2.0 - 1.0;
     float square = dot(at, at);
     if (square > 1.0) discard;
-    light = 0.55 + 0.45 * sqrt(1.0 - square);
+    light = 0.78 + 0.22 * sqrt(1.0 - square); // as measured in RViz
   }
   gl_FragColor = vec4(shade * light, opacity);
 }`;
@@ -126,13 +136,34 @@ export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, si
   return found;
 }
 
+/** Return boxes or balls of one size [x, y, z]: positions in a row, colors (RGB bytes) or null for `rgb`. */
+export function solids(positions, colors, { rgb = [255, 255, 255], alpha = 1, size, isRound = false }) {
+  const material = plainMaterial(colors ? [255, 255, 255] : rgb, alpha, { vertexColors: !isRound });
+  if (isRound) material.onBeforeCompile = shadeBalls;
+  const count = positions.length / 3;
+  const mesh = new InstancedMesh(isRound ? BALL : CRATE, material, count);
+  const matrix = new Matrix4().makeScale(...size);
+  for (let index = 0; index < count; index++) mesh.setMatrixAt(index, matrix.setPosition(positions[index * 3], positions[index * 3 + 1], positions[index * 3 + 2]));
+  if (colors) mesh.instanceColor = new InstancedBufferAttribute(colors, 3, true);
+  return mesh;
+}
+
+/** Let balls be a little darker at their edges, like the points that are drawn as spheres. */
+function shadeBalls(shader) {
+  shader.vertexShader = shader.vertexShader.replace("void main() {", "varying float facing;\nvoid main() {\n  facing = normalize(normalMatrix * mat3(instanceMatrix) * normal).z;");
+  shader.fragmentShader = shader.fragmentShader.replace("void main() {", "varying float facing;\nvoid main() {")
+    .replace("#include <opaque_fragment>", "outgoingLight *= 0.78 + 0.22 * max(facing, 0.0);\n#include <opaque_fragment>");
+}
+
 /** Return triangles: positions in a row, colors (RGB of 0 to 1) or null. */
 export function triangles(positions, colors, rgb, alpha) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   if (colors) geometry.setAttribute("color", new BufferAttribute(colors, 3));
+  // Light does not change colors of their own, as in RViz.
+  if (colors) return new Mesh(geometry, plainMaterial([255, 255, 255], alpha, { side: DoubleSide, vertexColors: true }));
   geometry.computeVertexNormals();
-  return new Mesh(geometry, bodyMaterial(colors ? [255, 255, 255] : rgb, alpha, { side: DoubleSide, vertexColors: Boolean(colors) }));
+  return new Mesh(geometry, bodyMaterial(rgb, alpha, { side: DoubleSide }));
 }
 
 /** Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard deviation. */

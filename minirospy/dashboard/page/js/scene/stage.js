@@ -3,7 +3,7 @@
 // long, they get coarser.
 
 import {
-  AmbientLight, Color, ColorManagement, DirectionalLight, LinearSRGBColorSpace, OrthographicCamera, PerspectiveCamera, Raycaster, Scene, Vector2,
+  Color, ColorManagement, DirectionalLight, LinearSRGBColorSpace, OrthographicCamera, PerspectiveCamera, Raycaster, Scene, Vector2,
   Vector3, WebGLRenderer } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
 import { Labels } from "./labels.js";
@@ -43,8 +43,9 @@ export class Stage {
     this.perspective = new PerspectiveCamera((FIELD_OF_VIEW * 180) / Math.PI, 1, 0.02, 5000);
     this.flat = new OrthographicCamera(-1, 1, 1, -1, -2000, 2000);
     for (const camera of [this.perspective, this.flat]) camera.up.set(0, 0, 1);
-    this.light = new DirectionalLight(0xffffff, 1.9);
-    this.scene.add(new AmbientLight(0xffffff, 1.5), this.light, this.light.target);
+    // As RViz's: from where the camera is, without any other. A surface that faces the camera has its own color.
+    this.light = new DirectionalLight(0xffffff, Math.PI);
+    this.scene.add(this.light, this.light.target);
     this.view = { kind: "orbit", distance: 10, focus: [0, 0, 0], pitch: 0.785, yaw: 0.785, scale: 50, angle: 0, target: "<Fixed Frame>" };
     this.base = { p: [0, 0, 0], yaw: 0 }; // of the target frame
     this.labels = new Labels();
@@ -191,8 +192,8 @@ export class Stage {
     }
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
-    this.light.position.copy(camera.position).add(new Vector3(0, 0, distance * 0.6));
-    this.light.target.position.copy(focus);
+    this.light.position.copy(camera.position);
+    this.light.target.position.copy(camera.position).add(camera.getWorldDirection(new Vector3()));
   }
 
   /** Move the focal point by pixels of the screen. */

@@ -179,6 +179,9 @@ export class SceneView {
     const settings = newSettings(name, topic);
     if (topic) settings.Name = `${name} ${topic}`;
     if (name === "Map" && /costmap/.test(topic)) Object.assign(settings, { "Color Scheme": "costmap", Alpha: 0.4 });
+    // Larger than RViz's, to be seen from where the view starts.
+    if (name === "LaserScan") settings["Size (m)"] = 0.04;
+    if (name === "PointCloud2" || name === "PointCloud") settings["Size (m)"] = 0.02;
     if (name === "Path" && /local/.test(topic)) settings.Color = "255; 170; 0";
     return settings;
   }

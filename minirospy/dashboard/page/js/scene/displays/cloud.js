@@ -1,11 +1,12 @@
 // Scans and clouds: points colored by intensity, axis, or their own colors; older ones stay for the decay time.
 
 import { colorsOf, pointsOfCloud, pointsOfOldCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../points.js";
-import { points } from "../shapes.js";
+import { points, solids } from "../shapes.js";
 import { IDENTITY } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
 const MOST_SCANS = 1000;
+const MOST_BOXES = 50_000; // of one message
 
 export class Cloud extends TopicDisplay {
   changed(path) {
@@ -40,9 +41,11 @@ export class Cloud extends TopicDisplay {
     const colors = colorsOf(found, settings, this.context.transformNow(frame) ?? IDENTITY);
 
     const isPixels = settings.Style === "Points";
-    const object = points(found.positions, colors, {
-      rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1),
-      size: isPixels ? this.number("Size (Pixels)", 3) : this.number("Size (m)", 0.01), isMetres: !isPixels, isRound: settings.Style === "Spheres" });
+    const size = isPixels ? this.number("Size (Pixels)", 3) : this.number("Size (m)", 0.01);
+    const paint = { rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1) };
+    // Boxes are 36 corners each: of very many a square is drawn.
+    const object = settings.Style === "Boxes" && found.count <= MOST_BOXES ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
+      : points(found.positions, colors, { ...paint, size, isMetres: !isPixels, isRound: settings.Style === "Spheres" });
     const item = this.addAt(message.header, object);
     item.until = performance.now() + this.number("Decay Time") * 1000;
     this.setStatus("Points", stride > 1 ? 1 : 0, stride > 1

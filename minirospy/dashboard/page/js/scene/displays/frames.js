@@ -6,7 +6,7 @@ import { missingText } from "../transforms.js";
 import { Display } from "./display.js";
 
 const MOST_CELLS = 1000;
-const ARROW_COLORS = [[255, 40, 190], [255, 220, 60]];
+const ARROW_COLORS = [[255, 26, 153], [204, 204, 77]];
 
 /** Return a setting's frame: "" stands for the fixed one. */
 const reference = (display) => {
@@ -89,7 +89,7 @@ export class TF extends Display {
     const group = new Group();
     group.name = name;
     const scale = this.number("Marker Scale", 1);
-    const cross = axes(0.45 * scale, 0.02 * scale);
+    const cross = axes(0.2 * scale, 0.02 * scale);
     cross.visible = this.get("Show Axes") !== false;
     group.add(cross);
     const line = { object: this.makeArrow(scale) };
@@ -100,7 +100,7 @@ export class TF extends Display {
 
   /** The arrow from a frame to its parent, of length 1. */
   makeArrow(scale) {
-    const shape = arrow(bodyMaterial(ARROW_COLORS[1]), { shaft: 1, shaftWidth: 0.012 * scale, head: 0, headWidth: 0.04 * scale });
+    const shape = arrow(bodyMaterial(ARROW_COLORS[1]), { shaft: 1, shaftWidth: 0.01 * scale, head: 0, headWidth: 0.04 * scale });
     shape.children[1].material = bodyMaterial(ARROW_COLORS[0]);
     return shape;
   }

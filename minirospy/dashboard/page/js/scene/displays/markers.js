@@ -1,8 +1,8 @@
 // Markers of visualization_msgs: shapes by namespace and number, until they are deleted or their lifetime ends.
 
-import { Group, InstancedMesh, Matrix4, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
+import { Group, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
 import { loadMesh } from "../meshes.js";
-import { arrow, BALL, bodyMaterial, BOX, chain, directed, points as pointCloud, ROLL, segments, triangles } from "../shapes.js";
+import { arrow, BALL, bodyMaterial, BOX, chain, directed, points as pointCloud, ROLL, segments, solids, triangles } from "../shapes.js";
 import { fromMessage, secondsOf } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
@@ -167,23 +167,21 @@ function makeLines(isStrip) {
   };
 }
 
-function makeList(geometry) {
-  return ({ points, colors, scale, color }) => {
-    const own = colors.length === points.length;
-    const mesh = new InstancedMesh(geometry, bodyMaterial(own ? [255, 255, 255] : rgbOf(color), own && colors.length ? colors[0].a : color.a), points.length);
-    const matrix = new Matrix4().makeScale(scale.x, scale.y, scale.z);
-    points.forEach(({ x, y, z }, index) => mesh.setMatrixAt(index, matrix.setPosition(x, y, z)));
-    if (own && points.length) {
-      const bytes = new Float32Array(points.length * 3);
-      colors.forEach(({ r, g, b }, index) => bytes.set([r, g, b], index * 3));
-      mesh.instanceColor = new mesh.instanceMatrix.constructor(bytes, 3);
-    }
-    return mesh;
+/** Return the colors of a marker's points as bytes, null where it has none for each. */
+const ownColors = ({ points, colors }) =>
+  (colors.length === points.length && colors.length ? Uint8Array.from(colors.flatMap(({ r, g, b }) => [r, g, b].map((part) => Math.min(Math.max(part, 0), 1) * 255))) : null);
+
+function makeList(isRound) {
+  return (marker) => {
+    const { points, colors, scale, color } = marker;
+    const own = ownColors(marker);
+    return solids(flat(points), own, { rgb: rgbOf(color), alpha: own ? colors[0].a : color.a, size: [scale.x, scale.y, scale.z], isRound });
   };
 }
 
-function makePoints({ points, colors, scale, color }) {
-  const own = colors.length === points.length && colors.length ? Uint8Array.from(colors.flatMap(({ r, g, b }) => [r * 255, g * 255, b * 255])) : null;
+function makePoints(marker) {
+  const { points, colors, scale, color } = marker;
+  const own = ownColors(marker);
   return pointCloud(flat(points), own, { rgb: rgbOf(color), alpha: own ? colors[0].a : color.a, size: Math.max(scale.x, scale.y), isMetres: true });
 }
 
@@ -209,5 +207,5 @@ function makeMesh({ mesh_resource: uri, mesh_use_embedded_materials: isOwn, scal
 }
 
 const MAKERS = [
-  makeArrow, body(BOX), body(BALL), body(ROLL), makeLines(true), makeLines(false), makeList(BOX), makeList(BALL), makePoints,
+  makeArrow, body(BOX), body(BALL), body(ROLL), makeLines(true), makeLines(false), makeList(false), makeList(true), makePoints,
   ({ text }) => ({ text }), makeMesh, makeTriangles];

@@ -1,7 +1,7 @@
 // Displays of poses and of what is made of points: paths, polygons, odometry, ranges, forces.
 
-import { ConeGeometry, DoubleSide, Group, InstancedMesh, Matrix4, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
-import { arrow, axes, BALL, bodyMaterial, BOX, chain, directed, ellipse, segments } from "../shapes.js";
+import { ConeGeometry, Group, InstancedMesh, Matrix4, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
+import { arrow, axes, BALL, bodyMaterial, BOX, chain, directed, ellipse, plainMaterial, segments } from "../shapes.js";
 import { fromMessage } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
@@ -49,8 +49,9 @@ class LastMessage extends TopicDisplay {
   pointer() {
     if (this.get("Shape") === "Axes") return axes(this.number("Axes Length", 1), this.number("Axes Radius", 0.1));
     return arrow(bodyMaterial(this.color(), this.number("Alpha", 1)), {
-      shaft: this.number("Shaft Length", 1), shaftWidth: this.number("Shaft Radius", 0.05) * 2,
-      head: this.number("Head Length", 0.3), headWidth: this.number("Head Radius", 0.1) * 2 });
+      // Diameters, as in RViz.
+      shaft: this.number("Shaft Length", 1), shaftWidth: this.number("Shaft Radius", 0.05),
+      head: this.number("Head Length", 0.3), headWidth: this.number("Head Radius", 0.1) });
   }
 }
 
@@ -85,12 +86,13 @@ export class PoseArray extends LastMessage {
           new Vector3(x1 * length, y1 * length, 0).applyMatrix4(transform).toArray(positions, index * 18 + part * 6 + 3);
         });
       });
-      return positions.length ? segments(positions, { rgb: this.color(), alpha: this.number("Alpha", 1), pixels: 1.5 }) : new Group();
+      return positions.length ? segments(positions, { rgb: this.color(), alpha: this.number("Alpha", 1) }) : new Group();
     }
-    const length = this.number("Arrow Length", 0.3);
     const material = bodyMaterial(this.color(), this.number("Alpha", 1));
     const make = shape === "Axes" ? () => axes(this.number("Axes Length", 0.3), this.number("Axes Radius", 0.01))
-      : () => arrow(material, { shaft: length * 0.75, shaftWidth: length * 0.06, head: length * 0.25, headWidth: length * 0.2 });
+      : () => arrow(material, {
+        shaft: this.number("Shaft Length", 0.23), shaftWidth: this.number("Shaft Radius", 0.01),
+        head: this.number("Head Length", 0.07), headWidth: this.number("Head Radius", 0.03) });
     return grouped(new Group(), ...shown.slice(0, MOST_KEPT).map((pose) => posed(make(), pose)));
   }
 }
@@ -140,19 +142,22 @@ export class Path extends LastMessage {
     const others = poses.filter(({ header: own }) => own.frame_id && own.frame_id !== header.frame_id).length;
     this.setStatus("Poses", others ? 1 : 0, `${poses.length} poses${others ? `, ${others} of another frame than the path's` : ""}`);
     const group = new Group();
+    group.position.set(...["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
     const isBroad = this.get("Line Style") === "Billboards";
     if (poses.length > 1) {
-      group.add(segments(chain(points), { rgb: this.color(), alpha: this.number("Alpha", 1), pixels: 2.5, metres: isBroad ? this.number("Line Width", 0.03) : null }));
+      // RViz draws broad lines without their alpha.
+      group.add(segments(chain(points), { rgb: this.color(), alpha: isBroad ? 1 : this.number("Alpha", 1), metres: isBroad ? this.number("Line Width", 0.03) : null }));
     }
     const style = this.get("Pose Style");
     if (style === "Axes" || style === "Arrows") {
-      const length = this.number(style === "Axes" ? "Length" : "Shaft Length", 0.3);
-      const material = bodyMaterial([255, 85, 255]);
-      for (const { pose } of poses.slice(0, MOST_KEPT)) {
-        group.add(posed(style === "Axes" ? axes(length, length / 10) : arrow(material, { shaft: length, shaftWidth: length / 5, head: length / 2, headWidth: length / 2 }), pose));
-      }
+      const material = bodyMaterial(this.color("Pose Color"));
+      const make = style === "Axes" ? () => axes(this.number("Length", 0.3), this.number("Radius", 0.03))
+        : () => arrow(material, {
+          shaft: this.number("Shaft Length", 0.1), shaftWidth: this.number("Shaft Diameter", 0.1),
+          head: this.number("Head Length", 0.2), headWidth: this.number("Head Diameter", 0.3) });
+      for (const { pose } of poses.slice(0, MOST_KEPT)) group.add(posed(make(), pose));
     }
-    return group;
+    return grouped(group);
   }
 
   show(message) {
@@ -182,8 +187,8 @@ export class Range extends LastMessage {
     }
     this.setStatus("Range", 0, `${Number(shown.toFixed(4))} m`);
     const width = 2 * shown * Math.tan(Math.min(angle, 3) / 2);
-    const cone = new Mesh(new ConeGeometry(width / 2, shown, 32, 1, true).rotateZ(Math.PI / 2).translate(shown / 2, 0, 0),
-      bodyMaterial(this.color(), Math.min(this.number("Alpha", 0.5), 0.99), { side: DoubleSide }));
+    const cone = new Mesh(new ConeGeometry(width / 2, shown, 32).rotateZ(Math.PI / 2).translate(shown / 2, 0, 0),
+      bodyMaterial(this.color(), Math.min(this.number("Alpha", 0.5), 0.99)));
     return grouped(cone);
   }
 }
@@ -202,7 +207,7 @@ export class PointStamped extends LastMessage {
 
 export class GridCells extends LastMessage {
   make({ cells, cell_width: width, cell_height: height }) {
-    const mesh = new InstancedMesh(BOX, bodyMaterial(this.color(), this.number("Alpha", 1)), cells.length);
+    const mesh = new InstancedMesh(BOX, plainMaterial(this.color(), this.number("Alpha", 1)), cells.length);
     const matrix = new Matrix4().makeScale(width * 0.96, height * 0.96, 0.002);
     cells.forEach(({ x, y, z }, index) => mesh.setMatrixAt(index, matrix.setPosition(x, y, z)));
     return grouped(mesh);
@@ -218,10 +223,26 @@ export class Wrench extends LastMessage {
       const vector = new Vector3(x, y, z).multiplyScalar(scale);
       const length = vector.length();
       if (!Number.isFinite(length)) throw new Error("Message contained invalid floating point values (nans or infs)");
-      if (length < 1e-6) continue;
-      const shape = arrow(bodyMaterial(this.color(name), this.number("Alpha", 1)), { shaft: length * 0.8, shaftWidth: 0.1 * width, head: length * 0.2, headWidth: 0.25 * width });
+      if (length < 1e-6 || (length <= width && this.get("Hide Small Values") !== false)) continue;
+      // As RViz: the shaft alone is as long as the value.
+      const material = bodyMaterial(this.color(name), this.number("Alpha", 1));
+      const shape = arrow(material, { shaft: length, shaftWidth: 0.1 * width, head: length * 0.3, headWidth: 0.2 * width });
       group.add(directed(shape, new Vector3(), vector));
+      if (name === "Torque Color") group.add(this.turn(vector, width, material));
     }
+    return group;
+  }
+
+  /** Return the circle around a torque's arrow, with the direction in which it turns. */
+  turn(vector, width, material) {
+    const length = vector.length();
+    const group = new Group();
+    const points = Float32Array.from({ length: 29 }, (_, step) => ((step + 4) * Math.PI) / 16).reduce((all, angle) =>
+      [...all, (Math.cos(angle) * length) / 4, (Math.sin(angle) * length) / 4, length / 2], []);
+    group.add(segments(chain(Float32Array.from(points)), { rgb: this.color("Torque Color"), alpha: this.number("Alpha", 1), metres: width * 0.05 }));
+    const head = arrow(material, { shaft: 0, shaftWidth: 0, head: width * 0.1, headWidth: width * 0.2 });
+    group.add(directed(head, new Vector3(length / 4, 0, length / 2), new Vector3(length / 4, 1, length / 2)));
+    group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), vector.clone().normalize());
     return group;
   }
 }

@@ -1,0 +1,415 @@
+"""`PYTHONPATH=. python tests/interop/rviz_pictures.py FOLDER [SCENE...]`: pictures of Debian's RViz and of our 3D view.
+
+Both open the same .rviz file on the same topics and draw from the same camera; each scene becomes one picture, RViz on the left.
+RViz runs under Xvfb, by Mesa's software renderer: apt-get install rviz xvfb libgl1-mesa-dri.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import contextlib
+import io
+import json
+import os
+import shutil
+import struct
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import Point, Point32, PoseStamped
+from nav_msgs.msg import GridCells
+from nav_msgs.msg import Path as PathMessage
+from PIL import Image
+from sensor_msgs.msg import ChannelFloat32, PointCloud
+from visualization_msgs.msg import Marker, MarkerArray
+
+from minirospy.bridge.access import Access
+from minirospy.bridge.bridge import BridgeOptions
+from tests.dashboard.conftest import TOKEN, Served
+from tests.interop import robot_scene
+from tests.interop.browser import PATIENCE, Page
+from tests.interop.conftest import running_master
+
+__all__ = ["HEIGHT", "SCENES", "WIDTH", "Rviz", "has_rviz", "our_picture", "prepare", "publish", "write_file"]
+
+WIDTH, HEIGHT = 640, 480
+_DEPTH = 24
+
+Settings = dict[str, object]
+
+STL = b"\0" * 80 + struct.pack("<I", 4)
+_CORNERS = ((0.0, 0.0, 0.4), (0.3, 0.2, 0.0), (-0.3, 0.2, 0.0), (0.0, -0.35, 0.0))
+for _a, _b, _c in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)):
+    STL += struct.pack("<12f", 0, 0, 0, *_CORNERS[_a], *_CORNERS[_b], *_CORNERS[_c]) + b"\0\0"
+"""A pyramid, 0.4 m high."""
+
+
+def display(cls: str, topic: str = "", **settings: object) -> Settings:
+    """Return a display; what is not given has the default of each program."""
+    key = {"Marker": "Marker Topic", "MarkerArray": "Marker Topic"}.get(cls, "Topic")
+    found: Settings = {
+        "Class": f"rviz/{cls}",
+        "Name": f"{cls} {topic}".strip(),
+        "Enabled": True,
+        "Value": True,
+    }
+    if topic:
+        found[key] = topic
+    return {**found, **{name.replace("_", " "): value for name, value in settings.items()}}
+
+
+def orbit(
+    distance: float, x: float = 0, y: float = 0, z: float = 0, yaw: float = 0.785, pitch: float = 0.785
+) -> Settings:
+    focus = {"X": x, "Y": y, "Z": z}
+    return {
+        "Class": "rviz/Orbit",
+        "Distance": distance,
+        "Focal Point": focus,
+        "Yaw": yaw,
+        "Pitch": pitch,
+        "Target Frame": "<Fixed Frame>",
+    }
+
+
+def mesh(x: float, y: float, file: str, **fields: Any) -> Marker:
+    found = robot_scene.marker(
+        Marker.MESH_RESOURCE, x, y, mesh_resource=f"package://rviz_meshes/{file}", **fields
+    )
+    found.scale.x = found.scale.y = found.scale.z = 1.0
+    return found
+
+
+def _old_cloud() -> PointCloud:
+    points = [Point32(-3 + 0.1 * n, 3.2, 0.3) for n in range(30)]
+    channels = [ChannelFloat32("intensity", [float(n) for n in range(30)])]
+    return robot_scene.stamped(PointCloud, "map", points=points, channels=channels)
+
+
+def _posed_path() -> PathMessage:
+    poses = [
+        robot_scene.stamped(PoseStamped, "map", pose=robot_scene.pose(-3.5 + n * 0.5, -3.0, n * 0.4))
+        for n in range(8)
+    ]
+    return robot_scene.stamped(PathMessage, "map", poses=poses)
+
+
+def _two_point_arrow() -> Marker:
+    found = robot_scene.marker(Marker.ARROW, -3.2, -1.4, points=[Point(0, 0, 0), Point(0.8, 0.3, 0.3)])
+    found.id = 100
+    found.scale.x, found.scale.y, found.scale.z = 0.08, 0.16, 0.2
+    return found
+
+
+def _glass() -> list[Marker]:
+    found = [robot_scene.marker(Marker.CUBE, 1.6, -1.2), robot_scene.marker(Marker.SPHERE, 1.9, -1.2)]
+    for index, each in enumerate(found):
+        each.id = 101 + index
+        each.color.a = 0.5
+    return found
+
+
+def _cells() -> GridCells:
+    cells = [Point(-2.0 + 0.25 * (n % 4), 1.0 + 0.25 * (n // 4), 0) for n in range(12)]
+    return robot_scene.stamped(GridCells, "map", cell_width=0.25, cell_height=0.25, cells=cells)
+
+
+def shapes() -> MarkerArray:
+    """Return a marker of each type, and glass."""
+    return MarkerArray(
+        [*robot_scene.markers().markers, _two_point_arrow(), *_glass(), mesh(2.6, -3.2, "part.stl")]
+    )
+
+
+def messages() -> dict[str, Any]:
+    """Return all messages, by their topics."""
+    found = robot_scene.everything()
+    # More than RViz hides as a small value.
+    found["/wrench"].wrench.torque.y = 0.5
+    return {
+        **found,
+        "/shapes": shapes(),
+        "/old_cloud": _old_cloud(),
+        "/posed": _posed_path(),
+        "/cells": _cells(),
+    }
+
+
+def description() -> str:
+    """Return the robot, with a mesh."""
+    part = '<visual><origin xyz="0 0 0.08"/><geometry><mesh filename="package://rviz_meshes/part.stl"/></geometry>'
+    return robot_scene.description(
+        part + '<material name="of_part"><color rgba="0.9 0.6 0.1 1"/></material></visual>'
+    )
+
+
+SCENES: dict[str, tuple[list[Settings], Settings]] = {
+    "robot": (
+        [
+            display("Grid"),
+            display("TF"),
+            display("RobotModel", Robot_Description="robot_description"),
+            display("LaserScan", "/scan"),
+            display("PointCloud2", "/cloud", Color_Transformer="RGB8"),
+            display("Map", "/map"),
+            display("Path", "/plan"),
+            display("Polygon", "/footprint"),
+        ],
+        orbit(5.5, x=0.9, y=0.2, yaw=-0.9, pitch=0.6),
+    ),
+    "markers": (
+        [display("Grid"), display("MarkerArray", "/shapes")],
+        orbit(6.2, x=0.1, y=-2.5, yaw=-1.3, pitch=0.75),
+    ),
+    "poses": (
+        [
+            display("Grid"),
+            display("Axes"),
+            display("Pose", "/goal"),
+            display("PoseArray", "/particles"),
+            display("PoseWithCovariance", "/estimate"),
+            display("Odometry", "/odometry"),
+            display("Range", "/sonar"),
+            display("WrenchStamped", "/wrench"),
+            display("PointStamped", "/point"),
+            display("GridCells", "/cells"),
+            {**display("Path", "/posed", Pose_Style="Arrows"), "Name": "arrows"},
+        ],
+        orbit(7, x=0.4, y=0.1, yaw=-1.2, pitch=0.8),
+    ),
+    "clouds": (
+        [
+            {
+                **display("PointCloud2", "/cloud", Color_Transformer="AxisColor", Style="Spheres"),
+                "Size (m)": 0.03,
+            },
+            {**display("LaserScan", "/scan", Style="Boxes"), "Size (m)": 0.06},
+            display("PointCloud", "/old_cloud", Style="Points"),
+            display("Map", "/map", Color_Scheme="costmap"),
+            {**display("Path", "/plan", Line_Style="Billboards", Alpha=0.5), "Line Width": 0.1},
+            {**display("PoseArray", "/particles", Shape="Arrow (3D)"), "Name": "particles"},
+            {**display("Path", "/posed", Pose_Style="Axes"), "Name": "axes"},
+        ],
+        orbit(8, x=-0.5, y=0.5, yaw=-1.2, pitch=0.8),
+    ),
+}
+"""Name -> displays, and the view."""
+
+
+def write_file(path: Path, scene: str) -> None:
+    """Write the .rviz file of a scene; JSON is YAML."""
+    displays, view = SCENES[scene]
+    manager = {
+        "Class": "",
+        "Name": "root",
+        "Enabled": True,
+        "Displays": displays,
+        "Global Options": {
+            "Background Color": "48; 48; 48",
+            "Fixed Frame": "map",
+            "Default Light": True,
+            "Frame Rate": 30,
+        },
+        "Tools": [{"Class": "rviz/MoveCamera"}],
+        "Views": {"Current": view},
+    }
+    window = {"Width": WIDTH, "Height": HEIGHT, "X": 0, "Y": 0}
+    path.write_text(
+        json.dumps({"Panels": [], "Visualization Manager": manager, "Window Geometry": window}),
+        encoding="utf-8",
+    )
+
+
+def has_rviz() -> bool:
+    """Return whether RViz and Xvfb are installed."""
+    return Path("/usr/bin/rviz").exists() and bool(shutil.which("Xvfb"))
+
+
+class Rviz:
+    """RViz under Xvfb with a file, without menus: the window is the picture."""
+
+    def __init__(self, file: Path, folder: Path) -> None:
+        self._frame = folder / "Xvfb_screen0"
+        self._stack = contextlib.ExitStack()
+        try:
+            number = self._start_display(folder)
+            environment = {**os.environ, "DISPLAY": f":{number}", "LIBGL_ALWAYS_SOFTWARE": "1"}
+            words = ["/usr/bin/rviz", "-d", str(file), "--fullscreen", "--splash-screen", ""]
+            self._start(words, env=environment)
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, words: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options)
+
+        def end() -> None:
+            process.terminate()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+        self._stack.callback(end)
+        return process
+
+    def _start_display(self, folder: Path) -> int:
+        """Start Xvfb; return its number, which it chooses."""
+        reading, writing = os.pipe()
+        screen = f"{WIDTH}x{HEIGHT}x{_DEPTH}"
+        words = [
+            "Xvfb",
+            "-displayfd",
+            str(writing),
+            "-screen",
+            "0",
+            screen,
+            "-nocursor",
+            "-nolisten",
+            "tcp",
+            "-fbdir",
+            str(folder),
+        ]
+        self._start(words, pass_fds=[writing])
+        os.close(writing)
+        with os.fdopen(reading) as numbers:
+            return int(numbers.readline())
+
+    def picture(self) -> Image.Image:
+        """Return what is on the screen; Xvfb keeps it as a file of xwd."""
+        data = self._frame.read_bytes()
+        size, width, height, line, colors = (
+            struct.unpack_from(">I", data, at)[0] for at in (0, 16, 20, 48, 76)
+        )
+        start = size + colors * 12
+        return Image.frombuffer(
+            "RGB", (width, height), data[start : start + line * height], "raw", "BGRX", line, 1
+        )
+
+    def settled(self, seconds: float = 4.0) -> Image.Image:
+        """Return the picture, once it has not changed for some seconds and is more than a background."""
+        end = time.monotonic() + PATIENCE
+        picture, since = self.picture(), time.monotonic()
+        while time.monotonic() - since < seconds or len(picture.getcolors(WIDTH * HEIGHT) or ()) < 20:
+            assert time.monotonic() < end, "RViz shows nothing"
+            time.sleep(0.3)
+            now = self.picture()
+            if now.tobytes() != picture.tobytes():
+                picture, since = now, time.monotonic()
+        return picture
+
+    def close(self) -> None:
+        """End RViz and its display."""
+        self._stack.close()
+
+
+def our_picture(page: Page) -> Image.Image:
+    """Return the picture of the page's 3D view, in RViz's size."""
+    clip = {"x": 0, "y": 0, "width": WIDTH, "height": HEIGHT, "scale": 1}
+    data = base64.b64decode(page.call("Page.captureScreenshot", format="png", clip=clip)["data"])
+    return Image.open(io.BytesIO(data)).convert("RGB")
+
+
+def enlarge(page: Page) -> None:
+    """Let the picture of the 3D view be all of the page's upper left corner, in RViz's size; wait until all displays are fine."""
+    page.wait(
+        "const all = [...document.querySelectorAll('.displays .display')];"
+        "return all.length && all.every(e => e.dataset.level === 'ok')"
+    )
+    style = f"position:fixed;inset:0 auto auto 0;width:{WIDTH}px;height:{HEIGHT}px;z-index:99;border:0;border-radius:0;margin:0"
+    page.evaluate(f"document.querySelector('.scene').style.cssText = {json.dumps(style)}")
+    page.wait(
+        "const c = document.querySelector('canvas.stage'); "
+        f"return c.clientWidth === {WIDTH} && c.clientHeight === {HEIGHT}"
+    )
+    drawn = int(page.evaluate("Number(document.querySelector('canvas.stage').dataset.drawn)"))
+    page.wait(f"return Number(document.querySelector('canvas.stage').dataset.drawn) > {drawn}")
+
+
+def prepare(folder: Path) -> None:
+    """Make the package whose meshes the scenes have."""
+    package = folder / "rviz_meshes"
+    package.mkdir()
+    (package / "package.xml").write_text(
+        '<package format="2"><name>rviz_meshes</name><version>0.0.1</version><description>Meshes</description>'
+        '<maintainer email="a@b.cd">A</maintainer><license>BSD</license></package>',
+        encoding="utf-8",
+    )
+    (package / "part.stl").write_bytes(STL)
+
+
+def publish(served: Served, all_messages: Mapping[str, Any]) -> None:
+    """Publish latched messages, and set the robot's description."""
+    node = served.node("robot")
+
+    async def run() -> None:
+        await node.set_param("/robot_description", description())
+        for topic, message in all_messages.items():
+            publisher = await node.advertise(topic, type(message), latch=True)
+            await publisher.publish(message)
+
+    served.run(run())
+
+
+@contextlib.contextmanager
+def robot() -> Iterator[Served]:
+    """Run a master, a dashboard and a node that publishes the messages."""
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        prepare(folder)
+        os.environ.update(
+            ROS_HOSTNAME="localhost", ROS_HOME=str(folder / "home"), ROS_PACKAGE_PATH=str(folder)
+        )
+        os.environ["ROS_MASTER_URI"] = stack.enter_context(running_master("ours"))
+        served = Served(BridgeOptions(foxglove_port=0, diagnostics=False, access=Access(write_token=TOKEN)))
+        served.start()
+        stack.callback(served.close)
+        publish(served, messages())
+        yield served
+
+
+def compare(served: Served, scene: str) -> tuple[Image.Image, Image.Image]:
+    """Return the pictures of a scene: RViz's, ours."""
+    assert served.dashboard
+    with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
+        file = Path(name, "scene.rviz")
+        write_file(file, scene)
+        rviz = Rviz(file, Path(name))
+        stack.callback(rviz.close)
+        served.dashboard.rviz.file = file
+        page = Page(f"http://127.0.0.1:{served.port}/#/3d?file=1&token={TOKEN}", width=1100, height=700)
+        stack.callback(page.close)
+        enlarge(page)
+        return rviz.settled(), our_picture(page)
+
+
+def main() -> None:
+    """Take the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help=f"of {', '.join(SCENES)}; all, if none is named"
+    )
+    words = parser.parse_args()
+    if unknown := set(words.scenes) - set(SCENES):
+        parser.error(f"there is no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
+    if not has_rviz():
+        raise SystemExit("RViz and Xvfb are needed: apt-get install rviz xvfb libgl1-mesa-dri")
+    words.folder.mkdir(parents=True, exist_ok=True)
+    with robot() as served:
+        for scene in words.scenes or SCENES:
+            both = Image.new("RGB", (2 * WIDTH + 4, HEIGHT), "white")
+            for index, picture in enumerate(compare(served, scene)):
+                both.paste(picture, (index * (WIDTH + 4), 0))
+            both.save(words.folder / f"rviz_{scene}.webp", quality=88, method=6)
+            print(words.folder / f"rviz_{scene}.webp")
+
+
+if __name__ == "__main__":
+    main()
