@@ -65,6 +65,8 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
+    # rospy logs its own warnings by the logger of the program, whose level may hide them.
+    terminal.addFilter(lambda record: _rosout.isEnabledFor(record.levelno))
     _add_handler(session, ours, terminal)
     if path.parent.parent == session.identity.environment.log_dir:
         _link_latest(path.parent)
