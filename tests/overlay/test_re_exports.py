@@ -28,6 +28,7 @@ SHARED = {
     "rosbag/internals.py",
     "rosbag/opening.py",
     "rosbag/private.py",
+    "rosbag/readers.py",
     "rpi.py",
     "rospy/live.py",
     "rospy/passing.py",

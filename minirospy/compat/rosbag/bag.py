@@ -36,6 +36,7 @@ from minirospy.compat.rosbag.private import (
     ConnectionFilter,
     nanoseconds_of,
 )
+from minirospy.compat.rosbag.readers import _BagReader, _BagReader200
 from minirospy.errors import BagCompressionError, BagError
 
 if TYPE_CHECKING:
@@ -123,6 +124,11 @@ class Bag(OpenedBag):
         try:
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
+            self._create_reader()
+            # Ours reads the index when it is needed; a reader of the program's own may show its progress now.
+            if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
+                self._reader.prepare()
+            self._connection_indexes_read = not skip_index
         except BaseException:
             self._version = None
             self._close_file()
@@ -280,7 +286,7 @@ class Bag(OpenedBag):
         What cannot be recovered is cut off where the bag was opened to append.
         """
         if self._version and self._version < 200:
-            reader = self._reader
+            reader = self._source
             if isinstance(reader, Reader12):
                 yield from reader.scan()
             return
@@ -289,7 +295,7 @@ class Bag(OpenedBag):
         repair = Repair(stream)
         with as_ros_errors():
             yield from repair.run()
-            self._reader = ChunkedReader(
+            self._source = ChunkedReader(
                 stream, repair.connections, repair.chunks, headers=dict(repair.headers)
             )
             if self._mode != "r":
@@ -363,6 +369,10 @@ class Bag(OpenedBag):
         except LookupError:
             print(f'Error getting key "{key}"', file=sys.stderr)
             return None
+
+    def _create_reader(self) -> None:
+        """Make ``_reader``, by which programs reach into the bag; a derived class may put another one there."""
+        self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
     # -- inside ---------------------------------------------------------------------------------------------------
 

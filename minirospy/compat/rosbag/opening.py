@@ -34,7 +34,8 @@ class OpenedBag(PrivateBag):
         self._filename: str | os.PathLike[str] | None = None
         self._version: int | None = None
         self._mode = mode
-        self._reader: BagReader | None = None
+        self._source: BagReader | None = None
+        """What reads the file; ``_reader`` is the real module's name for what a program may replace."""
         self._writer: BagWriter | None = None
         self._is_read = False
         """Whether the file's position may be another than the writer left."""
@@ -42,9 +43,9 @@ class OpenedBag(PrivateBag):
     def _current(self) -> BagReader:
         """Return the reader, which also knows what has been written so far."""
         stream = self._open_file()
-        reader = self._reader
+        reader = self._source
         if reader is None:
-            reader = self._reader = ChunkedReader(stream, {}, self._writer.chunks if self._writer else [])
+            reader = self._source = ChunkedReader(stream, {}, self._writer.chunks if self._writer else [])
         if self._writer:
             self._is_read = True
             for connection in self._writer.connections:
@@ -57,13 +58,13 @@ class OpenedBag(PrivateBag):
         self._version = read_version(stream)
         stream.seek(position)
         try:
-            self._reader = open_bag(stream)
+            self._source = open_bag(stream)
         except BagUnindexedError:
             if not allow_unindexed:
                 raise
             if self._version < 200:
                 stream.seek(position)
-                self._reader = unindexed_bag12(stream)
+                self._source = unindexed_bag12(stream)
 
     def _open_write(self, f: FileArgument, allow_unindexed: bool) -> None:
         self._file = self._take(f, "w+b")
@@ -100,7 +101,7 @@ class OpenedBag(PrivateBag):
             chunk_threshold=self._chunk_threshold,
             continued=Continued(connections.values(), chunks, position),
         )
-        self._reader = None
+        self._source = None
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
         """Return the open file, or open a path."""
@@ -120,8 +121,8 @@ class OpenedBag(PrivateBag):
         return io.UnsupportedOperation("write") if self._mode == "r" else ROSBagUnindexedException()
 
     def _close_file(self) -> None:
-        if self._reader:
-            self._reader.close()
+        if self._source:
+            self._source.close()
         if self._file is not None:
             self._file.close()
             self._file = None

@@ -52,6 +52,11 @@ class BagMessageWithConnectionHeader(NamedTuple):
 class PrivateBag(ABC):
     """The private names of rosbag.Bag."""
 
+    _connection_indexes_read = False
+    """Whether the index has been read, or is read when it is needed."""
+    _chunks_of_program: Iterable[_ChunkInfo] | None = None
+    """What a program has put in the place of the list of chunks."""
+
     @abstractmethod
     def _current(self) -> BagReader:
         """Return the reader, which also knows what has been written so far."""
@@ -70,8 +75,14 @@ class PrivateBag(ABC):
         return {number: _ConnectionInfo.of(each) for number, each in self._current().connections.items()}
 
     @property
-    def _chunks(self) -> list[_ChunkInfo]:
+    def _chunks(self) -> Iterable[_ChunkInfo]:
+        if self._chunks_of_program is not None:
+            return self._chunks_of_program
         return list(map(_ChunkInfo.of, self._current().chunks))
+
+    @_chunks.setter
+    def _chunks(self, chunks: Iterable[_ChunkInfo]) -> None:
+        self._chunks_of_program = chunks
 
     @property
     def _chunk_headers(self) -> dict[int, _ChunkHeader]:
