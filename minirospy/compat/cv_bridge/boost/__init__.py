@@ -1,0 +1,1 @@
+"""cv_bridge.boost: what cv_bridge has in C++, here in Python."""
