@@ -10,6 +10,7 @@ Definitions may come from strangers: names are written only after ``validate`` h
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from minirospy.idl.codec import keeps_buffer, lazy_arrays, write_deserialize, write_serialize
@@ -126,12 +127,11 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
     return _Module(_checked(lookup)).source([spec.request, spec.response], spec, f"{spec.full_name}.srv")
 
 
-def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
-    """Return the ``__init__`` of a package's msg or srv folder: module -> the names that it holds.
+def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
+    """Return the ``__init__`` of a package's msg or srv folder. Module ``_Name`` holds ``Name`` with each of ``parts`` after it.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError as :func:`emit_message`.
     """
-    names = {name: module for module, held in modules.items() for name in held}
     for name in names:
         check_type_name(f"{package}/{name}")
 
@@ -141,8 +141,10 @@ def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
         "import importlib",
         "from typing import Any",
         "",
-        f"_MODULES = {names!r}",
-        f"__all__ = {sorted(names)!r}",
+        # Short, since a wheel has hundreds of these.
+        f"_NAMES = {' '.join(names)!r}.split()",
+        f'_MODULES = {{name + part: "_" + name for name in _NAMES for part in {tuple(parts)!r}}}',
+        "__all__ = sorted(_MODULES)",
         "",
         "",
         "def __getattr__(name: str) -> Any:",

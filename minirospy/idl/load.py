@@ -182,12 +182,12 @@ def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
     for service in services:
         sources[f"srv/_{service.name}.py"] = emit_service(service, catalogue.message)
     if messages:
-        names = {f"_{message.name}": [message.name] for message in messages}
-        sources["msg/__init__.py"] = emit_package(package, "msg", names)
+        sources["msg/__init__.py"] = emit_package(package, "msg", [each.name for each in messages])
         sources["msg/__init__.pyi"] = emit_stub(messages)
     if services:
-        names = {f"_{each.name}": [each.name, each.request.name, each.response.name] for each in services}
-        sources["srv/__init__.py"] = emit_package(package, "srv", names)
+        sources["srv/__init__.py"] = emit_package(
+            package, "srv", [each.name for each in services], ("", "Request", "Response")
+        )
         parts = [message for service in services for message in (service.request, service.response)]
         sources["srv/__init__.pyi"] = emit_stub(parts, services)
     return sources
@@ -217,11 +217,16 @@ def _on_demand(sources: dict[str, str], package: str) -> dict[str, str]:
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     call = f"add_package({package!r}, {fingerprint})"
-    head = f"\nfrom minirospy.idl.on_demand import add_package\n\n{call}\n"
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
-    for name in kept:
+    for name, text in kept.items():
         if name.endswith("__init__.py"):
-            kept[name] += head
+            # What emit_package writes into each such file is here in one place.
+            doc, _, rest = text.partition("import importlib\n")
+            names = rest[rest.index("_NAMES") : rest.index("\n\n\ndef ")]
+            kept[name] = (
+                f"{doc}from minirospy.idl.on_demand import add_package, accessors\n\n{names}\n"
+                f"__getattr__, __dir__ = accessors(__name__, _MODULES)\n\n{call}\n"
+            )
     return kept
 
 

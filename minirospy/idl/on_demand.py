@@ -7,8 +7,9 @@ any module. Where that folder cannot be written to, the module is compiled again
 
 from __future__ import annotations
 
+import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import spec_from_file_location
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from minirospy.idl.load import Catalogue
 
-__all__ = ["add_package"]
+__all__ = ["accessors", "add_package"]
 
 
 def add_package(package: str, fingerprint: int) -> None:
@@ -31,6 +32,21 @@ def add_package(package: str, fingerprint: int) -> None:
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
     _FINDER.packages[package] = fingerprint
+
+
+def accessors(
+    package: str, modules: Mapping[str, str]
+) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return the ``__getattr__`` and ``__dir__`` of ``pkg.msg`` or ``pkg.srv``; ``modules``: names -> the modules with them."""
+
+    def load(name: str) -> object:
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value: object = getattr(importlib.import_module(f"{package}.{modules[name]}"), name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return load, lambda: sorted(modules)
 
 
 class _Finder:

@@ -138,7 +138,7 @@ def test_type_name_with_anything_but_a_name_is_refused(name: str) -> None:
 def test_package_whose_folder_or_file_is_an_attack_is_refused(name: str) -> None:
     package, _, short = name.partition("/")
     with pytest.raises(DefinitionError):
-        emit_package(package, "msg", {f"_{short}": [short]})
+        emit_package(package, "msg", [short])
     with pytest.raises(DefinitionError):
         emit_service(parse_service("---\n", package, short), {}.__getitem__)
     assert not EXECUTED
