@@ -11,19 +11,31 @@ import concurrent.futures
 import contextlib
 import functools
 import importlib
-import ipaddress
 import json
 import logging
-import os
-import re
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from minirospy.bridge.fleet.rules import Lane
+from minirospy.bridge.zenoh_library import (
+    DEFAULT_ENDPOINT,
+    DEFAULT_PORT,
+    Declared,
+    NetworkOptions,
+    Outlet,
+    Query,
+    Reply,
+    Sample,
+    Session,
+    configured,
+    is_loopback_endpoint,
+    one_line,
+    require_zenoh,
+    to_endpoint,
+)
 from minirospy.errors import BridgeError, MinirospyError
-from minirospy.escape import escaped, has_controls
+from minirospy.escape import escaped
 
 __all__ = [
     "DEFAULT_ENDPOINT",
@@ -41,17 +53,8 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-DEFAULT_PORT = 7447
-DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 MOST_TEXT = 16 << 20
 """Bytes of a query or a reply that is read at most: a response of a service, a definition."""
-
-_SESSIONS = 10_000
-_SEND_BUFFER = 65_536
-_THREADS = f"({', '.join(f'{pool}: (worker_threads: 32)' for pool in ('rx', 'acc', 'app', 'tx', 'net'))})"
-"""Measured: 100 robots that are lost together take more than 40 s to be shown again with Zenoh's own one or two threads in each
-pool, 1 to 7 s with 32. Why is inferred, not known: a thread that closes a dead link seems to wait up to 10 s (SO_LINGER)."""
-_CONNECT_MS = 3000
 _RETRY_SECONDS = 1.0
 _QUERIES = 200
 """Calls of services and parameters that are answered at the same time; more are refused."""
@@ -59,150 +62,17 @@ _CONTROL_QUERIES = 50
 """The same of pings, reports and definitions, which calls that wait must not hold up."""
 
 
-# --- what is used of zenoh, which has no types where it is not installed
-
-
-class _Bytes(Protocol):
-    def to_bytes(self) -> bytes: ...
-
-    def __len__(self) -> int: ...
-
-
-class _Sample(Protocol):
-    key_expr: object
-    payload: _Bytes
-    kind: object
-    attachment: _Bytes | None
-
-
-class _ReplyError(Protocol):
-    payload: _Bytes
-
-
-class _Reply(Protocol):
-    ok: _Sample | None
-    err: _ReplyError | None
-
-
-class _Query(Protocol):
-    key_expr: object
-    payload: _Bytes | None
-
-    def reply(self, key_expr: object, payload: bytes) -> None: ...
-
-    def reply_err(self, payload: bytes) -> None: ...
-
-    def drop(self) -> None: ...
-
-
-class Declared(Protocol):
-    """What has been declared, until it is undeclared."""
-
-    def undeclare(self) -> None: ...
-
-
-class Outlet(Protocol):
-    """A publisher of Zenoh. ``put`` may block."""
-
-    def put(self, payload: bytes, *, attachment: bytes) -> None: ...
-
-    def undeclare(self) -> None: ...
-
-
-class _Liveliness(Protocol):
-    def declare_token(self, key: str) -> Declared: ...
-
-    def declare_subscriber(self, key: str, handler: object, *, history: bool) -> Declared: ...
-
-    def get(self, key: str, handler: object, *, timeout: float) -> None: ...
-
-
-class _Info(Protocol):
-    def routers_zid(self) -> list[object]: ...
-
-    def peers_zid(self) -> list[object]: ...
-
-
-class _Session(Protocol):
-    info: _Info
-
-    def liveliness(self) -> _Liveliness: ...
-
-    def declare_subscriber(self, key: str, handler: object) -> Declared: ...
-
-    def declare_publisher(self, key: str, **options: object) -> Outlet: ...
-
-    def declare_queryable(self, key: str, handler: object, *, complete: bool) -> Declared: ...
-
-    def get(self, key: str, handler: object, **options: object) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class _Config(Protocol):
-    def get_json(self, key: str) -> str: ...
-
-    def insert_json5(self, key: str, value: str) -> None: ...
-
-
 # --- the network
-
-
-@dataclass(frozen=True)
-class NetworkOptions:
-    """Where a gateway connects and listens. Without any it connects to a router of this machine, and listens nowhere.
-
-    ``config``: a file in Zenoh's format, for TLS, users and all else. ``scouts``: whether it looks for others by multicast.
-    """
-
-    connect: tuple[str, ...] = ()
-    listen: tuple[str, ...] = ()
-    config: str = ""
-    scouts: bool = False
 
 
 class QueryFailed(MinirospyError):
     """A query got no answer, or one that says why it failed."""
 
 
-def to_endpoint(text: str) -> str:
-    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise BridgeError."""
-    if not text or has_controls(text) or " " in text:
-        raise BridgeError(f"[{escaped(text)}] is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
-    if "/" in text:
-        return text
-    has_port = re.search(r"(^[^:]*|\]):\d+$", text)
-    return f"tcp/{text}" if has_port else f"tcp/{text}:{DEFAULT_PORT}"
-
-
-def is_loopback_endpoint(endpoint: str) -> bool:
-    """Return whether an endpoint is on this machine."""
-    address = endpoint.partition("/")[2].partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
-    if address == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return False
-
-
-def require_zenoh(*, has_many_links: bool = False) -> None:
-    """Raise BridgeError with what to install where Zenoh's library is missing; ``has_many_links``: others will connect."""
-    if has_many_links:
-        # Before the import: Zenoh reads it once.
-        os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
-    try:
-        importlib.import_module("zenoh")
-    except ImportError as error:
-        raise BridgeError(
-            "the fleet needs the library eclipse-zenoh: python -m pip install 'minirospy[fleet]'"
-        ) from error
-
-
 class FleetNetwork:
     """A session of Zenoh; made by :meth:`open`. Handlers are called on the loop that opened it."""
 
-    def __init__(self, session: _Session, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, session: Session, loop: asyncio.AbstractEventLoop) -> None:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
@@ -219,7 +89,7 @@ class FleetNetwork:
         require_zenoh(has_many_links=bool(options.listen or options.config))
         zenoh = importlib.import_module("zenoh")
         loop = asyncio.get_running_loop()
-        config = _configured(options)
+        config = configured(options)
         endpoints = ", ".join(json.loads(config.get_json("connect/endpoints") or "[]"))
         is_reported = False
 
@@ -227,7 +97,7 @@ class FleetNetwork:
             try:
                 return cls(await loop.run_in_executor(None, functools.partial(zenoh.open, config)), loop)
             except zenoh.ZError as error:
-                text = _one_line(error)
+                text = one_line(error)
                 if "Unable to connect" not in text:
                     raise BridgeError(f"the fleet's network cannot be opened: {text}") from error
                 if not waits:
@@ -269,7 +139,7 @@ class FleetNetwork:
         """Call ``changed(key, is_there)`` for each token that is there, and whenever one comes or goes."""
         put = self._zenoh.SampleKind.PUT
 
-        def arrived(sample: _Sample) -> None:
+        def arrived(sample: Sample) -> None:
             self._soon(changed, str(sample.key_expr), sample.kind == put)
 
         return self._declare(
@@ -282,7 +152,7 @@ class FleetNetwork:
         """Return the keys of the tokens that are there."""
         found: list[str] = []
 
-        def arrived(reply: _Reply) -> None:
+        def arrived(reply: Reply) -> None:
             if reply.ok is not None:
                 found.append(str(reply.ok.key_expr))
 
@@ -296,7 +166,7 @@ class FleetNetwork:
     def subscribe(self, key: str, deliver: Callable[[str, bytes, bytes], object]) -> Later:
         """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block."""
 
-        def arrived(sample: _Sample) -> None:
+        def arrived(sample: Sample) -> None:
             attachment = sample.attachment
             try:
                 deliver(
@@ -335,7 +205,7 @@ class FleetNetwork:
         """
         share = self._control if is_control else self._calls
 
-        def arrived(query: _Query) -> None:
+        def arrived(query: Query) -> None:
             self._soon(self._start_answer, query, handler, share)
 
         return self._declare(
@@ -358,7 +228,7 @@ class FleetNetwork:
         """Return all answers by their keys."""
         found: dict[str, bytes | QueryFailed] = {}
 
-        def arrived(reply: _Reply) -> None:
+        def arrived(reply: Reply) -> None:
             if reply.ok is not None:
                 is_short = len(reply.ok.payload) <= MOST_TEXT
                 found[str(reply.ok.key_expr)] = (
@@ -387,9 +257,7 @@ class FleetNetwork:
 
     # --- within
 
-    async def _collected(
-        self, start: Callable[[object], object], arrived: Callable[[_Reply], object]
-    ) -> None:
+    async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], object]) -> None:
         """Start a query, and return when its last reply has arrived."""
         if self._is_closed:
             raise QueryFailed("the gateway is closed")
@@ -398,7 +266,7 @@ class FleetNetwork:
         try:
             await self._loop.run_in_executor(self._caller, start, handler)
         except self._zenoh.ZError as error:
-            raise QueryFailed(_one_line(error)) from error
+            raise QueryFailed(one_line(error)) from error
         await ended.wait()
 
     def _declare(self, declare: Callable[[], Declared]) -> Later:
@@ -409,7 +277,7 @@ class FleetNetwork:
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
-        self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
     ) -> None:
         task = asyncio.ensure_future(self._answer(query, handler, share))
         for tasks in (self._answering, share.tasks):
@@ -417,7 +285,7 @@ class FleetNetwork:
             task.add_done_callback(tasks.discard)
 
     async def _answer(
-        self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
     ) -> None:
         key, payload = str(query.key_expr), query.payload
         reply: Callable[[], object] | None = None
@@ -485,63 +353,3 @@ class Later:
         if declared is not None:
             with contextlib.suppress(self._fault):
                 declared.undeclare()
-
-
-def _configured(options: NetworkOptions) -> _Config:
-    """Return Zenoh's configuration: the file's, and what the options say; nothing listens unless one of them says so."""
-    zenoh = importlib.import_module("zenoh")
-    default: _Config = zenoh.Config()
-    config: _Config = default
-    if options.config:
-        if not Path(options.config).is_file():
-            raise BridgeError(f"--config {options.config}: there is no such file")
-        try:
-            config = zenoh.Config.from_file(options.config)
-        except zenoh.ZError as error:
-            raise BridgeError(f"--config {options.config}: {_one_line(error)}") from error
-    untouched: _Config = zenoh.Config()
-
-    def is_set(key: str) -> bool:
-        return bool(options.config) and config.get_json(key) != untouched.get_json(key)
-
-    def put(key: str, value: object) -> None:
-        try:
-            config.insert_json5(key, json.dumps(value))
-        except zenoh.ZError as error:
-            raise BridgeError(f"{key} may not be {value}: {_one_line(error)}") from error
-
-    listens = bool(options.listen) or is_set("listen/endpoints")
-    connects = bool(options.connect) or is_set("connect/endpoints")
-    if options.listen:
-        put("listen/endpoints", list(options.listen))
-    elif not listens:
-        put("listen/endpoints", [])
-    if options.connect:
-        put("connect/endpoints", list(options.connect))
-    elif not (connects or listens or options.scouts):
-        put("connect/endpoints", [DEFAULT_ENDPOINT])
-    if not is_set("mode"):
-        # A router passes on between all that are connected to it; a client has one connection.
-        put("mode", "router" if listens else "peer" if options.scouts else "client")
-    mode = json.loads(config.get_json("mode"))
-    put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router goes on trying; a client without one does not open, and is opened again.
-    for key, value in (
-        ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
-        ("connect/exit_on_failure", mode == "client"),
-        ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
-        ("transport/unicast/max_sessions", _SESSIONS),
-        ("transport/unicast/accept_pending", 1000),
-        # What the kernel has taken waits before everything else: at 4 Mbit/s some 0.3 s instead of 1.3 s.
-        ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
-        # It would pass large messages between gateways of one machine by files in /dev/shm, which containers make small.
-        ("transport/shared_memory/enabled", False),
-    ):
-        if not is_set(key):
-            put(key, value)
-    return config
-
-
-def _one_line(error: Exception) -> str:
-    # The line of Zenoh's source in which it arose says nothing to a user.
-    return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

@@ -1,0 +1,246 @@
+"""Zenoh's library, for all bridges: what is used of it, which has no types here, and the configuration of a session."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import ipaddress
+import json
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from minirospy.errors import BridgeError
+from minirospy.escape import escaped, has_controls
+
+__all__ = [
+    "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "NetworkOptions", "Outlet", "Query", "Reply", "Sample",
+    "Session", "configured", "is_loopback_endpoint", "one_line", "require_zenoh", "to_endpoint",
+]  # fmt: skip
+
+DEFAULT_PORT = 7447
+DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+_SESSIONS = 10_000
+_SEND_BUFFER = 65_536
+_THREADS = f"({', '.join(f'{pool}: (worker_threads: 32)' for pool in ('rx', 'acc', 'app', 'tx', 'net'))})"
+"""Measured: 100 robots that are lost together take more than 40 s to be shown again with Zenoh's own one or two threads in each
+pool, 1 to 7 s with 32. Why is inferred, not known: a thread that closes a dead link seems to wait up to 10 s (SO_LINGER)."""
+_CONNECT_MS = 3000
+
+
+# --- what is used of zenoh, which has no types where it is not installed
+
+
+class Bytes(Protocol):
+    """A payload or an attachment."""
+
+    def to_bytes(self) -> bytes: ...
+
+    def __len__(self) -> int: ...
+
+
+class Sample(Protocol):
+    """A message, a reply, or a change of a token."""
+
+    key_expr: object
+    payload: Bytes
+    kind: object
+    attachment: Bytes | None
+
+
+class _ReplyError(Protocol):
+    payload: Bytes
+
+
+class Reply(Protocol):
+    """An answer to a query."""
+
+    ok: Sample | None
+    err: _ReplyError | None
+
+
+class Query(Protocol):
+    """A request."""
+
+    key_expr: object
+    payload: Bytes | None
+    attachment: Bytes | None
+
+    def reply(self, key_expr: object, payload: bytes, *, attachment: bytes = ...) -> None: ...
+
+    def reply_err(self, payload: bytes) -> None: ...
+
+    def drop(self) -> None: ...
+
+
+class Declared(Protocol):
+    """What has been declared, until it is undeclared."""
+
+    def undeclare(self) -> None: ...
+
+
+class Outlet(Protocol):
+    """A publisher of Zenoh. ``put`` may block."""
+
+    def put(self, payload: bytes, *, attachment: bytes) -> None: ...
+
+    def undeclare(self) -> None: ...
+
+
+class _Liveliness(Protocol):
+    def declare_token(self, key: str) -> Declared: ...
+
+    def declare_subscriber(self, key: str, handler: object, *, history: bool) -> Declared: ...
+
+    def get(self, key: str, handler: object, *, timeout: float) -> None: ...
+
+
+class _Info(Protocol):
+    def zid(self) -> object: ...
+
+    def routers_zid(self) -> list[object]: ...
+
+    def peers_zid(self) -> list[object]: ...
+
+
+class Session(Protocol):
+    """A session."""
+
+    info: _Info
+
+    def liveliness(self) -> _Liveliness: ...
+
+    def declare_subscriber(self, key: str, handler: object, **options: object) -> Declared: ...
+
+    def declare_publisher(self, key: str, **options: object) -> Outlet: ...
+
+    def declare_queryable(self, key: str, handler: object, *, complete: bool) -> Declared: ...
+
+    def get(self, key: str, handler: object, **options: object) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Config(Protocol):
+    """A configuration."""
+
+    def get_json(self, key: str) -> str: ...
+
+    def insert_json5(self, key: str, value: str) -> None: ...
+
+
+@dataclass(frozen=True)
+class NetworkOptions:
+    """Where a gateway connects and listens. Without any it connects to a router of this machine, and listens nowhere.
+
+    ``config``: a file in Zenoh's format, for TLS, users and all else; ``source``: what names it. ``scouts``: whether it looks
+    for others by multicast.
+    """
+
+    connect: tuple[str, ...] = ()
+    listen: tuple[str, ...] = ()
+    config: str = ""
+    scouts: bool = False
+    source: str = "--config"
+
+
+def to_endpoint(text: str) -> str:
+    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise BridgeError."""
+    if not text or has_controls(text) or " " in text:
+        raise BridgeError(f"[{escaped(text)}] is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
+    if "/" in text:
+        return text
+    has_port = re.search(r"(^[^:]*|\]):\d+$", text)
+    return f"tcp/{text}" if has_port else f"tcp/{text}:{DEFAULT_PORT}"
+
+
+def is_loopback_endpoint(endpoint: str) -> bool:
+    """Return whether an endpoint is on this machine."""
+    address = endpoint.partition("/")[2].partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
+    if address == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return False
+
+
+def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> None:
+    """Raise BridgeError with what to install where Zenoh's library is missing, or speaks another protocol.
+
+    ``who`` needs it. ``has_many_links``: others will connect.
+    """
+    if has_many_links:
+        # Before the import: Zenoh reads it once.
+        os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
+    line = "python -m pip install --upgrade 'minirospy[fleet]'"
+    try:
+        importlib.import_module("zenoh.ext")
+    except ImportError as error:
+        raise BridgeError(f"{who} needs the library eclipse-zenoh: {line}") from error
+    version = importlib.metadata.version("eclipse-zenoh")
+    parts = [int(each) for each in re.findall(r"\d+", version)]
+    if parts[0] != 1 or parts < [1, 4]:
+        raise BridgeError(f"{who} needs eclipse-zenoh of version 1.4 or newer below 2, not {version}: {line}")
+
+
+def configured(options: NetworkOptions) -> Config:
+    """Return Zenoh's configuration: the file's, and what the options say; nothing listens unless one of them says so."""
+    zenoh = importlib.import_module("zenoh")
+    default: Config = zenoh.Config()
+    config: Config = default
+    if options.config:
+        if not Path(options.config).is_file():
+            raise BridgeError(f"{options.source} {options.config}: there is no such file")
+        try:
+            config = zenoh.Config.from_file(options.config)
+        except zenoh.ZError as error:
+            raise BridgeError(f"{options.source} {options.config}: {one_line(error)}") from error
+    untouched: Config = zenoh.Config()
+
+    def is_set(key: str) -> bool:
+        return bool(options.config) and config.get_json(key) != untouched.get_json(key)
+
+    def put(key: str, value: object) -> None:
+        try:
+            config.insert_json5(key, json.dumps(value))
+        except zenoh.ZError as error:
+            raise BridgeError(f"{key} may not be {value}: {one_line(error)}") from error
+
+    listens = bool(options.listen) or is_set("listen/endpoints")
+    connects = bool(options.connect) or is_set("connect/endpoints")
+    if options.listen:
+        put("listen/endpoints", list(options.listen))
+    elif not listens:
+        put("listen/endpoints", [])
+    if options.connect:
+        put("connect/endpoints", list(options.connect))
+    elif not (connects or listens or options.scouts):
+        put("connect/endpoints", [DEFAULT_ENDPOINT])
+    if not is_set("mode"):
+        # A router passes on between all that are connected to it; a client has one connection.
+        put("mode", "router" if listens else "peer" if options.scouts else "client")
+    mode = json.loads(config.get_json("mode"))
+    put("scouting/multicast/enabled", options.scouts)
+    # A gateway that loses its router goes on trying; a client without one does not open, and is opened again.
+    for key, value in (
+        ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
+        ("connect/exit_on_failure", mode == "client"),
+        ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
+        ("transport/unicast/max_sessions", _SESSIONS),
+        ("transport/unicast/accept_pending", 1000),
+        # What the kernel has taken waits before everything else: at 4 Mbit/s some 0.3 s instead of 1.3 s.
+        ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
+        # It would pass large messages between gateways of one machine by files in /dev/shm, which containers make small.
+        ("transport/shared_memory/enabled", False),
+    ):
+        if not is_set(key):
+            put(key, value)
+    return config
+
+
+def one_line(error: Exception) -> str:
+    # The line of Zenoh's source in which it arose says nothing to a user.
+    return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]
