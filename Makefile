@@ -64,7 +64,8 @@ pythons: $(STAMP)
 
 ros2: $(STAMP)
 	@$(BIN)/python tests/interop/install_ros2.py
-	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py
+	@$(BIN)/python tests/interop/install_zenoh_peers.py
+	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py tests/interop/test_interop_ros2_zenoh.py
 
 guard: $(STAMP)
 	@$(BIN)/python benchmarks/guard.py

@@ -78,11 +78,14 @@ PURE_FILES = (
         for name in (
             "action_links.py",
             "action_messages.py",
+            "definitions.py",
             "layouts.py",
             "links.py",
             "parameter_values.py",
             "rules.py",
             "service_links.py",
+            "xxh3.py",
+            "zenoh_keys.py",
             "statics.py",
         )
     }

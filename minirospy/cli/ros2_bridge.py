@@ -1,18 +1,24 @@
-"""`minirospy ros2-bridge`: topics, services, actions between ROS 1 and ROS 2, beside an installed ROS 2 (docs/ros2.md)."""
+"""`minirospy ros2-bridge`: topics, services, actions between ROS 1 and ROS 2 (docs/ros2.md).
+
+It runs beside an installed ROS 2, or without one by Zenoh.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.cli.parser import Parser
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.ros2.bridge import Ros2Bridge
+    from minirospy.bridge.ros2.interface import Ros2Side
     from minirospy.bridge.ros2.link_table import Pair
+    from minirospy.bridge.ros2.rules import Rules
+    from minirospy.idl.load import Catalogue
 
 __all__ = ["COMMAND", "main"]
 
@@ -29,7 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> Parser:
     parser = Parser(
         "minirospy ros2-bridge",
-        "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports. "
+        "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports, or "
+        "with --zenoh without one. "
         "A topic is bridged while it has a publisher on one side and a subscriber on the other, a service or "
         "an action while one side offers it.",
     )
@@ -72,6 +79,18 @@ def _parser() -> Parser:
         completer="files",
     )
     parser.add_argument(
+        "--zenoh",
+        action="store_true",
+        help="needs no ROS 2 here: passes on to nodes of ROS 2 that run rmw_zenoh, by their router",
+    )
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="the router of --zenoh, as 192.168.1.5 or tcp/robot.local:7447 (this machine's)",
+    )
+    parser.add_argument(
         "--list", action="store_true", help="print what would be bridged, and why something is not, and exit"
     )
     return parser
@@ -83,13 +102,16 @@ def _ros2_bridge(
     actions: Sequence[str],
     call_timeout: float,
     rules: str,
+    zenoh: bool,
+    connect: Sequence[str],
     list: bool,
 ) -> int:
+    import asyncio
+
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
     from minirospy.bridge.ros2.links import BRIDGE_PREFIX
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
-    from minirospy.bridge.ros2.side import RclpySide, require_rclpy
     from minirospy.bridge.serve import run
     from minirospy.errors import BridgeError
     from minirospy.idl.load import Catalogue
@@ -100,7 +122,10 @@ def _ros2_bridge(
     known = BUILT_IN
     if rules:
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
-    require_rclpy()
+    if connect and not zenoh:
+        raise Misuse("--connect is for --zenoh")
+    catalogue = Catalogue(Packages().folders())
+    open_side = _zenoh(known, catalogue, connect) if zenoh else _rclpy()
     options = Ros2Options(
         NameFilter.of(topics),
         NameFilter.of(services),
@@ -108,15 +133,48 @@ def _ros2_bridge(
         call_seconds=call_timeout,
         rules=known,
     )
-    catalogue = Catalogue(Packages().folders())
 
     async def start(node: Node) -> Ros2Bridge | _Listing:
-        bridge = Ros2Bridge(node, RclpySide(BRIDGE_PREFIX), options, catalogue)
+        loop = asyncio.get_running_loop()
+        # A router that does not answer keeps its thread waiting.
+        opened = loop.run_in_executor(None, open_side, BRIDGE_PREFIX) if zenoh else None
+        side = await opened if opened else open_side(BRIDGE_PREFIX)
+        bridge = Ros2Bridge(node, side, options, catalogue)
         return _Listing(bridge, node) if list else bridge
 
     name = f"{BRIDGE_PREFIX}_list" if list else BRIDGE_PREFIX
     # No message class of ROS 1 can be imported where those of ROS 2 have the same names.
     return run(name, (), start, lambda _: None, imports_messages=False)
+
+
+def _rclpy() -> Callable[[str], Ros2Side]:
+    from minirospy.bridge.ros2.side import RclpySide, require_rclpy
+
+    require_rclpy()
+    return RclpySide
+
+
+def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callable[[str], Ros2Side]:
+    import os
+
+    from minirospy.bridge.ros2.definitions import Definitions
+    from minirospy.bridge.ros2.zenoh_side import ZenohSide
+    from minirospy.bridge.zenoh_library import (
+        NetworkOptions,
+        is_loopback_endpoint,
+        require_zenoh,
+        to_endpoint,
+    )
+    from minirospy.environment import Environment
+
+    require_zenoh("ros2-bridge --zenoh")
+    variable = "ZENOH_SESSION_CONFIG_URI"
+    config = os.environ.get(variable, "")
+    options = NetworkOptions(tuple(map(to_endpoint, connect)), config=config, source=variable)
+    if Environment.read().local and (config or not all(map(is_loopback_endpoint, options.connect))):
+        raise Misuse("MINIROSPY_LOCAL=1 keeps all on this machine: this router may not be on it")
+    definitions = Definitions(rules, catalogue)
+    return lambda name: ZenohSide(name, options, definitions)
 
 
 class _Listing:

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import textwrap
 import threading
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
@@ -64,13 +64,13 @@ RULES = """
 
 
 class Peer:
-    """ros2_peer.py, in a process of real ROS 2."""
+    """ros2_peer.py, in a process of real ROS 2, or another program with the same lines."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
+    def __init__(self, environment: dict[str, str], command: Sequence[str] = ()) -> None:
         self._said: queue.Queue[dict[str, Any]] = queue.Queue()
         self._kept: list[dict[str, Any]] = []
         self._program = subprocess.Popen(
-            [str(PYTHON), str(HERE / "ros2_peer.py")],
+            command or [str(PYTHON), str(HERE / "ros2_peer.py")],
             env=environment,
             text=True,
             stdin=subprocess.PIPE,
@@ -143,13 +143,19 @@ class Peer:
 class Scene:
     """A master, the bridge, a node of ROS 1 in this process, a node of ROS 2 in another."""
 
-    def __init__(self, uri: str, environment: dict[str, str], parts: contextlib.ExitStack) -> None:
+    def __init__(
+        self,
+        uri: str,
+        environment: dict[str, str],
+        parts: contextlib.ExitStack,
+        command: Sequence[str] = (),
+    ) -> None:
         self._loop = LoopThread("test-ros2")
         parts.callback(self._loop.close)
         self.environment = environment
         self.node: Node = self.run(self._start(uri))
         parts.callback(lambda: self.run(self.node.close()))
-        self.peer = Peer(environment)
+        self.peer = Peer(environment, command)
         parts.callback(self.peer.close)
 
     def run(self, work: Coroutine[object, object, _T]) -> _T:

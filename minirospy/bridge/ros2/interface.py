@@ -1,6 +1,6 @@
-"""What the bridge needs of ROS 2. All of it is done by rclpy in ``side.py``; a test may put another side in its place.
+"""What the bridge needs of ROS 2: by rclpy in ``side.py``, by Zenoh in ``zenoh_side.py``; a test may put another side there.
 
-ROS 2 calls back in a thread of its executor. Types are ``pkg/Name``; messages are CDR.
+ROS 2 calls back in threads of its own. Types are ``pkg/Name``; messages are CDR.
 """
 
 from __future__ import annotations

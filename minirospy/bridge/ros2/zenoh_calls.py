@@ -1,0 +1,175 @@
+"""Clients and servers of services in ROS 2 by Zenoh: a request is a query, whose reply is the response.
+
+Zenoh calls back in its own threads; so do the futures.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import logging
+import struct
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
+from typing import TYPE_CHECKING
+
+from minirospy.bridge.ros2.zenoh_keys import Kind, reply_attachment
+from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
+from minirospy.errors import BridgeError, MinirospyError
+from minirospy.escape import escaped
+from minirospy.idl.cdr import CDR_HEADER
+from minirospy.idl.type_hash import Fields
+
+if TYPE_CHECKING:
+    from minirospy.bridge.ros2.zenoh_keys import Entity
+    from minirospy.bridge.zenoh_library import Query, Reply
+
+__all__ = ["ZenohClient", "ZenohServer"]
+
+_log = logging.getLogger(__name__)
+
+MOST_BYTES = 64 << 20
+_MOST_UNDER_WAY = 200
+_LONGEST_SECONDS = 10_000_000
+"""The bridge has time limits of its own; those of Zenoh would end a goal that takes long."""
+
+
+class ZenohClient:
+    """A client of a service. From any thread."""
+
+    def __init__(self, node: ZenohNode, end: Entity) -> None:
+        self._node = node
+        self._end = end
+        self._handle = Handle(node, end)
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is there."""
+        servers = self._node.graph.of_name(self._end.name, Kind.SERVICE)
+        return any(each.key == self._end.key for each in servers)
+
+    def call(self, request: bytes) -> Future[bytes]:
+        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
+        answered: Future[bytes] = Future()
+        name = self._end.name
+
+        def arrived(reply: Reply) -> None:
+            if reply.ok is not None and len(reply.ok.payload) <= MOST_BYTES:
+                with contextlib.suppress(InvalidStateError):
+                    answered.set_result(reply.ok.payload.to_bytes())
+            elif reply.err is not None:
+                text = escaped(reply.err.payload.to_bytes()[:500].decode(errors="replace"))
+                _fail(answered, f"service [{name}] of ROS 2: {text}")
+            else:
+                _fail(answered, f"the response of service [{name}] has more than {MOST_BYTES} bytes")
+
+        def ended() -> None:
+            _fail(answered, f"service [{name}] of ROS 2 has ended without a response")
+
+        library = self._node.zenoh
+        try:
+            self._node.session.get(
+                self._end.key,
+                self._node.handler(arrived, ended),
+                payload=request,
+                attachment=self._handle.attachment(),
+                target=library.QueryTarget.ALL_COMPLETE,
+                consolidation=library.ConsolidationMode.NONE,
+                timeout=_LONGEST_SECONDS,
+            )
+        except library.ZError as error:
+            _fail(answered, f"service [{name}] of ROS 2: {escaped(str(error))}")
+        return answered
+
+    def close(self) -> None:
+        """End the client. Idempotent."""
+        self._handle.close()
+
+
+class ZenohServer:
+    """A service that is offered in ROS 2; ``answer`` gets the CDR of a request and returns that of the response.
+
+    A MinirospyError of its future is why the call fails: the text of a response that has a place for it, else the error of the
+    query, which rmw_zenoh writes to its log.
+    """
+
+    def __init__(
+        self, node: ZenohNode, end: Entity, response: Fields, answer: Callable[[bytes], Future[bytes]]
+    ) -> None:
+        self._node = node
+        self._end = end
+        self._response = list(response.values())
+        self._answer = answer
+        self._under_way = 0
+        self._lock = threading.Lock()
+        # A reply may block where the network is slow.
+        self._replies = concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
+        queryable = node.session.declare_queryable(end.key, node.handler(self._arrived), complete=True)
+        self._handle = Handle(node, end, queryable)
+
+    def close(self) -> None:
+        """Offer it no more. Idempotent."""
+        self._handle.close()
+        self._replies.shutdown(wait=False)
+
+    def _arrived(self, query: Query) -> None:
+        with self._lock:
+            has_room = self._under_way < _MOST_UNDER_WAY
+            self._under_way += has_room
+        if not has_room:
+            self._refuse(query, f"the bridge is answering {_MOST_UNDER_WAY} other requests")
+            return
+        try:
+            if query.payload is None or query.attachment is None or len(query.payload) > MOST_BYTES:
+                raise ValueError("this is not a request of rmw_zenoh, or too large")
+            back = reply_attachment(query.attachment.to_bytes(), time.time_ns())
+            answered = self._answer(query.payload.to_bytes())
+        except ValueError as error:
+            self._done()
+            self._refuse(query, str(error))
+            return
+
+        def finished(_: object) -> None:
+            self._done()
+            try:
+                self._replies.submit(self._reply, query, back, answered)
+            except RuntimeError:
+                query.drop()  # the service is closed
+
+        answered.add_done_callback(finished)
+
+    def _reply(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
+        try:
+            data = answered.result()
+        except MinirospyError as error:
+            reason = " ".join(str(error).split())
+            _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
+            if self._response != ["bool", "string"]:
+                # Zeros would be taken for an answer.
+                self._refuse(query, reason)
+                return
+            # As that of SetBool and Trigger: without success, and why.
+            text = reason.encode() + b"\0"
+            data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
+        except concurrent.futures.CancelledError:
+            self._refuse(query, "the bridge has ended")
+            return
+        with contextlib.suppress(self._node.zenoh.ZError):
+            query.reply(self._end.key, data, attachment=back)
+        query.drop()
+
+    def _refuse(self, query: Query, reason: str) -> None:
+        with contextlib.suppress(self._node.zenoh.ZError):
+            query.reply_err(reason.encode())
+        query.drop()
+
+    def _done(self) -> None:
+        with self._lock:
+            self._under_way -= 1
+
+
+def _fail(future: Future[bytes], reason: str) -> None:
+    with contextlib.suppress(InvalidStateError):
+        future.set_exception(BridgeError(reason))
