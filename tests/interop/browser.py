@@ -53,10 +53,12 @@ new Promise((resolve, reject) => {
 
 _ARM = """
 window.clickedByTest = false;
-window.addEventListener("click", (event) => {
-  const e = %s;
-  window.clickedByTest = Boolean(e) && e.contains(event.target);
+let pressed = null;
+addEventListener("pointerdown", ({ clientX: x, clientY: y }) => {
+  const e = %s, r = e?.getBoundingClientRect();
+  pressed = e && r.left <= x && x <= r.right && r.top <= y && y <= r.bottom ? e : null;
 }, { capture: true, once: true });
+addEventListener("click", () => { window.clickedByTest = Boolean(pressed?.isConnected); }, { capture: true, once: true });
 """
 
 
@@ -155,7 +157,7 @@ class Page:
         """
         end = time.monotonic() + PATIENCE
         while True:
-            self.evaluate(_ARM % _finding(find, text))
+            self.evaluate("{%s}" % (_ARM % _finding(find, text)))
             for kind in ("mousePressed", "mouseReleased"):
                 self.mouse(kind, find, text)
             # A page that was just loaded knows nothing of the click that loaded it.
