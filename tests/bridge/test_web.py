@@ -280,6 +280,11 @@ def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Runn
         assert raw_answer(bridge.port, b"GET / HTTP/1.1\r\n") == b""
 
 
+def test_connection_that_a_browser_opened_in_advance_outlives_its_use() -> None:
+    # Chromium's net::kUnusedIdleSocketTimeout; a busy computer adds to it.
+    assert Limits().handshake_seconds >= 2 * 10
+
+
 def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> None:
     talker = bridge.node("talker")
     bridge.publisher(talker, "/t", String)

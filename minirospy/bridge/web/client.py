@@ -58,7 +58,8 @@ class Limits:
     connections: int = 256
     connections_a_second: float = 50.0
     connection_burst: int = 500
-    handshake_seconds: float = 10.0
+    handshake_seconds: float = 30.0
+    """A browser opens connections in advance, and uses them for ten seconds: those must not end here first."""
     ping_seconds: float = 20.0
     silent_seconds: float = 60.0
     """A client that answers no ping, or takes no byte, for this long is disconnected."""
