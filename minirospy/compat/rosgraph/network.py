@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import socket
+import struct
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
 from minirospy.environment import Environment, is_local
 from minirospy.errors import WireError
 from minirospy.wire.framing import LENGTH_BYTES, parse_length
-from minirospy.wire.header import parse_header, serialize_header
+from minirospy.wire.header import parse_header
 
 if TYPE_CHECKING:
     from io import BytesIO
@@ -111,8 +112,18 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
-    """Return a connection header's bytes, its length in front."""
-    return serialize_header({key: str(value) for key, value in header.items()})
+    """Return a connection header's bytes, its length in front; names and values are str or bytes. Raises TypeError."""
+    fields = [_as_bytes(name) + b"=" + _as_bytes(value) for name, value in header.items()]
+    body = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+    return struct.pack("<I", len(body)) + body
+
+
+def _as_bytes(text: object) -> bytes:
+    if isinstance(text, str):
+        return text.encode()
+    if isinstance(text, bytes):
+        return text
+    raise TypeError(f"a connection header has str or bytes, not {type(text).__name__}")
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:

@@ -56,6 +56,13 @@ for name in ("a\n", "a/b", "a//b", "1a", "", "/", "~a", "a b"):
 
 show("# headers")
 outcome("encode", lambda: network.encode_ros_handshake_header({"a": "b", "c": "d=e"}))
+for odd in ({"c": b"d"}, {b"c": "\xe4"}, {"a": b"\xff"}):
+    outcome(f"encode {odd}", lambda odd=odd: network.encode_ros_handshake_header(odd))
+for odd in ({"a": None}, {"a": 3}, {3: "a"}):
+    try:
+        show(network.encode_ros_handshake_header(odd))
+    except TypeError:
+        show(odd, "TypeError")
 outcome("decode", lambda: network.decode_ros_handshake_header(b"\x07\x00\x00\x00\x03\x00\x00\x00a=b"))
 for data in (b"\x0b\x00\x00\x00\x03\x00\x00\x00abc", b"\x07\x00\x00\x00\x09\x00\x00\x00abc"):
     try:
