@@ -39,7 +39,7 @@ VIEWS = (
 )
 """The names of the views, as in links, in the order of their tabs; the page has one module for each."""
 
-LAYOUTS = ("workshop", "console", "teleop", "classroom")
+LAYOUTS = ("workshop", "console", "rviz", "teleop", "classroom")
 """The layouts that come with the page: several views side by side."""
 
 _PLUGINS = {

@@ -202,4 +202,5 @@ export const GERMAN = {
   "By topic": "Nach Topic", "By kind": "Nach Art",
   "{name} cannot be shown here. It is kept when the file is saved.": "{name} lässt sich hier nicht zeigen. Beim Speichern der Datei bleibt es erhalten.",
   "a display without a class": "eine Anzeige ohne Klasse", "open the view Image": "die Ansicht Bild öffnen", "Rename": "Umbenennen", "Remove": "Entfernen",
+  "the robot in 3D with its camera and diagnostics": "der Roboter in 3D mit Kamera und Diagnose",
 };

@@ -9,6 +9,7 @@ export const PRESETS = {
   workshop: ["Workshop", "the board, its button in a plot, the log lines, the graph",
     "row(45:column(60:board,40:console),55:column(plot?path=%2Fbutton_state&window=30,graph))"],
   console: ["Console", "log lines, topics, diagnostics and parameters", "row(60:column(60:console,40:topics),40:column(diagnostics,parameters))"],
+  rviz: ["RViz", "the robot in 3D with its camera and diagnostics", "row(72:3d,28:column(image,diagnostics))"],
   teleop: ["Teleop", "a stick, the camera, and a plot of the speeds",
     "row(38:teleop,62:column(60:image,40:plot?path=%2Fcmd_vel%2Flinear%2Fx&path=%2Fcmd_vel%2Fangular%2Fz&window=30))"],
   classroom: ["Classroom", "the boards and robots of a group side by side", null],
