@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from minirospy.dashboard.files import FOLDER
 from minirospy.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
 from tests.interop.page_modules import run_script
@@ -374,4 +375,27 @@ def test_class_named_like_a_property_of_objects_is_unknown(name: str) -> None:
 def test_config_that_is_not_one_is_refused() -> None:
     assert run({"call": "config", "raw": {"a": 1}}) == [
         'Error: not a file of RViz: it has no "Visualization Manager"'
+    ]
+
+
+# --- languages
+
+
+def test_reasons_are_in_the_language_of_the_person() -> None:
+    texts = json.dumps((FOLDER / "js" / "texts.js").as_uri())
+    body = f"""
+      const {{ chooseLanguage }} = await import({texts});
+      const reason = (text) => {{ try {{ parseUrdf(text); }} catch (error) {{ return error.message; }} }};
+      const found = [];
+      for (const language of ["de", "en"]) {{
+        chooseLanguage(language);
+        found.push(reason("<robot>"), reason('<robot><link name="a"/><link name="b"/></robot>'));
+      }}
+      return found;
+    """
+    assert run_script("parseUrdf", "js/scene/urdf.js", body) == [
+        "Zeile 1: </robot> fehlt",
+        "zwei Wurzeln: a, b",
+        "line 1: </robot> is missing",
+        "two root links: a, b",
     ]

@@ -1,6 +1,7 @@
 // The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is kept as it is. Pure.
 // Source: files that RViz of ROS Noetic saves.
 
+import { t } from "../texts.js";
 import { CLASSES, classOf, complete, newSettings } from "./classes.js";
 
 const MANAGER = "Visualization Manager";
@@ -33,7 +34,7 @@ const isObject = (value) => value !== null && typeof value === "object" && !Arra
 /** A configuration: what is shown of it can be read and changed, `raw` is the whole for saving. */
 export class Config {
   constructor(raw = newConfig()) {
-    if (!isObject(raw) || !isObject(raw[MANAGER])) throw new Error(`not a file of RViz: it has no "${MANAGER}"`);
+    if (!isObject(raw) || !isObject(raw[MANAGER])) throw new Error(t('not a file of RViz: it has no "{name}"', { name: MANAGER }));
     this.raw = raw;
     this.manager = raw[MANAGER];
     if (!Array.isArray(this.manager.Displays)) this.manager.Displays = [];

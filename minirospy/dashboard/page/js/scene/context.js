@@ -1,5 +1,6 @@
 // What displays share: frames, the fixed frame, and where in the picture the things of a frame and time are.
 
+import { t } from "../texts.js";
 import { FrameError, Frames, IDENTITY, plainName } from "./transforms.js";
 
 const USUAL_FIXED = ["map", "odom", "world"];
@@ -75,8 +76,8 @@ export class Context {
   /** Return [level, text] of the fixed frame. */
   fixedStatus() {
     if (this.frames.has(this.fixedFrame)) return this.refused ? [1, this.refused] : [0, "OK"];
-    if (!this.frames.known.size) return [1, `No tf data.  Actual error: Fixed Frame [${this.fixedFrame}] does not exist`];
-    return [2, `Fixed Frame [${this.fixedFrame}] does not exist`];
+    if (!this.frames.known.size) return [1, t("No tf data.  Actual error: Fixed Frame [{frame}] does not exist", { frame: this.fixedFrame })];
+    return [2, t("Fixed Frame [{frame}] does not exist", { frame: this.fixedFrame })];
   }
 
   // --- placing

@@ -18,7 +18,7 @@ function requested(link, operation) {
       else resolve(answer);
       socket.close();
     };
-    socket.onclose = () => reject(new Error("the connection is lost"));
+    socket.onclose = () => reject(new Error(t("the connection is lost")));
   });
 }
 

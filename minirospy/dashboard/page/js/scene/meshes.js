@@ -1,6 +1,7 @@
 // Meshes of package://: fetched through the bridge once, read by their kind, copied for each use.
 
 import { BufferAttribute, ColladaLoader, Group, LoadingManager, Mesh, MeshLambertMaterial, STLLoader } from "../../vendor/three/three.min.js";
+import { t } from "../texts.js";
 import { bodyMaterial } from "./shapes.js";
 
 const cache = new WeakMap(); // link -> Map of uri -> promise of an object
@@ -36,13 +37,13 @@ function faded(material, alpha) {
 }
 
 async function read(link, uri) {
-  if (!uri.startsWith("package://")) throw new Error(`${uri || "a mesh without a name"}: only meshes of package:// can be loaded`);
+  if (!uri.startsWith("package://")) throw new Error(t("{name}: only meshes of package:// can be loaded", { name: uri || "?" }));
   const bytes = await link.asset(uri);
   const kind = /\.(\w+)$/.exec(uri)?.[1].toLowerCase();
   if (kind === "stl") return { object: readStl(bytes), hasColors: false };
   if (kind === "obj") return { object: readObj(new TextDecoder().decode(bytes)), hasColors: false };
   if (kind === "dae") return { object: await readDae(link, uri, bytes), hasColors: true };
-  throw new Error(`${uri}: meshes are .stl, .dae or .obj`);
+  throw new Error(t("{name}: meshes are .stl, .dae or .obj", { name: uri }));
 }
 
 function readStl(bytes) {
@@ -66,7 +67,7 @@ function readObj(text) {
     if (word === "v") vertices.push(rest.slice(0, 3).map(Number));
     else if (word === "f") {
       const corners = rest.map((part) => Number(part.split("/")[0])).map((index) => vertices[index < 0 ? vertices.length + index : index - 1]);
-      if (corners.includes(undefined)) throw new Error("the mesh names a vertex that it does not have");
+      if (corners.includes(undefined)) throw new Error(t("the mesh names a vertex that it does not have"));
       for (let corner = 2; corner < corners.length; corner++) for (const each of [corners[0], corners[corner - 1], corners[corner]]) positions.push(...each);
     }
   }
@@ -93,7 +94,7 @@ async function readDae(link, uri, bytes) {
   manager.setURLModifier((url) => pictures.get(url) ?? EMPTY_PICTURE);
   manager.onLoad = () => { for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url); };
   const parsed = new ColladaLoader(manager).parse(text, "");
-  if (!parsed) throw new Error(`${uri}: this is not a Collada file`);
+  if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
   // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and so does RViz.
   parsed.scene.rotation.set(0, 0, 0);
   const group = new Group();

@@ -1,5 +1,6 @@
 // Points of scans and clouds: positions and colors for drawing. Pure. Colors are chosen as RViz's color transformers choose.
 
+import { t } from "../texts.js";
 import { rainbow, rgbOf } from "./colors.js";
 
 const READERS = {
@@ -44,12 +45,12 @@ export function pointsOfCloud(message, wanted = [], stride = 1) {
   const { width, height, point_step: step, data } = message;
   const fields = new Map(message.fields.map((field) => [field.name, field]));
   for (const name of ["x", "y", "z"]) {
-    if (!fields.has(name)) throw new Error(`the cloud has no field ${name}; it has ${[...fields.keys()].join(", ") || "none"}`);
+    if (!fields.has(name)) throw new Error(t("the cloud has no field {name}; it has {names}", { name, names: [...fields.keys()].join(", ") || "-" }));
   }
   const total = width * height;
   const rows = message.row_step * height;
   if (step <= 0 || data.length < (total ? rows - message.row_step + width * step : 0)) {
-    throw new Error(`the cloud has ${data.length} bytes, ${width} x ${height} points of ${step} bytes need ${total * step}`);
+    throw new Error(t("the cloud has {size} bytes, {width} x {height} points of {step} bytes need {need}", { size: data.length, width, height, step, need: total * step }));
   }
 
   const index = new Uint32Array(Math.ceil(total / stride));
@@ -86,11 +87,11 @@ export function pointsOfCloud(message, wanted = [], stride = 1) {
 
 function column({ data, is_bigendian: isBig }, field, index) {
   const kind = READERS[field.datatype];
-  if (!kind) throw new Error(`the field ${field.name} has the unknown datatype ${field.datatype}`);
+  if (!kind) throw new Error(t("the field {name} has the unknown datatype {type}", { name: field.name, type: field.datatype }));
   const [method, size] = kind;
   const found = field.datatype === 6 ? new Uint32Array(index.length) : new Float32Array(index.length);
   const start = data.byteOffset + field.offset;
-  if (index.length && field.offset + index[index.length - 1] + size > data.length) throw new Error(`the field ${field.name} is outside of its point`);
+  if (index.length && field.offset + index[index.length - 1] + size > data.length) throw new Error(t("the field {name} is outside of its point", { name: field.name }));
   // The usual case: aligned, of this machine's byte order. Six times as fast as a DataView.
   if (!isBig && start % size === 0 && index.every((at) => at % size === 0)) {
     const values = new TYPED[field.datatype](data.buffer, start, Math.floor((data.length - field.offset) / size));

@@ -29,7 +29,7 @@ export class Stage {
     this.canvas.setAttribute("aria-label", t("The scene: drag to turn, with shift to move, wheel to zoom"));
     const options = { antialias: true, alpha: false, powerPreference: "high-performance" };
     const gl = this.canvas.getContext("webgl2", options);
-    if (!gl) throw new Error("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader");
+    if (!gl) throw new Error(t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"));
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl, ...options });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     const about = gl.getExtension("WEBGL_debug_renderer_info");

@@ -2,6 +2,8 @@
 // A transform is {p: [x, y, z], q: [x, y, z, w]}; that from `source` to `target` turns coordinates in source into those in target.
 // Source: tf2's BufferCore (http://wiki.ros.org/tf2); the texts of its errors are tf2's.
 
+import { t } from "../texts.js";
+
 export const IDENTITY = Object.freeze({ p: [0, 0, 0], q: [0, 0, 0, 1] });
 const CACHE_SECONDS = 10; // as in tf2
 const MOST_DEPTH = 1000; // frames between one and its root, as in tf2
@@ -186,7 +188,7 @@ export class Frames {
     const source = plainName(sourceName);
     if (target === source && (this.known.has(target) || !this.known.size)) return IDENTITY;
     for (const frame of [target, source]) {
-      if (!this.known.has(frame)) throw new FrameError("unknown", `Frame [${frame}] does not exist`);
+      if (!this.known.has(frame)) throw new FrameError("unknown", t("Frame [{frame}] does not exist", { frame }));
     }
 
     const up = this.chain(source);
@@ -217,7 +219,7 @@ export class Frames {
 
 /** Return why a display that is in `frame` cannot be shown, in RViz's words. */
 export function missingText(frame, fixedFrame, error) {
-  return `No transform from [${plainName(frame)}] to fixed frame [${fixedFrame}]${error ? `: ${error.message}` : ""}`;
+  return t("No transform from [{frame}] to fixed frame [{fixed}]", { frame: plainName(frame), fixed: fixedFrame }) + (error ? `: ${error.message}` : "");
 }
 
 function record(edge, seconds, value) {

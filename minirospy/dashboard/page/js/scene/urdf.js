@@ -1,5 +1,6 @@
 // Robot descriptions: the text of a URDF becomes links with their shapes, and joints. Pure. Source: http://wiki.ros.org/urdf/XML.
 
+import { t } from "../texts.js";
 import { compose, fromRpy, IDENTITY, normalized } from "./transforms.js";
 import { parseXml } from "./xml.js";
 
@@ -11,7 +12,7 @@ export class UrdfError extends Error {}
  * origin, axis, mimic: {joint, multiplier, offset} | null}. */
 export function parseUrdf(text) {
   const robot = parseXml(text);
-  if (robot.name !== "robot") throw new UrdfError(`<${robot.name}>, where <robot> is expected`);
+  if (robot.name !== "robot") throw new UrdfError(t("<{name}>, where <robot> is expected", { name: robot.name }));
   const colors = new Map();
   for (const material of named(robot, "material")) {
     const color = colorOf(material);
@@ -34,14 +35,14 @@ export function parseUrdf(text) {
   for (const joint of named(robot, "joint")) {
     const found = jointOf(joint);
     for (const link of [found.parent, found.child]) {
-      if (!links.has(link)) throw new UrdfError(`joint "${found.name}": there is no link "${link}"`);
+      if (!links.has(link)) throw new UrdfError(t('joint "{name}": there is no link "{link}"', { name: found.name, link }));
     }
     joints.set(found.name, found);
   }
 
   const children = new Set([...joints.values()].map(({ child }) => child));
   const roots = [...links.keys()].filter((name) => !children.has(name));
-  if (roots.length !== 1) throw new UrdfError(roots.length ? `two root links: ${roots.join(", ")}` : "there is no root link");
+  if (roots.length !== 1) throw new UrdfError(roots.length ? t("two root links: {names}", { names: roots.join(", ") }) : t("there is no root link"));
   return { name: robot.attributes.name ?? "", root: roots[0], links, joints };
 }
 
@@ -80,7 +81,7 @@ const first = (element, name) => element?.children.find((child) => child.name ==
 function numbers(text, usual) {
   const found = (text ?? "").trim().split(/\s+/).filter(Boolean).map(Number);
   if (!found.length) return usual;
-  if (found.length !== usual.length || !found.every(Number.isFinite)) throw new UrdfError(`"${text}", where ${usual.length} numbers are expected`);
+  if (found.length !== usual.length || !found.every(Number.isFinite)) throw new UrdfError(t('"{text}", where {count} numbers are expected', { text, count: usual.length }));
   return found;
 }
 
@@ -107,9 +108,9 @@ function shapeOf(element, colors, link) {
     cylinder: () => ({ kind: "cylinder", radius: size("radius"), length: size("length") }),
     mesh: () => ({ kind: "mesh", uri: attributes.filename ?? "", scale: numbers(attributes.scale, [1, 1, 1]) }),
   };
-  if (!Object.hasOwn(kinds, geometry.name)) throw new UrdfError(`link "${link}": the shape <${geometry.name}> is not known`);
+  if (!Object.hasOwn(kinds, geometry.name)) throw new UrdfError(t('link "{link}": the shape <{name}> is not known', { link, name: geometry.name }));
   const made = kinds[geometry.name]();
-  if ([made.radius ?? 0, made.length ?? 0].includes(NaN)) throw new UrdfError(`link "${link}": <${geometry.name}> without radius or length`);
+  if ([made.radius ?? 0, made.length ?? 0].includes(NaN)) throw new UrdfError(t('link "{link}": <{name}> without radius or length', { link, name: geometry.name }));
   return { origin: originOf(element), geometry: made, color };
 }
 

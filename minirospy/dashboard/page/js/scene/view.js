@@ -121,7 +121,7 @@ export class SceneView {
     this.dismissed.clear();
     this.apply();
     const unknown = this.config.unknown();
-    this.say(unknown.length ? `not shown, but kept when it is saved: ${unknown.join(", ")}` : "opened", unknown.length > 0);
+    this.say(unknown.length ? t("not shown, but kept when it is saved: {names}", { names: unknown.join(", ") }) : t("opened"), unknown.length > 0);
     this.changed();
   }
 

@@ -2,6 +2,7 @@
 
 import { colorsOf, pointsOfCloud, pointsOfOldCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../points.js";
 import { points, solids } from "../shapes.js";
+import { t } from "../../texts.js";
 import { IDENTITY } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
@@ -49,8 +50,8 @@ export class Cloud extends TopicDisplay {
     const item = this.addAt(message.header, object);
     item.until = performance.now() + this.number("Decay Time") * 1000;
     this.setStatus("Points", stride > 1 ? 1 : 0, stride > 1
-      ? `Showing ${found.count} points of ${total}: every ${stride}${["th", "st", "nd", "rd"][stride] ?? "th"}, for this ${this.context.stage.isSoftware ? "software renderer" : "browser"}`
-      : `Showing ${found.count} points from ${message.ranges ? message.ranges.length : found.total}`);
+      ? t(this.context.stage.isSoftware ? "Showing {count} points of {all}: one of {stride}, for this software renderer" : "Showing {count} points of {all}: one of {stride}, for this browser", { count: found.count, all: total, stride })
+      : t("Showing {count} points from {all}", { count: found.count, all: message.ranges ? message.ranges.length : found.total }));
   }
 
   /** Return the settings with a transformer, where none is set that which suits the message's fields. */

@@ -5,6 +5,7 @@ import { CLASSES, classOf, getSetting } from "../classes.js";
 import { rgbOf } from "../colors.js";
 import { discard } from "../shapes.js";
 import { missingText, secondsOf } from "../transforms.js";
+import { t } from "../../texts.js";
 
 export const LEVELS = ["ok", "warn", "error"];
 
@@ -101,7 +102,7 @@ export class Display {
 
   showTransform(failed) {
     if (failed) this.setStatus("Transform", 2, missingText(failed.frame, this.context.fixedFrame, failed.error));
-    else if (this.items.size) this.setStatus("Transform", 0, "Transform OK");
+    else if (this.items.size) this.setStatus("Transform", 0, t("Transform OK"));
   }
 }
 
@@ -119,15 +120,15 @@ export class TopicDisplay extends Display {
     this.topic = name && !name.startsWith("/") ? `/${name}` : name;
     this.count = 0;
     if (!this.topic) {
-      this.setStatus("Topic", 1, "No topic is set");
+      this.setStatus("Topic", 1, t("No topic is set"));
       return;
     }
     this.ends = [this.listen(this.topic, this.mode, (message) => {
       this.count += 1;
       this.received(message);
-      this.setStatus("Topic", 0, "Messages received");
+      this.setStatus("Topic", 0, t("Messages received"));
     })];
-    this.setStatus("Topic", 1, "No messages received");
+    this.setStatus("Topic", 1, t("No messages received"));
     this.ends.push(this.context.link.watch(["channels"], () => this.checkType()));
   }
 
@@ -154,8 +155,8 @@ export class TopicDisplay extends Display {
     const channel = this.context.link.channels.get(this.topic);
     this.type = channel?.type;
     this.isWrong = Boolean(channel) && !this.types.includes(channel.type);
-    if (this.isWrong) this.setStatus("Topic", 2, `${this.topic} has the type ${channel.type}, not ${this.types[0]}`);
-    else if (!this.count) this.setStatus("Topic", 1, "No messages received");
+    if (this.isWrong) this.setStatus("Topic", 2, t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: channel.type, wanted: this.types[0] }));
+    else if (!this.count) this.setStatus("Topic", 1, t("No messages received"));
   }
 
   stop() {

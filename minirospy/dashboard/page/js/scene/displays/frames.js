@@ -3,6 +3,7 @@
 import { Group, Vector3 } from "../../../vendor/three/three.min.js";
 import { arrow, axes, bodyMaterial, directed, hairlines } from "../shapes.js";
 import { missingText } from "../transforms.js";
+import { t } from "../../texts.js";
 import { Display } from "./display.js";
 
 const MOST_CELLS = 1000;
@@ -13,6 +14,12 @@ const reference = (display) => {
   const name = String(display.get("Reference Frame") ?? "");
   return name === "<Fixed Frame>" || !name ? display.context.fixedFrame : name;
 };
+
+/** Return the first of some texts, and how many more there are. */
+function someOf(texts, most, between) {
+  const shown = texts.slice(0, most).join(between);
+  return texts.length > most ? t("{names} and {count} more", { names: shown, count: texts.length - most }) : shown;
+}
 
 class Anchored extends Display {
   start() {
@@ -108,7 +115,7 @@ export class TF extends Display {
   update() {
     const { frames } = this.context;
     const names = new Set(frames.names().filter((name) => this.isShown(name)));
-    if (!names.size && !frames.known.size) this.setStatus("Transforms", 1, "No tf data");
+    if (!names.size && !frames.known.size) this.setStatus("Transforms", 1, t("No tf data"));
     for (const name of this.frames.keys()) if (!names.has(name)) this.drop(name);
     for (const name of names) if (!this.frames.has(name)) this.frames.set(name, this.make(name));
 
@@ -132,10 +139,10 @@ export class TF extends Display {
       const parent = this.frames.get(frames.parent(name))?.item.object;
       this.point(line.object, item.object.position, isSeen && parent?.visible && this.get("Show Arrows") !== false ? parent.position : null);
     }
-    if (silent.length) this.setStatus("Timeout", 1, `no transform for ${this.number("Frame Timeout", 15)} s: ${silent.slice(0, 5).join(", ")}${silent.length > 5 ? ` and ${silent.length - 5} more` : ""}`);
+    if (silent.length) this.setStatus("Timeout", 1, t("no transform for {time} s: {names}", { time: this.number("Frame Timeout", 15), names: someOf(silent, 5, ", ") }));
     else this.clearStatus("Timeout");
-    if (missing.length) this.setStatus("Transforms", 1, missing.length > 3 ? `${missing.slice(0, 3).join("; ")}; and ${missing.length - 3} more` : missing.join("; "));
-    else if (names.size) this.setStatus("Transforms", 0, `${names.size} frames`);
+    if (missing.length) this.setStatus("Transforms", 1, someOf(missing, 3, "; "));
+    else if (names.size) this.setStatus("Transforms", 0, t("{count} frames", { count: names.size }));
   }
 
   /** Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand still. */

@@ -4,6 +4,7 @@ import {
   DataTexture, DoubleSide, Group, Mesh, NearestFilter, PlaneGeometry, RedFormat, RGBAFormat, ShaderMaterial, UnsignedByteType } from "../../../vendor/three/three.min.js";
 import { palette } from "../colors.js";
 import { fromMessage } from "../transforms.js";
+import { t } from "../../texts.js";
 import { TopicDisplay } from "./display.js";
 
 const VERTEX = "varying vec2 at; void main() { at = uv; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }";
@@ -40,8 +41,8 @@ export class MapDisplay extends TopicDisplay {
   received(message) {
     const { width, height } = message.info;
     // Positions in a grid of no cells, or of others than it says, are nowhere.
-    if (message.data.length !== width * height) throw new Error(`Data size doesn't match width*height: width = ${width}, height = ${height}, data size = ${message.data.length}`);
-    if (!width || !height) throw new Error(`Map is zero-sized (${width}x${height})`);
+    if (message.data.length !== width * height) throw new Error(t("Data size doesn't match width*height: width = {width}, height = {height}, data size = {size}", { width, height, size: message.data.length }));
+    if (!width || !height) throw new Error(t("Map is zero-sized ({width}x{height})", { width, height }));
     this.map = message;
     this.draw();
   }
@@ -49,7 +50,7 @@ export class MapDisplay extends TopicDisplay {
   updated({ x, y, width, height, data }) {
     if (!this.map || data.length === undefined) return;
     const { info, data: cells } = this.map;
-    if (x < 0 || y < 0 || x + width > info.width || y + height > info.height) throw new Error("Update area outside of original map area.");
+    if (x < 0 || y < 0 || x + width > info.width || y + height > info.height) throw new Error(t("Update area outside of original map area."));
     for (let row = 0; row < height; row++) cells.set(data.subarray(row * width, (row + 1) * width), (y + row) * info.width + x);
     this.draw();
   }
@@ -81,6 +82,6 @@ export class MapDisplay extends TopicDisplay {
     group.add(plane);
     // A map stays where its frame is.
     this.add(group, header.frame_id, 0, true);
-    this.setStatus("Map", step > 1 ? 1 : 0, `${info.width} x ${info.height} cells of ${Number(info.resolution.toFixed(4))} m${step > 1 ? `, every ${step}th is shown` : ""}`);
+    this.setStatus("Map", step > 1 ? 1 : 0, t("{width} x {height} cells of {size} m", { width: info.width, height: info.height, size: Number(info.resolution.toFixed(4)) }) + (step > 1 ? t(", one of {step} is shown", { step }) : ""));
   }
 }

@@ -4,6 +4,7 @@ import { Group, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
 import { loadMesh } from "../meshes.js";
 import { arrow, BALL, bodyMaterial, BOX, chain, directed, points as pointCloud, ROLL, segments, solids, triangles } from "../shapes.js";
 import { fromMessage, secondsOf } from "../transforms.js";
+import { t } from "../../texts.js";
 import { TopicDisplay } from "./display.js";
 
 const [ADD, DELETE, DELETE_ALL] = [0, 2, 3];
@@ -47,7 +48,7 @@ export class Markers extends TopicDisplay {
       }
     }
     if (error) throw error;
-    this.setStatus("Markers", 0, `${this.markers.size} markers`);
+    this.setStatus("Markers", 0, t("{count} markers", { count: this.markers.size }));
   }
 
   process(marker) {
@@ -60,12 +61,12 @@ export class Markers extends TopicDisplay {
       this.drop(key);
       return;
     }
-    if (marker.action !== ADD) throw new Error(`the action ${marker.action} is not known`);
+    if (marker.action !== ADD) throw new Error(t("the action {action} is not known", { action: marker.action }));
     if (!this.spaces.has(marker.ns) && this.spaces.size < MOST_SPACES) {
       this.spaces.add(marker.ns);
       this.context.statusChanged();
     }
-    if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(`more than ${MOST} markers`);
+    if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} markers", { count: MOST }));
 
     const made = this.make(marker);
     this.drop(key);
@@ -84,7 +85,7 @@ export class Markers extends TopicDisplay {
 
   /** Return the namespaces, for the list of settings. */
   parts() {
-    return [...this.spaces].sort().map((space) => ({ name: space || "(no namespace)", isShown: this.isShown(space), set: (isShown) => {
+    return [...this.spaces].sort().map((space) => ({ name: space || t("(no namespace)"), isShown: this.isShown(space), set: (isShown) => {
       this.settings.Namespaces = { ...this.settings.Namespaces, [space]: isShown };
     } }));
   }
@@ -118,9 +119,9 @@ export class Markers extends TopicDisplay {
   /** Return {object, label, offset} of a marker; its frame's transform is applied around it. Throws Error. */
   make(marker) {
     const build = MAKERS[marker.type];
-    if (!build) throw new Error(`the marker type ${marker.type} is not known`);
+    if (!build) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
     const numbers = [...Object.values(marker.pose.position), ...Object.values(marker.pose.orientation), ...Object.values(marker.scale)];
-    if (!numbers.every(Number.isFinite)) throw new Error("Marker contained invalid floating point values (nans or infs)");
+    if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contained invalid floating point values (nans or infs)"));
     const group = new Group();
     const pose = fromMessage(marker.pose);
     const made = build(marker, this);
@@ -150,7 +151,7 @@ function body(geometry) {
 function makeArrow({ points, scale, color }) {
   const material = bodyMaterial(rgbOf(color), color.a);
   if (points.length === 0) return arrow(material, { shaft: scale.x * 0.77, shaftWidth: scale.y, head: scale.x * 0.23, headWidth: scale.y * 2 });
-  if (points.length === 1) throw new Error("an arrow needs no points, or two");
+  if (points.length === 1) throw new Error(t("an arrow needs no points, or two"));
   const [from, to] = points.map(({ x, y, z }) => new Vector3(x, y, z));
   const length = from.distanceTo(to);
   if (!length) return new Group();
@@ -160,7 +161,7 @@ function makeArrow({ points, scale, color }) {
 
 function makeLines(isStrip) {
   return ({ points, colors, scale, color }) => {
-    if (!isStrip && points.length % 2) throw new Error("a line list needs an even number of points");
+    if (!isStrip && points.length % 2) throw new Error(t("a line list needs an even number of points"));
     const positions = flat(points);
     const own = colors.length === points.length && colors.length ? Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b])) : null;
     return segments(isStrip ? chain(positions) : positions, { rgb: rgbOf(color), colors: own && isStrip ? chain(own) : own, alpha: own ? colors[0].a : color.a, metres: scale.x });
@@ -186,7 +187,7 @@ function makePoints(marker) {
 }
 
 function makeTriangles({ points, colors, scale, color }) {
-  if (!points.length || points.length % 3) throw new Error("a triangle list needs three points for each triangle");
+  if (!points.length || points.length % 3) throw new Error(t("a triangle list needs three points for each triangle"));
   let own = null;
   if (colors.length === points.length) own = Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b]));
   else if (colors.length === points.length / 3) own = Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b, r, g, b, r, g, b]));

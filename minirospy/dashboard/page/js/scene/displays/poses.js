@@ -3,6 +3,7 @@
 import { ConeGeometry, Group, InstancedMesh, Matrix4, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
 import { arrow, axes, BALL, bodyMaterial, BOX, chain, directed, ellipse, plainMaterial, segments } from "../shapes.js";
 import { fromMessage } from "../transforms.js";
+import { t } from "../../texts.js";
 import { TopicDisplay } from "./display.js";
 
 const MOST_KEPT = 2000;
@@ -58,7 +59,7 @@ class LastMessage extends TopicDisplay {
 export class Pose extends LastMessage {
   make(message) {
     const stamped = message.pose.pose ?? message.pose;
-    if (!isFinitePose(stamped)) throw new Error("Message contained invalid floating point values (nans or infs)");
+    if (!isFinitePose(stamped)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
     const group = grouped(posed(this.pointer(), stamped));
     if (message.pose.covariance && this.get("Covariance/Position/Value") !== false) {
       const ball = ellipse(message.pose.covariance);
@@ -72,7 +73,7 @@ export class Pose extends LastMessage {
 export class PoseArray extends LastMessage {
   make({ poses }) {
     const shown = poses.filter(isFinitePose);
-    this.setStatus("Poses", shown.length < poses.length ? 1 : 0, `${shown.length} of ${poses.length} poses`);
+    this.setStatus("Poses", shown.length < poses.length ? 1 : 0, t("{count} of {all} poses", { count: shown.length, all: poses.length }));
     const shape = this.get("Shape");
     if (shape === "Arrow (Flat)") {
       // Lines of one object: thousands of particles are usual.
@@ -109,7 +110,7 @@ export class Odometry extends LastMessage {
 
   show(message) {
     const { pose } = message.pose;
-    if (!isFinitePose(pose)) throw new Error("Message contained invalid floating point values (nans or infs)");
+    if (!isFinitePose(pose)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
     const now = fromMessage(pose);
     if (this.last) {
       const moved = Math.hypot(...now.p.map((value, index) => value - this.last.p[index]));
@@ -137,10 +138,10 @@ export class Path extends LastMessage {
       const { x, y, z } = pose.position;
       points.set([x, y, z], index * 3);
     });
-    if (!points.every(Number.isFinite)) throw new Error("Message contained invalid floating point values (nans or infs)");
+    if (!points.every(Number.isFinite)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
     // Poses of other frames are drawn as if they were in the path's: RViz does that, too, and names none.
     const others = poses.filter(({ header: own }) => own.frame_id && own.frame_id !== header.frame_id).length;
-    this.setStatus("Poses", others ? 1 : 0, `${poses.length} poses${others ? `, ${others} of another frame than the path's` : ""}`);
+    this.setStatus("Poses", others ? 1 : 0, t("{count} poses", { count: poses.length }) + (others ? t(", {count} of another frame than the path's", { count: others }) : ""));
     const group = new Group();
     group.position.set(...["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
     const isBroad = this.get("Line Style") === "Billboards";
@@ -182,7 +183,7 @@ export class Range extends LastMessage {
     // As RViz: a fixed distance (least = most) that is not reached is nothing.
     const shown = least === most && range > 0 ? most : range;
     if (!(shown > 0) || !Number.isFinite(shown)) {
-      this.setStatus("Range", 0, `nothing in range (${range})`);
+      this.setStatus("Range", 0, t("nothing in range ({range})", { range }));
       return new Group();
     }
     this.setStatus("Range", 0, `${Number(shown.toFixed(4))} m`);
@@ -222,7 +223,7 @@ export class Wrench extends LastMessage {
     for (const [{ x, y, z }, name, scale] of shown) {
       const vector = new Vector3(x, y, z).multiplyScalar(scale);
       const length = vector.length();
-      if (!Number.isFinite(length)) throw new Error("Message contained invalid floating point values (nans or infs)");
+      if (!Number.isFinite(length)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
       if (length < 1e-6 || (length <= width && this.get("Hide Small Values") !== false)) continue;
       // As RViz: the shaft alone is as long as the value.
       const material = bodyMaterial(this.color(name), this.number("Alpha", 1));
@@ -251,6 +252,6 @@ export class Wrench extends LastMessage {
 export class Linked extends TopicDisplay {
   start() {
     const topic = String(this.get("Image Topic") ?? "");
-    this.setStatus("Topic", topic ? 0 : 1, topic ? "Shown by the view Image" : "No topic is set");
+    this.setStatus("Topic", topic ? 0 : 1, topic ? t("Shown by the view Image") : t("No topic is set"));
   }
 }

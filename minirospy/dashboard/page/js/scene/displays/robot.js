@@ -5,6 +5,7 @@ import { loadMesh } from "../meshes.js";
 import { BALL, bodyMaterial, BOX, ROLL } from "../shapes.js";
 import { compose, missingText, plainName } from "../transforms.js";
 import { linkPoses, parseUrdf } from "../urdf.js";
+import { t } from "../../texts.js";
 import { Display } from "./display.js";
 
 const PLAIN = [180, 180, 180, 1];
@@ -44,16 +45,16 @@ export class RobotModel extends Display {
     this.links.clear();
     this.robot = null;
     if (typeof text !== "string") {
-      this.setStatus("URDF", 2, `Parameter [${name}] does not exist, and was not found by searchParam()`);
+      this.setStatus("URDF", 2, t("Parameter [{name}] does not exist, and was not found by searchParam()", { name }));
       return;
     }
     try {
       this.robot = parseUrdf(text);
     } catch (error) {
-      this.setStatus("URDF", 2, `URDF failed Model parse: ${error.message}`);
+      this.setStatus("URDF", 2, t("URDF failed Model parse: {why}", { why: error.message }));
       return;
     }
-    this.setStatus("URDF", 0, "URDF parsed OK");
+    this.setStatus("URDF", 0, t("URDF parsed OK"));
     this.poses = null;
     this.isLoading = 0;
     this.failed = [];
@@ -110,7 +111,7 @@ export class RobotModel extends Display {
     for (const [name, item] of this.links) {
       const frame = this.frameOf(name);
       if (frames.has(frame) || plainName(frame) === fixedFrame) this.context.place(item);
-      else item.error = { message: `Frame [${frame}] does not exist` };
+      else item.error = { message: t("Frame [{frame}] does not exist", { frame }) };
       if (item.error && !this.placeByJoints(name, item)) {
         item.object.visible = false;
         missing.push([frame, item.error]);
@@ -118,8 +119,8 @@ export class RobotModel extends Display {
     }
     if (missing.length) {
       const [[frame, error]] = missing;
-      this.setStatus("Transform", 2, `${missingText(frame, fixedFrame, error)}${missing.length > 1 ? `; and ${missing.length - 1} more links` : ""}`);
-    } else this.setStatus("Transform", 0, "Transform OK");
+      this.setStatus("Transform", 2, `${missingText(frame, fixedFrame, error)}${missing.length > 1 ? t("; and {count} more links", { count: missing.length - 1 }) : ""}`);
+    } else this.setStatus("Transform", 0, t("Transform OK"));
   }
 
   /** Put a link where the positions of the joints have it, below the root link; return whether that is possible. */
