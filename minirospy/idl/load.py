@@ -201,7 +201,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     """
     sources = compile_package(catalogue, package)
     if on_demand:
-        sources = _on_demand(sources, package)
+        sources = _on_demand(sources)
         for kind in ("msg", "srv"):
             # Of an earlier build, which compiled it ahead.
             for stale in (root / package / kind).glob("_[!_]*.py"):
@@ -212,22 +212,29 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     return [path for name, source in sources.items() if write_if_changed(path := folder / name, source)]
 
 
-def _on_demand(sources: dict[str, str], package: str) -> dict[str, str]:
+def _on_demand(sources: dict[str, str]) -> dict[str, str]:
     """Return the files of a package whose modules are made when they are imported."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
-    call = f"add_package({package!r}, {fingerprint})"
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
             # What emit_package writes into each such file is here in one place.
-            doc, _, rest = text.partition("import importlib\n")
-            names = rest[rest.index("_NAMES") : rest.index("\n\n\ndef ")]
+            names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
-                f"{doc}from minirospy.idl.on_demand import add_package, accessors\n\n{names}\n"
-                f"__getattr__, __dir__ = accessors(__name__, _MODULES)\n\n{call}\n"
+                f"{text.partition('import importlib')[0]}from minirospy.idl.on_demand import load_package\n\n"
+                f"__getattr__, __dir__, __all__ = load_package(__name__, {fingerprint}, {names!r})\n"
             )
     return kept
+
+
+def _is_in(module: str, init: str) -> bool:
+    return _is_module(module) and module.partition("/")[0] == init.partition("/")[0]
+
+
+def _module_name(name: str) -> str:
+    """Return ``Name`` of ``msg/_Name.py``."""
+    return name.partition("/_")[2].removesuffix(".py")
 
 
 def _is_module(name: str) -> bool:

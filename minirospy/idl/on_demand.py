@@ -1,6 +1,6 @@
 """Definitions -> modules, when they are first imported: for the many packages of which a program uses a few types.
 
-A package that is compiled so has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`add_package`; from then on
+A package that is compiled so has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`load_package`; from then on
 ``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python keeps the result in ``__pycache__`` as it does with
 any module. Where that folder cannot be written to, the module is compiled again in each process.
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import spec_from_file_location
@@ -24,29 +24,32 @@ if TYPE_CHECKING:
 
     from minirospy.idl.load import Catalogue
 
-__all__ = ["accessors", "add_package"]
+__all__ = ["load_package"]
 
 
-def add_package(package: str, fingerprint: int) -> None:
-    """Let the modules of a package of ours be imported. ``fingerprint`` changes with the text of any of them."""
+def load_package(
+    module: str, fingerprint: int, names: str
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """Let the modules of ``pkg.msg`` or ``pkg.srv`` be imported; return its ``__getattr__``, ``__dir__`` and ``__all__``.
+
+    ``names``: its messages or services, with spaces between. ``fingerprint`` changes with the text of any module of the package.
+    """
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
+    package, _, kind = module.rpartition(".")
     _FINDER.packages[package] = fingerprint
-
-
-def accessors(
-    package: str, modules: Mapping[str, str]
-) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return the ``__getattr__`` and ``__dir__`` of ``pkg.msg`` or ``pkg.srv``; ``modules``: names -> the modules with them."""
+    parts = ("", "Request", "Response") if kind == "srv" else ("",)
+    modules = {name + part: f"{module}._{name}" for name in names.split() for part in parts}
 
     def load(name: str) -> object:
         if name not in modules:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value: object = getattr(importlib.import_module(f"{package}.{modules[name]}"), name)
-        setattr(sys.modules[package], name, value)
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        value: object = getattr(importlib.import_module(modules[name]), name)
+        setattr(sys.modules[module], name, value)
         return value
 
-    return load, lambda: sorted(modules)
+    all_names = sorted(modules)
+    return load, lambda: all_names, all_names
 
 
 class _Finder:
