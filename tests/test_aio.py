@@ -35,6 +35,7 @@ from minirospy.errors import (
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from minirospy.times import Duration, Time
 from minirospy.wire.tcpros import InterfaceType
+from tests.waiting import until
 
 SECONDS = 40.0
 
@@ -58,12 +59,6 @@ def graph(master: str) -> Iterator[MasterProxy]:
     proxy = MasterProxy(master, "/test")
     yield proxy
     proxy.close()
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    """Return when a condition holds; the test's own time limit ends it."""
-    while not condition():
-        await asyncio.sleep(0.005)
 
 
 def test_aio_is_an_attribute_of_the_package() -> None:

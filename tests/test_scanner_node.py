@@ -18,6 +18,7 @@ from sick_safetyscanners.msg import OutputPathsMsg, RawMicroScanDataMsg
 from minirospy import Node
 from minirospy.gpio.board import Board
 from minirospy.scanner import BEAMS
+from tests.waiting import until
 
 NODE = Path(__file__).parents[1] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
 SECONDS = 40.0
@@ -45,8 +46,7 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
 
 async def until_person_is(board: Board, wanted: object) -> None:
     """Wait for the move on each board: each has its own connection."""
-    while board.person != wanted:
-        await asyncio.sleep(0.005)
+    await until(lambda: board.person == wanted)
 
 
 async def until_paths_are(node: Node, wanted: list[bool]) -> None:

@@ -19,6 +19,7 @@ from minirospy.actionlib.aio import server as server_module
 from minirospy.actionlib.spec import ActionException
 from minirospy.errors import ROSException, ROSInterruptException
 from minirospy.graph.goals import GoalState
+from tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("master")
 
@@ -67,8 +68,7 @@ async def _done(work: Awaitable[None]) -> None:
 
 async def started(goal: Any) -> None:
     """Return when the server works on the goal."""
-    while goal.state is not GoalState.ACTIVE:
-        await asyncio.sleep(0.005)
+    await until(lambda: goal.state is GoalState.ACTIVE)
 
 
 def test_feedback_and_result() -> None:
@@ -274,8 +274,9 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
         async def sleep(seconds: float) -> None:
             # Both have come by now; the one whose pause is shorter is done before the other goes on.
             pauses.append(seconds)
-            while len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server._goals):
-                await asyncio.sleep(0.001)
+            await until(
+                lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server._goals))
+            )
 
         monkeypatch.setattr(server_module, "asyncio", SimpleNamespace(**{**vars(asyncio), "sleep": sleep}))
         async with (

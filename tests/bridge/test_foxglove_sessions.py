@@ -25,6 +25,7 @@ from minirospy.times import Time
 from minirospy.wire.tcpros import InterfaceType
 from minirospy.workspace.packages import Packages
 from tests.conftest import write_files
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running
@@ -264,8 +265,7 @@ def test_changes_of_parameters_reach_subscribers(bridge: Running) -> None:
         each.next("parameterValues", lambda message: message.get("id") == "there")
 
     async def watched() -> None:
-        while "/" not in bridge.bridge.node._node.parameters:
-            await asyncio.sleep(0.01)
+        await until(lambda: "/" in bridge.bridge.node._node.parameters)
 
     bridge.run(watched())
     bridge.run(node.set_param("/a", 2))

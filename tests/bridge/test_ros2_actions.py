@@ -43,6 +43,7 @@ from minirospy.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
+from tests.waiting import until
 
 FIBONACCI = "example_interfaces/Fibonacci"
 SEND_GOAL = {"/fly/_action/send_goal": "example_interfaces/Fibonacci_SendGoal"}
@@ -146,8 +147,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
 
 async def sent(side: FakeSide, number: int) -> Any:
     """Return a goal that ROS 2 has got: its CDR, where feedback goes, its handle."""
-    while len(side.action_clients["/fly"].goals) <= number:
-        await asyncio.sleep(0.01)
+    await until(lambda: len(side.action_clients["/fly"].goals) > number)
     return side.action_clients["/fly"].goals[number]
 
 
@@ -177,8 +177,7 @@ def test_goals_of_ros1_go_to_ros2_and_come_to_an_end() -> None:
                 goal = client.send(FibonacciGoal(order=3))
                 _, _, handle = await sent(side, number)
                 goal.cancel()
-                while not handle.is_cancelled:
-                    await asyncio.sleep(0.01)
+                await until(lambda handle=handle: handle.is_cancelled)  # type: ignore[misc]
                 handle.ended.set_result((end, cdr(7)))
                 assert await end_of(goal) == (state, [7])
 

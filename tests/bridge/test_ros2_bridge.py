@@ -33,6 +33,7 @@ from minirospy.idl.load import message_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
+from tests.waiting import until
 
 STRING = Ros2End("/peer", "std_msgs/String")
 
@@ -424,8 +425,7 @@ async def connected(bridge: Ros2Bridge, count: int = 1) -> None:
     def found() -> int:
         return sum(len(each._subscription.headers) for each in bridge.topics.links.values())
 
-    while found() < count:
-        await asyncio.sleep(0.01)
+    await until(lambda: found() >= count)
 
 
 def raw(name: str) -> Any:

@@ -25,6 +25,7 @@ from minirospy.wire.service import serialize_response
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
+from tests.waiting import until
 
 SET_BOOL = "std_srvs/SetBool"
 LIMIT = 60.0
@@ -142,8 +143,7 @@ def test_a_call_ends_with_the_server_of_ros2() -> None:
         side.offered["/set"] = SET_BOOL
         await bridge.look()
         calling = asyncio.ensure_future(call(node, "/set", b"\1"))
-        while not side.clients["/set"].requests:
-            await asyncio.sleep(0.01)
+        await until(lambda: side.clients["/set"].requests)
         side.clients["/set"].is_ready = False
         with pytest.raises(ServiceException, match="has ended during the call"):
             await calling

@@ -30,6 +30,7 @@ from minirospy.bridge.rosbridge import png, protocol
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
 from minirospy.errors import ServiceException
 from minirospy.wire.tcpros import InterfaceType
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running
@@ -212,8 +213,7 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
     client.synchronize()
 
     async def unadvertised() -> None:
-        while "/x" in bridge.bridge.graph._publishers:
-            await asyncio.sleep(0.01)
+        await until(lambda: "/x" not in bridge.bridge.graph._publishers)
 
     bridge.run(asyncio.wait_for(unadvertised(), 30))
 

@@ -26,6 +26,7 @@ from minirospy.bridge.access import Access
 from minirospy.bridge.web.connection import Limits
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.errors import BridgeError
+from tests.waiting import wait_until
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Client, Running
@@ -187,8 +188,9 @@ def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[...
     listener = bridge.bridge.listeners["foxglove"]
 
     def wait_for_unfinished(total: int) -> None:
-        while bridge.call(lambda: sum(each.unfinished for each in listener.connections)) != total:
-            time.sleep(0.005)
+        wait_until(
+            lambda: bridge.call(lambda: sum(each.unfinished for each in listener.connections)) == total
+        )
 
     other = bridge.client()
     with contextlib.ExitStack() as stack:
@@ -217,8 +219,7 @@ def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) 
     (connection,) = bridge.bridge.listeners["foxglove"].connections
     # It sends nothing unasked from now on.
     heard = connection._received
-    while connection._received <= heard:
-        time.sleep(0.01)
+    wait_until(lambda: connection._received > heard)
     assert_alive(client)
 
 
@@ -243,8 +244,7 @@ def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Runn
     assert_alive(first)
     for sock in held:
         sock.close()
-    while bridge.call(lambda: len(listener.connections)) > 1:
-        time.sleep(0.01)
+    wait_until(lambda: bridge.call(lambda: len(listener.connections)) <= 1)
     assert_alive(bridge.client())
 
 
@@ -302,8 +302,7 @@ def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> 
                     b"\1\0\0\0\0\0\0\0" if sys.platform != "win32" else b"\1\0\0\0",
                 )
     listener = bridge.bridge.listeners["foxglove"]
-    while bridge.call(lambda: len(listener.connections)) > 1:
-        time.sleep(0.01)
+    wait_until(lambda: bridge.call(lambda: len(listener.connections)) <= 1)
     assert len(bridge.bridge.foxglove.sessions) == 1
     assert_alive(steady)
 
@@ -326,8 +325,7 @@ def test_connections_that_come_too_often_are_refused(bridge: Running) -> None:
     assert_alive(first)
     now = 1.0
     assert_alive(bridge.client())
-    while bridge.call(lambda: len(listener.connections)) > 2:
-        time.sleep(0.01)
+    wait_until(lambda: bridge.call(lambda: len(listener.connections)) <= 2)
 
 
 def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[..., Running]) -> None:
@@ -393,8 +391,7 @@ def test_disconnected_client_leaves_no_messages_in_memory(bridge: Running) -> No
     while bridge.call(lambda: len(connection.queue)) < 5:
         bridge.run(publisher.publish(data=bytes(200_000)))
     stuck.close()
-    while bridge.call(lambda: len(bridge.bridge.listeners["foxglove"].connections)):
-        time.sleep(0.01)
+    wait_until(lambda: not bridge.call(lambda: len(bridge.bridge.listeners["foxglove"].connections)))
     assert (len(connection.queue), connection.queue.size) == (0, 0)
 
 

@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any
@@ -18,6 +17,7 @@ import pytest
 from minirospy.introspect import nodes
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
+from tests.waiting import wait_until
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
@@ -130,9 +130,7 @@ def test_ping(robot: Any, command: Any, program: Start, monkeypatch: pytest.Monk
 
 def test_kill(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert command("rosnode", "kill", "/robot") == (0, "killing /robot\nkilled\n", "")
-    deadline = time.monotonic() + 30
-    while not robot.stopped and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_until(lambda: robot.stopped)
     assert "user request" in robot.stopped[0]
     monkeypatch.setattr(sys, "stdin", io.StringIO("x\n7\n1\n"))
     out = command("rosnode", "kill").out

@@ -22,6 +22,7 @@ from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.tcpros import InterfaceType
+from tests.waiting import wait_until
 
 from .conftest import own_lines
 
@@ -156,7 +157,7 @@ def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "data: True"])
     assert pub.stdout is not None
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
-    _until(lambda: robot.heard == [b"\x01"])
+    wait_until(lambda: robot.heard == [b"\x01"])
     _interrupt(pub)
     assert pub.communicate(timeout=30) == ("", "")
     assert pub.returncode == 0
@@ -168,7 +169,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     def wait(_: ToolNode, seconds: float) -> bool:
         # On a busy machine a subscriber may need longer.
         waits.append(seconds)
-        _until(lambda: len(robot.heard) == len(waits))
+        wait_until(lambda: len(robot.heard) == len(waits))
         return False
 
     with monkeypatch.context() as patched:
@@ -199,7 +200,7 @@ def test_pub_from_standard_input_and_file(
     assert command("rostopic", *pub, "-f", str(file)).status == 0
     monkeypatch.setattr(sys, "stdin", io.StringIO("data: True\n"))
     assert command("rostopic", *pub).status == 0
-    _until(lambda: robot.heard == [b"\x01", b"\x00", b"\x01"])
+    wait_until(lambda: robot.heard == [b"\x01", b"\x00", b"\x01"])
     monkeypatch.setattr(sys, "stdin", io.StringIO(""))
     assert "please specify message values: data" in command("rostopic", *pub).err
     assert "file [nope.yaml] not found" in command("rostopic", *pub, "-f", "nope.yaml").err
@@ -330,13 +331,6 @@ def _interrupt(process: subprocess.Popen[str]) -> None:
     process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
 
 
-def _until(is_so: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 30
-    while not is_so():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
 def test_echo_options_that_cannot_be(master: str, command: Any) -> None:
     for words, why in (
         (["-w", "1", "/t"], "the fixed width of numbers is at least 2"),
@@ -371,13 +365,13 @@ def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
     for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
         pub.stdin.write(text)
         pub.stdin.flush()
-        _until(lambda expected=heard: robot.heard == expected)  # type: ignore[misc]
+        wait_until(lambda expected=heard: robot.heard == expected)  # type: ignore[misc]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there immediately")
 def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, command: Any) -> None:
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "True"])
-    _until(lambda: robot.heard == [b"\x01"])
+    wait_until(lambda: robot.heard == [b"\x01"])
     pub.terminate()
     assert pub.wait(30) == 0
     assert command("rosnode", "list").out == "/robot\n"
@@ -435,7 +429,7 @@ def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: St
     pub = program(
         ["rosrun", "rostopic", "rostopic", "pub", "a", "std_msgs/Bool", "True", "a:=/listen", "__name:=fake"]
     )
-    _until(lambda: robot.heard == [b"\x01"])
+    wait_until(lambda: robot.heard == [b"\x01"])
     assert command("rosnode", "list").out == "/fake\n/robot\n"
     _interrupt(pub)
     assert pub.wait(30) == 0

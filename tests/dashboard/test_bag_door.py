@@ -7,7 +7,6 @@ import json
 import os
 import struct
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from minirospy.errors import BagFormatError
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag, text_body
 from tests.dashboard.conftest import TOKEN
+from tests.waiting import wait_until
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -172,13 +172,6 @@ def listened(served: Served, topic: str) -> list[str]:
 
     served.run(listen())
     return found
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def test_nothing_is_published_until_that_is_switched_on(

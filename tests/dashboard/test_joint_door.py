@@ -7,7 +7,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from minirospy.introspect.snapshot import fetch
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.dashboard.robot import ROBOT
+from tests.waiting import wait_until
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -174,10 +174,7 @@ def test_topics_are_left_with_the_page_and_the_parameter(
     set_params(served, source_list=["/from_other"])
     page.next("joints")
     page.socket.close()
-    until = time.monotonic() + 60
-    while any(topics()):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    wait_until(lambda: not any(topics()))
 
 
 def test_description_that_comes_later_or_is_broken_is_followed(

@@ -21,6 +21,7 @@ from minirospy.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSessi
 from minirospy.dashboard.launch_run import RunState
 from tests.dashboard.conftest import TOKEN
 from tests.dashboard.lamp import make_lamp
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient
@@ -236,8 +237,7 @@ def test_launch_that_is_added_while_launches_are_reported() -> None:
 
     async def work() -> None:
         session = LaunchSession(cast(LaunchDoor, SimpleNamespace(runs=runs)), cast("WebClient", client))
-        while not sent and not session.task.done():
-            await asyncio.sleep(0.01)
+        await until(lambda: not (not sent and not session.task.done()))
         session.ended()
         with contextlib.suppress(asyncio.CancelledError):
             await session.task

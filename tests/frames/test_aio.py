@@ -20,6 +20,7 @@ from minirospy.errors import (
 )
 from minirospy.frames.aio import Broadcaster, Buffer
 from minirospy.times import Time
+from tests.waiting import until
 
 LONG = 40.0
 
@@ -161,8 +162,7 @@ class TestBuffer:
 
         async def bounded(node: Node, buffer: Buffer) -> None:
             task = asyncio.create_task(main(node, buffer))
-            while "is not a tf2_msgs/TFMessage" not in caplog.text:
-                await asyncio.sleep(0.01)
+            await until(lambda: "is not a tf2_msgs/TFMessage" in caplog.text)
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function
 from minirospy.gpio.place import Place
 from minirospy.gpio.rpigpio import BCM, OUT, Gpio
+from tests.waiting import wait_until
 
 
 @pytest.fixture
@@ -136,10 +136,7 @@ def test_many_start_one_server() -> None:
     opened[2].press(12)
     assert next(edges).level == 1
     # Those that lost the race may still be on their way out; one stays.
-    deadline = time.monotonic() + 30
-    while len(servers(Place.find())) > 1 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert len(servers(Place.find())) == 1
+    wait_until(lambda: len(servers(Place.find())) == 1)
 
     for child in children:
         child.communicate("\n", timeout=30)

@@ -16,7 +16,8 @@ from rosbags.rosbag1 import Reader
 from minirospy.bag.writer import BagWriter
 from minirospy.wire.tcpros import InterfaceType
 from tests.interop.conftest import REAL_PYTHON, environment
-from tests.recording.conftest import STRING, Talker, connected, said, say, wait_until
+from tests.recording.conftest import STRING, Talker, connected, said, say
+from tests.waiting import wait_until
 
 CPP = Path("/usr/lib/rosbag")
 BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -15,15 +13,7 @@ import roslaunch.roslaunch_logs
 
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
-
-
-def eventually(condition: Callable[[], object]) -> bool:
-    """Return whether a condition holds within half a minute."""
-    end = time.monotonic() + 30
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.01)
-    return bool(condition())
-
+from tests.waiting import wait_until
 
 SAID = """\
 the master's run id True given
@@ -117,7 +107,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
         process.popen.wait(30)
         process.stop()
         monitor = launch.parent.pm
-        assert eventually(lambda: not monitor.get_active_names())
+        wait_until(lambda: not monitor.get_active_names())
         assert (process.spawn_count, process.exit_code) == (1, 3)
         assert [each.name for each in monitor.dead_list] == [process.name]
     finally:
@@ -161,10 +151,10 @@ def test_a_listener_may_fail_and_may_stop_the_launch(
     launch.start()
     monitor = launch.pm
     try:
-        assert eventually(lambda: died == ["b"])
+        wait_until(lambda: died == ["b"])
         assert not monitor.done
         launch.runner.launch_node(roslaunch.core.Node("pkg", "stop.py", "c", args="0"))
-        assert eventually(lambda: monitor.done)
+        wait_until(lambda: monitor.done)
         assert (died[1], monitor.get_active_names()) == ("c", [])
         assert "a process listener failed\nTraceback" in capfd.readouterr().err
     finally:
@@ -190,7 +180,7 @@ def test_a_monitor_of_ones_own(master: str, package: Path) -> None:
     process = roslaunch.nodeprocess.create_node_process("run", node, master)
     monitor.register(process)
     assert process.start()
-    assert eventually(lambda: codes == [4])
+    wait_until(lambda: codes == [4])
     assert not monitor.done
     monitor.registrations_complete()
     monitor.join(30)

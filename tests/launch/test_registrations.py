@@ -5,8 +5,7 @@ from __future__ import annotations
 import signal
 import socket
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -22,6 +21,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
 from tests.launch.conftest import Running, Start
+from tests.waiting import wait_until
 
 NODE = """import signal, sys, rospy
 from std_msgs.msg import String
@@ -123,13 +123,6 @@ def test_close_waits_for_the_nodes_added_before(master: str) -> None:
     dead.close()
     assert registered(master) == set()
     dead.close()
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def process_of(launch: Running, name: str) -> psutil.Process:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, NamedTuple
@@ -18,6 +17,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import InterfaceType
+from tests.waiting import wait_until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
 GUARD = 45.0
@@ -40,14 +40,6 @@ def messages(path: Path) -> list[Recorded]:
             Recorded(connection.topic, connection.ext.callerid or "", time, body)  # type: ignore[union-attr]
             for connection, time, body in reader.messages()
         ]
-
-
-def wait_until(condition: Callable[[], object]) -> None:
-    """Poll a condition until it is true."""
-    end = time.monotonic() + GUARD
-    while not condition():
-        assert time.monotonic() < end, "it did not become true"
-        time.sleep(0.01)
 
 
 class Talker:

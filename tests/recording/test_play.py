@@ -17,7 +17,8 @@ from minirospy.bag.writer import BagWriter
 from minirospy.environment import Environment
 from minirospy.introspect.streams import ToolNode
 from minirospy.wire.tcpros import InterfaceType
-from tests.recording.conftest import GUARD, STRING, Start, Talker, connected, read_until, said, wait_until
+from tests.recording.conftest import GUARD, STRING, Start, Talker, connected, read_until, said
+from tests.waiting import wait_until
 
 SECOND = 10**9
 START = 1000 * SECOND

@@ -22,6 +22,7 @@ from minirospy.rosserial.ports import SerialPort
 from minirospy.workspace.packages import Packages
 from tests.conftest import free_port
 from tests.robots.conftest import SECONDS, Start, end
+from tests.waiting import until
 
 HERE = Path(__file__).parent
 UNIX = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are Unix's")
@@ -106,8 +107,7 @@ def test_devices_connect_by_tcp_one_after_the_other(start: Start, fork: str) -> 
                     await words.publish(String("short"))
                     (packet,) = await asyncio.to_thread(packets, device, decoder, 1)
                     assert packet == (WORDS, to_bytes(String("short")))
-                while words.num_connections or received.num_connections:
-                    await asyncio.sleep(0.02)
+                await until(lambda: not (words.num_connections or received.num_connections))
 
     asyncio.run(asyncio.wait_for(body(), SECONDS * 2))
     output, errors = end(process)
@@ -144,8 +144,7 @@ def test_line_that_breaks_is_opened_again(start: Start, tmp_path: Path) -> None:
             await talk(first[0], "first", received)
             for end_of_line in first:
                 os.close(end_of_line)
-            while received.num_connections:
-                await asyncio.sleep(0.02)
+            await until(lambda: not received.num_connections)
             second = plug()
             await talk(second[0], "second", received)
             os.close(second[0])

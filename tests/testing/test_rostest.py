@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,6 +15,7 @@ import pytest
 from minirospy.cli.ros.rostest import rostest, rosunit
 from minirospy.errors import MinirospyError
 from minirospy.testing.bare import run_bare
+from tests.waiting import wait_until
 
 HERE = Path(__file__).parent
 TEST = HERE / "tested" / "test"
@@ -140,9 +140,7 @@ def test_ctrl_c_ends_all_tests(tmp_path: Path) -> None:
         for name in "ab"
     )
     popen = start("rostest", "--package=p", "--pkgdir=/", write_test(tmp_path / "x.test", text))
-    end = time.monotonic() + 30
-    while not list((tmp_path / "log").glob("rostest-*/a-1-stdout.log")) and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_until(lambda: list((tmp_path / "log").glob("rostest-*/a-1-stdout.log")))
     os.kill(popen.pid, signal.SIGINT)
     out, err = popen.communicate(timeout=30)
     assert popen.returncode == 1
@@ -156,9 +154,7 @@ def test_ctrl_c_is_no_success_of_rosunit(tmp_path: Path) -> None:
     started, file = tmp_path / "started", tmp_path / "slow.py"
     file.write_text(f"import time\nopen({str(started)!r}, 'w')\ntime.sleep(60)\n")
     popen = start("rosunit", "--package=p", file)
-    end = time.monotonic() + 30
-    while not started.exists() and popen.poll() is None and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_until(lambda: started.exists() or popen.poll() is not None)
     os.kill(popen.pid, signal.SIGINT)
     _, err = popen.communicate(timeout=30)
     assert popen.returncode == 1

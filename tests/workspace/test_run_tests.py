@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from minirospy.cli.catkin.test_results import main as catkin_test_results
 from minirospy.cli.catkin.tool import catkin
 from minirospy.workspace.plan import Test as PlannedTest
 from minirospy.workspace.plan import read_plan
+from tests.waiting import wait_until
 
 if TYPE_CHECKING:
     from conftest import Scene
@@ -177,9 +177,7 @@ def test_slow():
         text=True,
         start_new_session=True,
     )
-    end = time.monotonic() + 30
-    while not started.exists() and popen.poll() is None and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_until(lambda: started.exists() or popen.poll() is not None)
     os.killpg(popen.pid, signal.SIGINT)
     _, err = popen.communicate(timeout=30)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Callable
 
 import pytest
 
@@ -14,19 +13,12 @@ from minirospy.runtime.master import dead_nodes
 from minirospy.runtime.master import master as masters
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.server import RpcServer
+from tests.waiting import until
 
 
 def closed_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as server:
         return int(server.getsockname()[1])
-
-
-async def until(condition: Callable[[], object]) -> None:
-    async def wait() -> None:
-        while not condition():
-            await asyncio.sleep(0.01)
-
-    await asyncio.wait_for(wait(), 30)
 
 
 def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pytest.MonkeyPatch) -> None:

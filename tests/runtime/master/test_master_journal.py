@@ -33,6 +33,7 @@ from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.journal import HEAD, parse_journal
 from minirospy.wire.xmlrpc import parse_response, serialize_response
 from tests.conftest import free_port
+from tests.waiting import until, wait_until
 
 BIN = Path(sys.executable).parent
 
@@ -66,11 +67,6 @@ class Fakes:
 
 def run(test: Coroutine[Any, Any, None]) -> None:
     asyncio.run(asyncio.wait_for(test, 30))
-
-
-async def until(condition: Callable[[], object]) -> None:
-    while not condition():
-        await asyncio.sleep(0.005)
 
 
 def state(master: Master) -> Any:
@@ -965,8 +961,5 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
 
 def first_to_end(processes: list[subprocess.Popen[bytes]]) -> list[subprocess.Popen[bytes]]:
     """Return the processes, the one first that has exited."""
-    start_time = time.monotonic()
-    while all(each.poll() is None for each in processes):
-        assert time.monotonic() - start_time < 60
-        time.sleep(0.01)
+    wait_until(lambda: any(each.poll() is not None for each in processes))
     return sorted(processes, key=lambda each: each.poll() is None)

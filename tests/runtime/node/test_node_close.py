@@ -173,8 +173,7 @@ def test_close_sends_the_unregistration_before_it_flushes() -> None:
             node = await publishing_node(master.uri)
             master.release.clear()
             closing = asyncio.ensure_future(node.close())
-            while "system.multicall" not in [method for method, _ in master.calls]:
-                await asyncio.sleep(0)
+            await until(lambda: "system.multicall" in [method for method, _ in master.calls])
             assert not closing.done()
             master.release.set()
             await closing
@@ -190,11 +189,9 @@ def test_close_unregisters_a_name_after_the_call_under_way() -> None:
             master.release.clear()
             publication = node.publications["/t0"]
             leaving = asyncio.ensure_future(node.unadvertise(publication))
-            while not master.calls:
-                await asyncio.sleep(0)
+            await until(lambda: master.calls)
             closing = asyncio.ensure_future(node.close())
-            while len(master.calls) < 2:
-                await asyncio.sleep(0)
+            await until(lambda: len(master.calls) >= 2)
             master.release.set()
             await asyncio.gather(leaving, closing)
             assert master.unregistered == ALL

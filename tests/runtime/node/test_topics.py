@@ -50,12 +50,6 @@ def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
         loop.close()
 
 
-async def eventually(condition: Callable[[], object]) -> None:
-    """Wait until a condition holds; the test's time limit ends the wait."""
-    while not condition():
-        await asyncio.sleep(0.01)
-
-
 def environment(master: Master) -> Environment:
     return Environment.read(
         {
@@ -151,10 +145,10 @@ def test_messages_go_from_node_to_node() -> None:
             box = Box()
             publication = await publish(a, "/t")
             await listen(b, "/t", box)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             publication.publish(serialize_frame(b"one"))
             publication.publish(serialize_frame(b"two"))
-            await eventually(lambda: len(box.bodies) == 2)
+            await until(lambda: len(box.bodies) == 2)
             assert box.bodies == [b"one", b"two"]
             assert (box.headers[0]["callerid"], box.headers[0]["topic"]) == ("/a", "/t")
 
@@ -169,9 +163,9 @@ def test_a_publisher_that_closes_the_connection_is_connected_again() -> None:
             publication = await publish(a, "/t")
             await listen(b, "/t", box)
             for number in range(3):
-                await eventually(lambda: publication.links)
+                await until(lambda: publication.links)
                 publication.publish(serialize_frame(b"%d" % number))
-                await eventually(lambda number=number: len(box.bodies) == number + 1)
+                await until(lambda number=number: len(box.bodies) == number + 1)
                 publication.links[0].close()
             assert box.bodies == [b"0", b"1", b"2"]
 
@@ -186,13 +180,13 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
             publication = Publication("/t", BOOL)
             await a.advertise(publication)
             subscription = await listen(b, "/t", Box())
-            await eventually(lambda: "refused the connection" in caplog.text)
+            await until(lambda: "refused the connection" in caplog.text)
             assert not publication.links
             # Its task has logged that; it has ended a turn of the loop later.
-            await eventually(lambda: not subscription._connecting)
+            await until(lambda: not subscription._connecting)
             await a.unadvertise(publication)
             right = await publish(a, "/t")
-            await eventually(lambda: right.links)
+            await until(lambda: right.links)
 
     run(scene)
     assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
@@ -217,7 +211,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
             monkeypatch.setattr(
                 subscription, "_start_connecting", lambda action: (delays.append(action.delay), start(action))
             )
-            await eventually(lambda: len(delays) >= 4)
+            await until(lambda: len(delays) >= 4)
             subscription.close()
             await foreign.close()
             assert box.bodies == []
@@ -239,7 +233,7 @@ def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
         async with graph("/b") as (_, (b,)):
             foreign = Foreign(bad_header)
             subscription = await subscribe_to(foreign, monkeypatch, b, Box())
-            await eventually(lambda: foreign.connections >= 6)
+            await until(lambda: foreign.connections >= 6)
             subscription.close()
             await foreign.close()
 
@@ -267,7 +261,7 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
         async with graph("/b") as (_, (b,)):
             subscription = b.make_subscription("/t", STRING, Box())
             subscription.publishers_changed([uri])
-            await eventually(lambda: subscription._plan.failures(uri) >= 5)
+            await until(lambda: subscription._plan.failures(uri) >= 5)
             subscription.close()
 
     run(scene)
@@ -313,7 +307,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
             publication = await publish(a, "/t", queue_size=2)
             subscription = b.make_subscription("/t", STRING, slow, newest=1)
             await b.subscribe(subscription)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             publication.publish(serialize_frame(b"0000" + bytes(1_000_000)))
             await asyncio.get_running_loop().run_in_executor(None, started.wait, 30)
             for number in range(1, 101):
@@ -321,7 +315,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
             # 100 MB were published; what waits is bounded by the queue.
             assert publication.links[0].waiting <= 3
             go_on.set()
-            await eventually(lambda: bodies[-1] == b"0100")
+            await until(lambda: bodies[-1] == b"0100")
             assert len(bodies) <= 4
 
     run(scene)
@@ -332,14 +326,14 @@ def test_a_slow_reader_costs_the_publisher_no_more_than_its_queue() -> None:
         async with graph("/a") as (_, (a,)):
             publication = await publish(a, "/t", queue_size=5)
             sock = await raw_subscriber(a)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             link = publication.links[0]
             for _ in range(100):
                 publication.publish(serialize_frame(bytes(1_000_000)))
             assert link.waiting <= 6
             assert link.dropped >= 80
             sock.close()
-            await eventually(lambda: not publication.links)
+            await until(lambda: not publication.links)
             publication.publish(serialize_frame(b"to nobody"))
 
     run(scene)
@@ -350,11 +344,11 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
         async with graph("/a") as (_, (a,)):
             publication = await publish(a, "/t", queue_size=None)
             sock = await raw_subscriber(a)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             loop = asyncio.get_running_loop()
             whole = serialize_frame(bytes(30_000_000))
             done = loop.run_in_executor(None, publication.publish, whole)
-            await eventually(lambda: publication.links[0].waiting)
+            await until(lambda: publication.links[0].waiting)
             assert not done.done()
             received = 0
             while received < len(whole):
@@ -362,7 +356,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
             await done
             # A reader that goes away ends the wait too.
             done = loop.run_in_executor(None, publication.publish, whole)
-            await eventually(lambda: publication.links[0].waiting)
+            await until(lambda: publication.links[0].waiting)
             sock.close()
             await done
 
@@ -383,7 +377,7 @@ def test_a_publisher_with_an_invalid_address_is_reported(caplog: pytest.LogCaptu
         async with graph("/a") as (_, (node,)):
             subscription = await listen(node, "/t", Box())
             subscription.publishers_changed(["nonsense"])
-            await eventually(lambda: "not the address of a node" in caplog.text)
+            await until(lambda: "not the address of a node" in caplog.text)
 
     run(scene)
 
@@ -428,7 +422,7 @@ def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
             publication.publish(serialize_frame(b"new"))
             box = Box()
             subscription = await listen(b, "/t", box)
-            await eventually(lambda: box.bodies)
+            await until(lambda: box.bodies)
             assert box.bodies == [b"new"]
             assert subscription.links[0].latched == b"new"
 
@@ -444,7 +438,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
                 answer = await ask(method, *args)
                 if not a.publications:
                     await publish(a, "/t")
-                    await eventually(lambda: b.subscriptions["/t"].links)
+                    await until(lambda: b.subscriptions["/t"].links)
                 return answer
 
             monkeypatch.setattr(b._registrations, "call", answer_late)
@@ -470,7 +464,7 @@ def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: p
 
             monkeypatch.setattr(subscription, "_open_link", refuse_once)
             await b.subscribe(subscription)
-            await eventually(lambda: subscription.links)
+            await until(lambda: subscription.links)
 
     run(scene)
 
@@ -483,10 +477,10 @@ def test_publisher_list_of_an_earlier_subscription_is_queried_again() -> None:
             await publish(a, "/t")
             await b.unsubscribe(await listen(b, "/t", Box()))
             subscription = await listen(b, "/t", Box())
-            await eventually(lambda: subscription.links)
+            await until(lambda: subscription.links)
             b.publishers_changed("/t", [])
             assert not subscription.links
-            await eventually(lambda: subscription.links)
+            await until(lambda: subscription.links)
 
     run(scene)
 
@@ -513,12 +507,12 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
 
             monkeypatch.setattr(subscription, "_open_link", open_all_the_same)
             await b.subscribe(subscription)
-            await eventually(lambda: opening)
+            await until(lambda: opening)
             subscription.publishers_changed([])
             subscription.publishers_changed([a.uri])
             is_named_again.set()
-            await eventually(lambda: opened == 2)
-            await eventually(lambda: len(a.publications["/t"].links) == len(subscription.links) == 1)
+            await until(lambda: opened == 2)
+            await until(lambda: len(a.publications["/t"].links) == len(subscription.links) == 1)
 
     run(scene)
 
@@ -649,7 +643,7 @@ def test_a_master_that_was_away_gets_the_registrations_it_missed(
             with pytest.raises(MasterUnreachableError):
                 await offer(a, kind)
             is_away = False
-            await eventually(lambda: known(master) == {kind: ["/a"]})
+            await until(lambda: known(master) == {kind: ["/a"]})
             is_away = True
             part = {"publisher": a.publications, "subscriber": a.subscriptions, "service": a.services}[kind][
                 "/x"
@@ -658,7 +652,7 @@ def test_a_master_that_was_away_gets_the_registrations_it_missed(
             with pytest.raises(MasterUnreachableError):
                 await end(part)  # type: ignore[operator]
             is_away = False
-            await eventually(lambda: not known(master))
+            await until(lambda: not known(master))
 
     run(scene)
 
@@ -674,8 +668,8 @@ def test_a_restarted_master_that_knows_one_new_topic_gets_all_others() -> None:
             await restarted.start()
             try:
                 await publish(a, "/new")
-                await eventually(lambda: known(restarted) == {"service": ["/a"]})
-                await eventually(lambda: set(restarted.registry.publishers()) == {"/old", "/new"})
+                await until(lambda: known(restarted) == {"service": ["/a"]})
+                await until(lambda: set(restarted.registry.publishers()) == {"/old", "/new"})
             finally:
                 await restarted.close()
 
@@ -714,27 +708,27 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             again = threading.Event()
             b.when_registered_again.append(again.set)
             # The publisher's end is open a moment before the subscriber's.
-            await eventually(lambda: publication.links and subscription.links)
+            await until(lambda: publication.links and subscription.links)
             link = subscription.links[0]
             port = master.port
             await master.close()
-            await eventually(lambda: "What is connected goes on" in caplog.text)
+            await until(lambda: "What is connected goes on" in caplog.text)
             publication.publish(serialize_frame(b"without a master"))
-            await eventually(lambda: len(box.bodies) == 1)
+            await until(lambda: len(box.bodies) == 1)
             restarted = Master(host="127.0.0.1", port=port)
             await restarted.start()
 
             try:
-                await eventually(lambda: restarted.registry.publishers().get("/t"))
-                await eventually(lambda: restarted.registry.subscribers().get("/t"))
+                await until(lambda: restarted.registry.publishers().get("/t"))
+                await until(lambda: restarted.registry.subscribers().get("/t"))
                 await asyncio.get_running_loop().run_in_executor(None, again.wait, 30)
                 publication.publish(serialize_frame(b"after"))
-                await eventually(lambda: len(box.bodies) == 2)
+                await until(lambda: len(box.bodies) == 2)
 
                 assert subscription.links == (link,), "the connection outlived the master"
                 late = Box()
                 await listen(a, "/t", late)
-                await eventually(lambda: len(publication.links) == 2)
+                await until(lambda: len(publication.links) == 2)
             finally:
                 await restarted.close()
 
@@ -750,17 +744,17 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
             # The publisher's end is open a moment before the subscriber's.
-            await eventually(lambda: publication.links and subscription.links)
+            await until(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])
-            await eventually(lambda: subscription._settling is None)
+            await until(lambda: subscription._settling is None)
             assert [link.uri for link in subscription.links] == [a.uri]
             assert tuple(subscription._plan._failures) == ("http://127.0.0.1:1/",)
             # A node that the master names again is connected already.
             subscription.publishers_changed([a.uri])
             assert not subscription._connecting.get(a.uri)
             publication.links[0].close()
-            await eventually(lambda: len(publication.links) == 1)
+            await until(lambda: len(publication.links) == 1)
 
     run(scene)
 
@@ -810,9 +804,9 @@ def test_nodes_meet_over_ipv6() -> None:
             box = Box()
             publication = await publish(node, "/t")
             await listen(node, "/t", box)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             publication.publish(serialize_frame(b"six"))
-            await eventually(lambda: box.bodies)
+            await until(lambda: box.bodies)
         finally:
             await node.close()
             await master.close()
@@ -831,7 +825,7 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
             subscription = a.make_subscription("/t", STRING, Box())
             monkeypatch.setattr(subscription._rpc, "call", answer)
             subscription.publishers_changed(f"http://127.0.0.1:{port}/" for port in range(1, 101))
-            await eventually(lambda: not subscription._connecting)
+            await until(lambda: not subscription._connecting)
             subscription.close()
 
     run(scene)
@@ -850,10 +844,9 @@ def test_subscription_closed_while_connecting_leaves_no_link() -> None:
             publication = await publish(a, "/t")
             for _ in range(30):
                 subscription = await listen(b, "/t", Box())
-                while not publication.links:
-                    await asyncio.sleep(0)
+                await until(lambda: publication.links)
                 await b.unsubscribe(subscription)
-                await eventually(lambda: not publication.links)
+                await until(lambda: not publication.links)
 
     run(scene)
 
@@ -864,13 +857,13 @@ def test_a_subscriber_that_comes_again_takes_the_place_of_its_stalled_link() -> 
             publication = await publish(a, "/t", queue_size=None)
             first = await raw_subscriber(a)
             other = await raw_subscriber(a, callerid="/other")
-            await eventually(lambda: len(publication.links) == 2)
+            await until(lambda: len(publication.links) == 2)
             loop = asyncio.get_running_loop()
             whole = serialize_frame(bytes(30_000_000))
             done = loop.run_in_executor(None, publication.publish, whole)
-            await eventually(lambda: all(link.waiting for link in publication.links))
+            await until(lambda: all(link.waiting for link in publication.links))
             second = await raw_subscriber(a)
-            await eventually(lambda: len(publication.links) == 2)
+            await until(lambda: len(publication.links) == 2)
             assert [link.peer for link in publication.links] == ["/other", "/raw"]
             other.close()
             await done

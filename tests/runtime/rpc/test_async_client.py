@@ -19,6 +19,7 @@ from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.xmlrpc import serialize_call
+from tests.waiting import until
 
 CALL = serialize_call("getPid", ["/x"])
 
@@ -38,11 +39,6 @@ class Publishers:
 
 def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(asyncio.wait_for(test(), 30))
-
-
-async def until(condition: Callable[[], object]) -> None:
-    while not condition():
-        await asyncio.sleep(0.002)
 
 
 def test_a_kept_connection_that_the_peer_closed_is_replaced() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,18 +17,11 @@ from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.http import HttpReader, serialize_request
 from minirospy.wire.xmlrpc import serialize_call
+from tests.waiting import until
 
 
 def call(method: str, *args: Any) -> bytes:
     return serialize_request("localhost", "/", serialize_call(method, args))
-
-
-async def until(condition: Callable[[], object]) -> None:
-    async def wait() -> None:
-        while not condition():
-            await asyncio.sleep(0)
-
-    await asyncio.wait_for(wait(), 30)
 
 
 def connect(server: RpcServer) -> socket.socket:

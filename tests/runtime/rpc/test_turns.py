@@ -10,6 +10,7 @@ import pytest
 
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.steps import ALONE, PAUSE, Need, Steps, finish, is_small
+from tests.waiting import until
 
 
 class Clock:
@@ -163,8 +164,7 @@ def test_work_that_waits_does_not_hold_up_the_rest() -> None:
         await turn(15)
         assert len(done) == 30
         is_ready = True
-        while turns:
-            await asyncio.sleep(0.001)
+        await until(lambda: not turns)
         assert done[-1] == "ready"
 
     asyncio.run(main())

@@ -24,6 +24,7 @@ from minirospy.runtime.transport.loop import LoopThread, new_event_loop
 from minirospy.runtime.transport.workers import InOrder, Workers
 from minirospy.wire.framing import Frame
 from minirospy.wire.tcpros import InterfaceType
+from tests.waiting import until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
 
@@ -228,8 +229,7 @@ def test_a_listener_without_file_descriptors_pauses_and_goes_on(caplog: pytest.L
         await paused.wait()
         assert sock.tries == 1
         sock.is_full = False
-        while not accepted:
-            await asyncio.sleep(0.01)
+        await until(lambda: accepted)
         peer.close()
         await listener.close()
 

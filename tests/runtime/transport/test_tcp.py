@@ -17,6 +17,7 @@ from minirospy.errors import WireError
 from minirospy.runtime.transport import sockets, tcp
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.header import serialize_header
+from tests.waiting import until
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
@@ -212,8 +213,7 @@ def test_long_headers_share_a_limited_memory() -> None:
             long = serialize_header({"message_definition": "x" * 400_000})
             receiving = asyncio.ensure_future(tcp.receive_header(one, memory=memory))
             await loop.sock_sendall(other, long[:200_000])
-            while memory.held < 200_000 - 2 * 65536:
-                await asyncio.sleep(0)
+            await until(lambda: memory.held >= 200_000 - 2 * 65536)
 
             second, other_second = connect()
             sending = asyncio.ensure_future(loop.sock_sendall(other_second, long))
@@ -239,8 +239,7 @@ def test_closing_ends_handshakes_that_are_under_way() -> None:
     async def scene() -> None:
         listener = await serve([])
         sock = await tcp.connect("127.0.0.1", listener.port)
-        while not listener._handshakes:
-            await asyncio.sleep(0)
+        await until(lambda: listener._handshakes)
         await listener.close()
         assert await asyncio.get_running_loop().sock_recv(sock, 1) == b""
         sock.close()

@@ -33,7 +33,8 @@ from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.service import serialize_response
 from minirospy.wire.tcpros import InterfaceType, service_client_header
-from tests.runtime.node.test_topics import STRING, Box, eventually, graph, listen, publish, run
+from tests.runtime.node.test_topics import STRING, Box, graph, listen, publish, run
+from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="abstract Unix sockets are Linux'")
 
@@ -92,7 +93,7 @@ def test_a_publisher_enlarges_the_send_buffer_of_a_unix_socket(monkeypatch: pyte
             box = Box()
             publication = await publish(a, "/t")
             await listen(b, "/t", box)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
 
     run(scene)
     assert enlarged == [socket.AF_UNIX]
@@ -114,9 +115,9 @@ def test_both_sides_have_to_want_it(
             box = Box()
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", box)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             publication.publish(serialize_frame(b"hello"))
-            await eventually(lambda: box.bodies)
+            await until(lambda: box.bodies)
             assert (publication.links[0].transport, subscription.links[0].transport) == (transport, transport)
             ((_, _, rows), (_, _, others)) = (SlaveApi(node).get_bus_info("/c") for node in (a, b))
             assert [row[3] for row in rows + others] == [transport, transport]
@@ -137,10 +138,10 @@ def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) 
             publication = await publish(a, "/t")
             box = Box()
             await listen(b, "/t", box)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             assert publication.links[0].transport == "TCPROS"
             publication.publish(serialize_frame(b"hello"))
-            await eventually(lambda: box.bodies == [b"hello"])
+            await until(lambda: box.bodies == [b"hello"])
 
     run(scene)
 
@@ -347,14 +348,14 @@ def test_a_client_whose_unix_socket_has_a_name_is_served() -> None:
         with socket.socket(socket.AF_UNIX) as named:
             named.bind(own)
             named.connect(b"\0" + local.name_of("127.0.0.1", server.port).encode())
-            await eventually(lambda: server.clients == 1)
+            await until(lambda: server.clients == 1)
         listener, beside = Listener(accept), local.bind(OWN, 2)
         assert beside
         listener.listen(beside)
         with socket.socket(socket.AF_UNIX) as named:
             named.bind(own)
             named.connect(b"\0" + local.name_of(OWN, 2).encode())
-            await eventually(lambda: where)
+            await until(lambda: where)
         await listener.close()
         await server.close()
 
@@ -455,9 +456,9 @@ def test_image_arrives_by_unix_socket_without_a_copy(transport: str, monkeypatch
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
             await listen(b, "/t", lambda frame, _: got.append((frame, Image().deserialize(frame))))
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             publication.publish(pieces.frame())
-            await eventually(lambda: got)
+            await until(lambda: got)
 
     run(scene)
     ((frame, image),) = got
@@ -498,7 +499,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
             process = await loop.run_in_executor(None, start_listener, master.port)
 
             try:
-                await eventually(lambda: publication.links)
+                await until(lambda: publication.links)
                 pieces = Pieces()
                 Image(data=bytes(20_000_000)).serialize(pieces)
                 frame = pieces.frame()
@@ -510,7 +511,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
                 link = publication.links[0]
                 assert link.waiting == 1
                 process.send_signal(signal.SIGKILL)
-                await eventually(lambda: not publication.links)
+                await until(lambda: not publication.links)
             finally:
                 process.kill()
                 process.communicate()
@@ -519,9 +520,9 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
             # Nobody else is the worse for it.
             subscription = b.make_subscription("/t", publication.type, box)
             await b.subscribe(subscription)
-            await eventually(lambda: publication.links)
+            await until(lambda: publication.links)
             await loop.run_in_executor(None, publication.publish, frame)
-            await eventually(lambda: box.bodies)
+            await until(lambda: box.bodies)
             assert box.bodies == [b"".join(pieces)]
 
     run(scene)
