@@ -8,7 +8,7 @@ The way of a message, file by file::
     Bool.msg -> idl/parse -> spec -> idl/emit -> class
     publish  -> client/publisher (serialize, caller's thread) -> runtime/node/topics.Publication
              -> runtime/transport/links.OutLink ==> TCP ==>
-    runtime/transport/links.read_frames (worker) -> wire/framing -> runtime/node/topics.Subscription
+    runtime/transport/readers.read_frames (worker) -> wire/framing -> runtime/node/topics.Subscription
              -> client/subscriber (deserialize, user's function)
 
 and how the two ends find each other: client/publisher -> runtime/node/node -> runtime/master/master -> graph/registry ->

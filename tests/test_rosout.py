@@ -16,7 +16,7 @@ from minirospy import rosout
 from minirospy.environment import Environment
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.runtime.transport.links import watch_frames_in_turns
+from minirospy.runtime.transport.readers import watch_frames_in_turns
 from minirospy.steps import Steps, finish
 from minirospy.wire.framing import serialize_frame
 

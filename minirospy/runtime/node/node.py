@@ -24,7 +24,7 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, tcp
 from minirospy.runtime.transport.access import Access
-from minirospy.runtime.transport.links import ReaderSet
+from minirospy.runtime.transport.readers import ReaderSet
 from minirospy.runtime.transport.workers import InOrder, Workers
 from minirospy.wire.tcpros import InterfaceType
 

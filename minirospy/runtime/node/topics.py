@@ -22,14 +22,9 @@ from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, S
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
-from minirospy.runtime.transport.links import (
-    OutLink,
-    ReaderSet,
-    read_frames,
-    watch_frames,
-    watch_frames_in_turns,
-)
+from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+from minirospy.runtime.transport.readers import ReaderSet, read_frames, watch_frames, watch_frames_in_turns
 from minirospy.runtime.transport.workers import Workers
 from minirospy.steps import Steps
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame

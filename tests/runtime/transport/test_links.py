@@ -1,4 +1,4 @@
-"""runtime/transport/links: what carries frames, over TCP and over a Unix socket, and peers that stall, end and lie."""
+"""runtime/transport/links and readers: frames over TCP and over a Unix socket, and peers that stall, end and lie."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from minirospy.errors import WireError
-from minirospy.runtime.transport import links
+from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
@@ -148,7 +148,9 @@ def test_reading_ends_at_a_length_over_the_limit(pair: tuple[socket.socket, sock
     pair[1].sendall(serialize_frame(b"good") + b"\xff\xff\xff\xff")
     bodies: list[bytes] = []
     with pytest.raises(WireError, match="over the limit"):
-        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), links.ReaderSet())
+        readers.read_frames(
+            pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), readers.ReaderSet()
+        )
     assert bodies == [b"good"]
     assert pair[0].fileno() == -1
 
@@ -157,7 +159,7 @@ def test_reading_ends_with_half_a_frame(pair: tuple[socket.socket, socket.socket
     pair[1].sendall(serialize_frame(b"whole") + b"\x05\0\0\0ab")
     pair[1].close()
     bodies: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), links.ReaderSet())
+    readers.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), readers.ReaderSet())
     assert bodies == [b"whole"]
 
 
@@ -168,7 +170,9 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
     pair[1].sendall(b"".join(serialize_frame(bytes([number])) for number in range(10)))
     pair[1].close()
     bodies: list[int] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), QueueSize(newest), links.ReaderSet())
+    readers.read_frames(
+        pair[0], lambda frame: bodies.append(frame[0]), QueueSize(newest), readers.ReaderSet()
+    )
     assert bodies == expected
 
 
@@ -197,15 +201,15 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
     def deliver(frame: Frame) -> None:
         bodies.append(bytes(frame))
         if not is_alone:
-            readers.last = "another"
+            reader_set.last = "another"
         if not looks:
             other.close()
 
-    monkeypatch.setattr(links, "BUSY_POLL_SECONDS", seconds)
-    monkeypatch.setattr(links, "may_busy_poll", lambda _: True)
-    monkeypatch.setattr(links, "busy_receive", busy_receive)
+    monkeypatch.setattr(readers, "BUSY_POLL_SECONDS", seconds)
+    monkeypatch.setattr(readers, "may_busy_poll", lambda _: True)
+    monkeypatch.setattr(readers, "busy_receive", busy_receive)
     bodies: list[bytes] = []
-    readers = links.ReaderSet()
+    reader_set = readers.ReaderSet()
     waiting = threading.Event()
 
     class Waiting(socket.socket):
@@ -215,7 +219,7 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
 
     with other:
         reader = threading.Thread(
-            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, QueueSize(0), readers)
+            target=readers.read_frames, args=(Waiting(fileno=one.detach()), deliver, QueueSize(0), reader_set)
         )
         reader.start()
         assert waiting.wait(60)
@@ -240,17 +244,17 @@ def test_reader_blocks_after_busy_polling_without_success(
     def busy_receive(sock: socket.socket, space: memoryview) -> int:
         looks.append("look")
         if len(looks) == 1:
-            clock.now += links.BUSY_POLL_SECONDS
+            clock.now += readers.BUSY_POLL_SECONDS
             raise BlockingIOError
         clock.now += 0.005
         return 4
 
-    monkeypatch.setattr(links, "may_busy_poll", lambda _: True)
-    monkeypatch.setattr(links, "busy_receive", busy_receive)
-    monkeypatch.setattr(links, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr(readers, "may_busy_poll", lambda _: True)
+    monkeypatch.setattr(readers, "busy_receive", busy_receive)
+    monkeypatch.setattr(readers, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     with one, other:
         sock: Any = SimpleNamespace(recv_into=recv_into)
-        source = links._FrameSource(sock, links.ReaderSet())
+        source = readers._FrameSource(sock, readers.ReaderSet())
         space = memoryview(bytearray(8))
         for expected in (0, 1, 1, 2, 2):  # blocked, no data, blocked, late, blocked
             source._receive(space)
@@ -277,12 +281,12 @@ def joined(frame: LargeFrame) -> bytes:
 
 def read_in_thread(sock: socket.socket, frames: list[Frame], newest: int = 0) -> threading.Thread:
     thread = threading.Thread(
-        target=links.read_frames,
+        target=readers.read_frames,
         args=(
             sock,
             lambda frame: frames.append(frame if isinstance(frame, bytes) else bytes(frame)),
             QueueSize(newest),
-            links.ReaderSet(),
+            readers.ReaderSet(),
         ),
     )
     thread.start()
@@ -376,7 +380,7 @@ def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
     pair[1].sendall(serialize_frame(b"whole") + start)
     pair[1].close()
     frames: list[Frame] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(0), links.ReaderSet())
+    readers.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(0), readers.ReaderSet())
     assert frames == [b"whole"]
 
 
@@ -397,7 +401,7 @@ def test_split_frames_that_lie(
     sender = threading.Thread(target=pair[1].sendall, args=(data,))
     sender.start()
     with pytest.raises(WireError, match=words):
-        links.read_frames(pair[0], lambda _: None, QueueSize(0), links.ReaderSet())
+        readers.read_frames(pair[0], lambda _: None, QueueSize(0), readers.ReaderSet())
     sender.join(30)
 
 
@@ -417,7 +421,7 @@ def test_no_memory_for_a_message_ends_the_link_with_a_line() -> None:
         close=lambda: None,
     )
     with pytest.raises(WireError, match="no memory for a message of 536870912 bytes"):
-        links.read_frames(sock, lambda _: None, QueueSize(0), links.ReaderSet())
+        readers.read_frames(sock, lambda _: None, QueueSize(0), readers.ReaderSet())
 
 
 def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> None:
@@ -426,7 +430,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
     sender = threading.Thread(target=lambda: (pair[1].sendall(data), pair[1].close()))
     sender.start()
     frames: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(1), links.ReaderSet())
+    readers.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(1), readers.ReaderSet())
     sender.join(30)
     assert frames[-1] == joined(image(bytes([2]) * CHUNK))
 

@@ -1,0 +1,281 @@
+"""A subscriber's end of a link: the frames that a connection carries after its handshake.
+
+They are read by a worker (:func:`read_frames`) or on the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from minirospy.errors import WireError
+from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
+from minirospy.steps import Steps
+from minirospy.wire.framing import (
+    CHUNK,
+    LENGTH_BYTES,
+    MAX_FRAME,
+    SPLIT,
+    Frame,
+    FrameReader,
+    SplitFrame,
+    may_split,
+    parse_length,
+    split_sizes,
+)
+
+__all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
+
+_TURN_CHUNK = 4096
+"""Bytes that are received at a time, and kept for each connection, where frames are read in turns."""
+
+_DRAIN_BYTES = 64 * 1024 * 1024
+_CLAIM = 16 * 1024 * 1024
+"""Largest receive, in bytes: a length is only a claim until the bytes arrive."""
+
+_WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
+_log = logging.getLogger(__name__)
+
+
+class QueueSize(Protocol):
+    """The number of frames kept for a slow receiver; it may change at any time."""
+
+    newest: int
+
+
+@dataclass(eq=False)
+class ReaderSet:
+    """The readers of a node's topics. A reader that is the only active one may busy-poll for its next message.
+
+    Two would wait for each other's GIL, which takes longer than to be woken.
+    """
+
+    last: object = None
+    """The reader that has read last."""
+
+
+def read_frames(
+    sock: socket.socket, deliver: Callable[[Frame], None], size: QueueSize, readers: ReaderSet
+) -> None:
+    """Read frames in the calling thread until the peer ends; closes the socket.
+
+    ``size.newest``: of what is ready when the thread reads, only so many frames, the newest, are
+    delivered (0: all), so that a slow receiver sees the present. Raises OSError or WireError.
+    """
+    source = _FrameSource(sock, readers)
+    try:
+        sock.setblocking(True)
+        with contextlib.suppress(_Ended):
+            while True:
+                frames = source.read()
+                if size.newest:
+                    _deliver_newest(source, frames, deliver, size.newest)
+                else:
+                    for frame in frames:
+                        deliver(frame)
+    finally:
+        if readers.last is source:
+            readers.last = None
+        sock.close()
+
+
+def watch_frames(
+    loop: asyncio.AbstractEventLoop,
+    sock: socket.socket,
+    deliver: Callable[[memoryview], None],
+    on_end: Callable[[], None],
+) -> None:
+    """Read frames on the loop: for receivers that do so little that a thread each would cost more."""
+    reader = FrameReader()
+
+    def readable() -> None:
+        try:
+            count = sock.recv_into(reader.space())
+            for frame in reader.received(count):
+                deliver(frame)
+        except (BlockingIOError, InterruptedError):
+            return
+        except (OSError, WireError) as error:
+            _log.debug("connection ended: %s", error)
+            count = 0
+        if not count:
+            loop.remove_reader(sock)
+            sock.close()
+            on_end()
+
+    loop.add_reader(sock, readable)
+
+
+def watch_frames_in_turns(
+    loop: asyncio.AbstractEventLoop,
+    sock: socket.socket,
+    deliver: Callable[[memoryview], Steps[None]],
+    on_end: Callable[[], None],
+    start_steps: Callable[[Steps[None]], None],
+    most: int,
+    on_left_out: Callable[[], None],
+) -> None:
+    """Read frames on the loop in steps, which ``start_steps`` runs in turns with those of other connections.
+
+    Frames of more than ``most`` bytes are left out; ``on_left_out`` is called when one comes.
+    """
+    reader = FrameReader(most, skips=True, chunk=_TURN_CHUNK)
+
+    def readable() -> None:
+        loop.remove_reader(sock)
+        start_steps(read())
+
+    def read() -> Steps[None]:
+        if sock.fileno() < 0:
+            # It was closed meanwhile.
+            return
+        skipped = reader.skipped
+        try:
+            count = sock.recv_into(reader.space())
+            for frame in reader.received(count):
+                yield from deliver(frame)
+        except (BlockingIOError, InterruptedError):
+            count = -1
+        except (OSError, WireError) as error:
+            _log.debug("connection ended: %s", error)
+            count = 0
+
+        if reader.skipped > skipped:
+            on_left_out()
+        if count:
+            loop.add_reader(sock, readable)
+        else:
+            sock.close()
+            on_end()
+
+    loop.add_reader(sock, readable)
+
+
+class _FrameSource:
+    """Frames off a blocking socket: small ones by the bufferful, each large one in its own memory."""
+
+    def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
+        self.sock = sock
+        self._readers = readers
+        self._reader = FrameReader(gathers=False)
+        self._rest = b""
+        self._was_large = False
+        self._may_busy_poll = may_busy_poll(sock)
+        self._is_fast = False
+
+    def read(self) -> Iterable[Frame]:
+        """Wait for the next frames; they are valid until the next call, large ones for good.
+
+        Raises _Ended, OSError, WireError.
+        """
+        reader = self._reader
+        if self._was_large:
+            # Another large one is likely: its first bytes are kept out of the small ones' buffer.
+            word = self._take(LENGTH_BYTES)
+            length = parse_length(word)
+            if length > CHUNK:
+                return (self._large(length),)
+            self._was_large = False
+            reader.put_back(word)
+        count = self._receive(reader.space())
+        if not count:
+            raise _Ended
+        return self._small(count)
+
+    def _receive(self, space: memoryview) -> int:
+        """Wait for bytes; busy-poll where the last ones came within the time that waking up takes."""
+        start = time.perf_counter()
+        count = None
+        if self._is_fast and self._readers.last is self:
+            with contextlib.suppress(BlockingIOError):
+                count = busy_receive(self.sock, space)
+        if count is None:
+            count = self.sock.recv_into(space)
+        # Also where the bytes were there, but the GIL was not: other threads of this process need it.
+        self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
+        self._readers.last = self
+        return count
+
+    def _small(self, count: int) -> Iterator[Frame]:
+        reader = self._reader
+        yield from reader.received(count)
+        if reader.unfinished:
+            (length, self._rest), reader.unfinished = reader.unfinished, None
+            self._was_large = True
+            yield self._large(length)
+
+    def _large(self, word: int) -> Frame:
+        size = word & ~SPLIT
+        if size > MAX_FRAME:
+            raise WireError(f"a message of {word} bytes is over the limit of {MAX_FRAME}")
+        try:
+            if not word & SPLIT:
+                return self._take(size)
+            head_size, tail_size = split_sizes(size, parse_length(self._take(LENGTH_BYTES)))
+            head, tail = self._take(head_size), self._take(tail_size)
+        except MemoryError:
+            raise WireError(f"no memory for a message of {size} bytes") from None
+        if not may_split(head, tail_size):
+            raise WireError("a split message was not split where its array begins")
+        return SplitFrame(head, tail)
+
+    def _take(self, count: int) -> bytes:
+        """Return exactly ``count`` bytes. Raises _Ended, OSError."""
+        if not self._rest:
+            data = self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
+            if len(data) == count:
+                return data
+            if not data:
+                raise _Ended
+        else:
+            data, self._rest = self._rest[:count], self._rest[count:]
+            if len(data) == count:
+                return data
+
+        parts = [data]
+        missing = count - len(data)
+        while missing:
+            data = self.sock.recv(min(missing, _CLAIM), _WAIT_ALL)
+            if not data:
+                raise _Ended
+            parts.append(data)
+            missing -= len(data)
+        return b"".join(parts)
+
+
+def _deliver_newest(
+    source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
+) -> None:
+    """Read on while something is ready, then deliver the newest frames."""
+    kept: deque[Frame] = deque(maxlen=newest)
+    total = 0
+    ended = False
+
+    while True:
+        for frame in frames:
+            total += len(frame)
+            # A small frame is in the reader's buffer, which the next receive reuses.
+            kept.append(frame if isinstance(frame, bytes) else bytes(frame))
+        if total >= _DRAIN_BYTES or not is_readable(source.sock):
+            break
+        try:
+            frames = source.read()
+        except _Ended:
+            ended = True
+            break
+
+    for frame in kept:
+        deliver(frame if isinstance(frame, SplitFrame) else memoryview(frame))
+    if ended:
+        raise _Ended
+
+
+class _Ended(Exception):
+    """The peer has ended the connection."""
