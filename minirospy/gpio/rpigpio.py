@@ -8,7 +8,6 @@ not on import. Leaving the process leaves the pins as they are, as on hardware; 
 from __future__ import annotations
 
 import atexit
-import contextlib
 import operator
 import threading
 import time
@@ -16,11 +15,12 @@ import warnings
 import weakref
 from collections.abc import Sequence
 
-from minirospy.errors import BoardError
+from minirospy.gpio.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
 from minirospy.gpio.events import Callback, CallbackThread, Detector, Slope
 from minirospy.gpio.link import Edge, Link
 from minirospy.gpio.model import PINS, Function, Pull, Setup
 from minirospy.gpio.place import Place
+from minirospy.gpio.wave import Wave
 from minirospy.signal_dispatch import is_dispatching_signal
 
 __all__ = [
@@ -107,11 +107,6 @@ HEADER = {
 }
 """Pin of the 40-pin header (BOARD numbering) -> BCM pin."""
 
-PWM_LIMIT = 50.0
-"""Hz: a faster PWM shows on the board with this frequency and its own duty cycle."""
-
-_NO_BOUNCETIME = -666
-
 
 class Gpio:
     """One program's view of the board: its numbering mode, the pins that it set up, its events."""
@@ -166,7 +161,7 @@ class Gpio:
         if pull_up_down not in {PUD_OFF, PUD_DOWN, PUD_UP}:
             raise ValueError("Invalid value for pull_up_down - should be either PUD_OFF, PUD_UP or PUD_DOWN")
         level = initial if initial in {LOW, HIGH} else None
-        for one in _channels(channel):
+        for one in channels_of(channel):
             self._set_up(one, direction, pull_up_down, level)
 
     def output(self, channel: int | Sequence[int], value: int | bool | Sequence[int | bool]) -> None:
@@ -174,7 +169,7 @@ class Gpio:
         try:
             # The usual case first: one channel, one value.
             pin = self._writable[channel]  # type: ignore[index]
-            level = _level(value)
+            level = level_of(value)
         except (KeyError, TypeError):
             self._output_several(channel, value)
         else:
@@ -200,7 +195,7 @@ class Gpio:
         with self._lock:
             everything = channel is None
             wanted = (
-                set(self._directions) if channel is None else {self._pin(one) for one in _channels(channel)}
+                set(self._directions) if channel is None else {self._pin(one) for one in channels_of(channel)}
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
@@ -233,7 +228,7 @@ class Gpio:
         gpio: int | None = None,
         edge: int | None = None,
         callback: Callback | None = None,
-        bouncetime: int = _NO_BOUNCETIME,
+        bouncetime: int = NO_BOUNCETIME,
         *,
         channel: int | None = None,
     ) -> None:
@@ -244,7 +239,7 @@ class Gpio:
         if callback is not None and not callable(callback):
             raise TypeError("Parameter must be callable")
         pin = self._input_pin(number)
-        detector = _detector(number, edge, bouncetime)
+        detector = detector_of(number, edge, bouncetime)
 
         with self._lock:
             if pin in self._detectors:
@@ -268,11 +263,11 @@ class Gpio:
             self._detectors[pin].callbacks.append(callback)
 
     def wait_for_edge(
-        self, channel: int, edge: int, bouncetime: int = _NO_BOUNCETIME, timeout: int = -1
+        self, channel: int, edge: int, bouncetime: int = NO_BOUNCETIME, timeout: int = -1
     ) -> int | None:
         """Wait for an edge, up to ``timeout`` ms (-1: for ever); the channel, or None when time is up."""
         pin = self._input_pin(channel)
-        detector = _detector(channel, edge, bouncetime)
+        detector = detector_of(channel, edge, bouncetime)
         if operator.index(timeout) <= 0 and timeout != -1:
             raise ValueError("Timeout must be greater than 0")
         with self._lock:
@@ -393,14 +388,14 @@ class Gpio:
     def _output_several(self, channel: object, value: object) -> None:
         if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
             return
-        channels = _channels(channel)
+        channels = channels_of(channel)
         several = isinstance(value, (list, tuple))
         values = list(value) if isinstance(value, (list, tuple)) else [value] * len(channels)
         if len(channels) != len(values) or (several and not isinstance(channel, (list, tuple))):
             raise RuntimeError("Number of channels != number of values")
 
         try:
-            levels = [_level(one) for one in values]
+            levels = [level_of(one) for one in values]
         except TypeError:
             raise ValueError(
                 "Value must be an integer or boolean"
@@ -437,64 +432,6 @@ class Gpio:
         """Warn about the user's line, ``depth`` calls above this one."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
-
-
-class Wave:
-    """The square wave of one PWM, on a separate thread."""
-
-    def __init__(self, gpio: Gpio, pin: int, frequency: float) -> None:
-        self.pin = pin
-        self._gpio = gpio
-        self._frequency = frequency
-        self._duty = 0.0
-        self._changed = threading.Event()
-        self._stopping = False
-        self._thread: threading.Thread | None = None
-        gpio.register_wave(self)
-
-    def set(self, *, duty: float | None = None, frequency: float | None = None) -> None:
-        """Change the duty cycle (percent) or the frequency (Hz)."""
-        if duty is not None:
-            if not 0.0 <= duty <= 100.0:
-                raise ValueError("dutycycle must have a value from 0.0 to 100.0")
-            self._duty = float(duty)
-        if frequency is not None:
-            if not frequency > 0.0:
-                raise ValueError("frequency must be greater than 0.0")
-            self._frequency = float(frequency)
-        self._changed.set()
-
-    def start(self) -> None:
-        """Begin; again after stop()."""
-        if self._thread is None:
-            self._stopping = False
-            self._gpio.register_wave(self)
-            self._thread = threading.Thread(target=self._run, name=f"gpio-pwm-{self.pin}", daemon=True)
-            self._thread.start()
-
-    def stop(self) -> None:
-        """End with the pin low; the pin is free for another PWM."""
-        thread, self._thread = self._thread, None
-        self._stopping = True
-        self._changed.set()
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(1.0)
-        self._gpio.unregister_wave(self)
-
-    def _run(self) -> None:
-        # Without a board there is nothing to modulate any more.
-        with contextlib.suppress(BoardError):
-            while not self._stopping:
-                self._changed.clear()
-                period = 1.0 / min(self._frequency, PWM_LIMIT)
-                high = period * self._duty / 100.0
-                if high > 0.0:
-                    self._gpio.write(self.pin, 1)
-                    self._changed.wait(high if high < period else None)
-                if high < period and not self._stopping:
-                    self._gpio.write(self.pin, 0)
-                    self._changed.wait(period - high if high > 0.0 else None)
-            self._gpio.write(self.pin, 0)
 
 
 _gpio = Gpio()
@@ -553,32 +490,3 @@ add_event_callback = _gpio.add_event_callback
 wait_for_edge = _gpio.wait_for_edge
 event_detected = _gpio.event_detected
 remove_event_detect = _gpio.remove_event_detect
-
-
-def _channels(channel: object) -> list[int]:
-    if isinstance(channel, int):
-        return [channel]
-    if not isinstance(channel, (list, tuple)):
-        raise ValueError("Channel must be an integer or list/tuple of integers")
-    if not all(isinstance(one, int) for one in channel):
-        raise ValueError("Channel must be an integer")
-    return list(channel)
-
-
-def _level(value: object) -> int:
-    if isinstance(value, int):
-        return 1 if value else 0
-    if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
-        raise TypeError("not a level")
-    # numpy.bool_ and its kin.
-    return 1 if value else 0
-
-
-def _detector(channel: int, edge: int, bouncetime: int) -> Detector:
-    # Whole milliseconds: a time in seconds, such as 0.2, is refused with a TypeError, as by RPi.GPIO.
-    edge, bouncetime = operator.index(edge), operator.index(bouncetime)
-    if edge not in {RISING, FALLING, BOTH}:
-        raise ValueError("The edge must be set to RISING, FALLING or BOTH")
-    if bouncetime <= 0 and bouncetime != _NO_BOUNCETIME:
-        raise ValueError("Bouncetime must be greater than 0")
-    return Detector(channel, Slope(edge), None if bouncetime == _NO_BOUNCETIME else bouncetime / 1000)

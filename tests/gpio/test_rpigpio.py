@@ -16,7 +16,8 @@ import pytest
 from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function, Setup
-from minirospy.gpio.rpigpio import Gpio, Wave
+from minirospy.gpio.rpigpio import Gpio
+from minirospy.gpio.wave import Wave
 from minirospy.signal_dispatch import dispatching_signal
 
 

@@ -1,0 +1,44 @@
+"""The arguments of RPi.GPIO's functions: which are taken, and the errors of the others, in its words."""
+
+from __future__ import annotations
+
+import operator
+
+from minirospy.gpio.events import Detector, Slope
+
+__all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of"]
+
+NO_BOUNCETIME = -666
+"""RPi.GPIO's default: every edge counts."""
+
+
+def channels_of(channel: object) -> list[int]:
+    """Return the channels of one or of several. Raises ValueError."""
+    if isinstance(channel, int):
+        return [channel]
+    if not isinstance(channel, (list, tuple)):
+        raise ValueError("Channel must be an integer or list/tuple of integers")
+    if not all(isinstance(one, int) for one in channel):
+        raise ValueError("Channel must be an integer")
+    return list(channel)
+
+
+def level_of(value: object) -> int:
+    """Return 0 or 1. Raises TypeError."""
+    if isinstance(value, int):
+        return 1 if value else 0
+    if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
+        raise TypeError("not a level")
+    # numpy.bool_ and its kin.
+    return 1 if value else 0
+
+
+def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
+    """Return what looks for an edge; ``bouncetime`` in ms. Raises ValueError, TypeError."""
+    # Whole milliseconds: a time in seconds, such as 0.2, is refused with a TypeError, as by RPi.GPIO.
+    edge, bouncetime = operator.index(edge), operator.index(bouncetime)
+    if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:
+        raise ValueError("The edge must be set to RISING, FALLING or BOTH")
+    if bouncetime <= 0 and bouncetime != NO_BOUNCETIME:
+        raise ValueError("Bouncetime must be greater than 0")
+    return Detector(channel, Slope(edge), None if bouncetime == NO_BOUNCETIME else bouncetime / 1000)
