@@ -158,10 +158,12 @@ class GraphStage:
 class OpenBag:
     """A bag that is shown: a timeline, and a player that is paused at its start. Methods block: not on the loop.
 
-    Raise BagError, OSError.
+    ``on_change`` is called in the player's thread when that has moved, or ended. Raise BagError, OSError.
     """
 
-    def __init__(self, path: Path, name: str, stage: GraphStage) -> None:
+    def __init__(
+        self, path: Path, name: str, stage: GraphStage, on_change: Callable[[], object] = lambda: None
+    ) -> None:
         self.name = name
         self.stage = stage
         self.failure = ""
@@ -178,6 +180,7 @@ class OpenBag:
         self._is_ready = threading.Event()
         options = PlayOptions(paused=True, delay=0, quiet=True)
         self.player = Player(self._bags, options, lambda first, last: self._is_ready.set(), stage)
+        self.player.on_change = self._on_change = on_change
         self._thread = threading.Thread(target=self._play, name="bag-player", daemon=True)
         if self.timeline.topics:
             self._thread.start()
@@ -216,3 +219,4 @@ class OpenBag:
             _log.exception("the player of %s", self.name)
         finally:
             self._is_ready.set()
+            self._on_change()

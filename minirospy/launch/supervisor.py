@@ -81,6 +81,8 @@ class Supervisor:
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         self._restarts: list[tuple[float, Process]] = []
 
+        self.on_change: Callable[[], object] = lambda: None
+        """Called from any thread after a process was started, has exited, or is being ended."""
         self.processes: list[Process] = []
         """The nodes that were started and are watched, those that wait to be started again included."""
         self.master: Process | None = None
@@ -97,6 +99,7 @@ class Supervisor:
         """Watch the process of a node."""
         self.processes.append(process)
         self._attend(process)
+        self.on_change()
 
     def add_master(self, process: Process) -> None:
         """Watch a master: when it exits, the run is over."""
@@ -141,6 +144,7 @@ class Supervisor:
                     forever = False
                 case _Exited(process):
                     status = self._exited(process)
+                    self.on_change()
                 case _RemoteExited():
                     status = self._remote_exited(event)
             if status is not None:
@@ -161,6 +165,7 @@ class Supervisor:
     def end_process(self, process: Process) -> None:
         """End one process, and wait for that; it is not started again, unless its file has changed."""
         process.is_ending = True
+        self.on_change()
         end_processes([process], self._timeouts, self._output.warn)
 
     # --- helpers
@@ -257,6 +262,7 @@ class Supervisor:
         again.starts = process.starts + 1
         self.processes[place] = again
         self._attend(again)
+        self.on_change()
 
     def _restart_changed(self, files: FileWatch) -> None:
         for process in self.processes:

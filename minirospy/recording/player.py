@@ -51,6 +51,8 @@ class Player:
 
         Its caller controls the player from then on by :meth:`control`: so the player stays at the end of the bags.
         """
+        self.on_change: Callable[[], object] = lambda: None
+        """Called in the player's thread when :meth:`state` has changed by itself: a message was published, the end reached."""
         self._stage = stage or NodeStage(options)
         self._bags = bags
         self._options = options
@@ -258,12 +260,14 @@ class Player:
                     self._schedule.seek(span[0], time.perf_counter_ns())
                 else:
                     self._schedule = Schedule(self._options, *span, time.perf_counter_ns() + _LEAD)
+            self.on_change()
 
     def _wait_at_end(self) -> None:
         """Wait for a seek; the keys and the clock work as ever."""
         schedule = self._schedule
         assert schedule
         self._is_at_end = self._seek_to is None
+        self.on_change()
         while not self._ended and self._seek_to is None and not self._options.loop:
             now = time.perf_counter_ns()
             self._tick(schedule, now)
@@ -287,6 +291,7 @@ class Player:
             if self._schedule and self._seek_to is None:
                 # Steps that were requested meanwhile count.
                 self._schedule.seek(start, time.perf_counter_ns(), keeps_steps=True)
+        self.on_change()
         return found
 
     def _play(self, message: StoredMessage) -> bool:
@@ -323,6 +328,7 @@ class Player:
 
     def _publish(self, number: int, message: StoredMessage) -> None:
         self._stage.publish(number, message)
+        self.on_change()
 
     def _tick(self, schedule: Schedule, now: int) -> None:
         """Publish the clock and print the status line, where it is time for that."""
