@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/joint_state_publisher.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -86,6 +87,6 @@ def _dependent_joints(value: object) -> dict[str, Dependent]:
 
 
 def _as_number(name: str, value: object) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise JointError(f"The {name} parameter is [{value}]: it is a number")
-    return float(value)
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    raise JointError(f"The {name} parameter is [{value}]: it is a number")
