@@ -46,6 +46,11 @@ _log = logging.getLogger(__name__)
 
 _MOST_TOPICS = 20
 _MOST_VALUES = 100
+_LONGEST = 20_000
+"""Characters of a command."""
+
+_LARGEST_AXIS = 3.4028234663852886e38
+"""Of a float32."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,8 @@ class Command:
 
 def parse(text: str) -> Command:
     """Return the command of a text. Raise ValueError."""
+    if len(text) > _LONGEST:
+        raise ValueError(f"it has more than {_LONGEST} characters")
     try:
         fields = json.loads(text)
     except RecursionError:
@@ -110,7 +117,10 @@ def parse(text: str) -> Command:
         buttons = tuple(int(each) for each in _numbers(fields["buttons"]))
         if not all(-(2**31) <= each < 2**31 for each in buttons):
             raise ValueError("a button is 0 or 1")
-        return Command(_topic(fields["topic"]), Joystick(_numbers(fields["axes"]), buttons))
+        axes = _numbers(fields["axes"])
+        if not all(abs(each) <= _LARGEST_AXIS for each in axes):
+            raise ValueError("an axis is from -1 to 1")
+        return Command(_topic(fields["topic"]), Joystick(axes, buttons))
     raise ValueError(f"it has {', '.join(sorted(map(str, names)))[:80] or 'nothing'}")
 
 
@@ -183,7 +193,10 @@ class DriveSession:
     def ended(self) -> None:
         """Stop everything that the client drives, and leave it."""
         for topic in list(self._driven):
-            self._driven.pop(topic).close()
+            try:
+                self._driven.pop(topic).close()
+            except Exception:  # noqa: BLE001 - whatever it is, the other topics are stopped
+                _log.exception("%s could not be stopped", topic)
 
     def _carry_out(self, command: Command) -> None:
         driven = self._driven.get(command.topic)

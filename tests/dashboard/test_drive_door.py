@@ -11,7 +11,8 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from geometry_msgs.msg import Twist
@@ -22,9 +23,10 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
-from minirospy.dashboard.drive_door import SUBPROTOCOL, Command, Joystick, Velocity, parse
+from minirospy.dashboard.drive_door import SUBPROTOCOL, Command, DriveSession, Joystick, Velocity, parse
 
 if TYPE_CHECKING:
+    from minirospy.bridge.graph import SharedGraph
     from tests.dashboard.conftest import Served
 
 FORWARD = {"topic": "/cmd_vel", "twist": [0.5, 0, 0, 0, 0, -1]}
@@ -58,7 +60,9 @@ def test_commands_are_parsed() -> None:
         ('{"topic": 1, "twist": [1, 2, 3, 4, 5, 6]}', "a topic is a name"),
         ('{"topic": "/a", "axes": [], "buttons": [1e12]}', "a button is 0 or 1"),
         (json.dumps({"topic": "/a", "axes": [0] * 101, "buttons": []}), "an array, of 100 at most"),
-        ("[" * 100_000, "nested too deep"),
+        ("[" * 20_000, "nested too deep"),
+        ("[" * 20_001, "more than 20000 characters"),
+        ('{"topic": "/a", "axes": [1e39], "buttons": []}', "an axis is from -1 to 1"),
     ],
 )
 def test_text_that_is_not_a_command_is_refused(text: str, why: str) -> None:
@@ -244,3 +248,22 @@ def test_what_may_not_be_driven_is_named(serve: Callable[..., Served]) -> None:
         assert "not a command of driving: it has nothing" in json.loads(client.recv(timeout=60))["error"]
         client.send(b"1")
         assert "binary" in json.loads(client.recv(timeout=60))["error"]
+
+
+def test_all_topics_are_stopped_where_one_cannot_be() -> None:
+    closed: list[str] = []
+
+    class Driven:
+        def __init__(self, topic: str) -> None:
+            self.topic = topic
+
+        def close(self) -> None:
+            closed.append(self.topic)
+            if self.topic == "/a":
+                raise OSError("gone")
+
+    client: Any = SimpleNamespace(may_write=True, send_text=lambda _: None)
+    session = DriveSession(client, cast("SharedGraph", None))
+    session._driven = {topic: cast("Any", Driven(topic)) for topic in ("/a", "/b")}
+    session.ended()
+    assert closed == ["/a", "/b"]
