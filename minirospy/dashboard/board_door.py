@@ -10,15 +10,15 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Mapping
+from concurrent.futures import Future
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.bridge.tasks import Faults
+from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number
 from minirospy.errors import BoardError
 from minirospy.gpio.board import Board
-from minirospy.gpio.model import BUTTONS, LEDS, Function
+from minirospy.gpio.model import BUTTONS, LEDS, PINS, Function
 from minirospy.gpio.place import Place
 from minirospy.scanner import FIELDS
 
@@ -32,124 +32,99 @@ SUBPROTOCOL = "minirospy.board.v1"
 _log = logging.getLogger(__name__)
 
 _LOOK_SECONDS = 0.02
-_MOST_WAITING = 100
 
 
-class BoardDoor:
+class BoardDoor(JsonDoor["BoardSession"]):
     """Serves boards of this machine; each client names its own, ``?board=NAME``."""
 
     def __init__(self) -> None:
-        self._sessions: set[asyncio.Task[None]] = set()
-
-    def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
-        if SUBPROTOCOL in offered:
-            return SUBPROTOCOL
-        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
-
-    def open(self, client: WebClient) -> BoardSession:
-        """Start serving a client."""
-        session = BoardSession(client)
-        self._sessions.add(session.task)
-        session.task.add_done_callback(self._sessions.discard)
-        return session
-
-    async def close(self) -> None:
-        """Wait until the sessions, whose connections have ended, have left their boards."""
-        await asyncio.gather(*self._sessions, return_exceptions=True)
+        super().__init__(SUBPROTOCOL, BoardSession)
 
 
-class BoardSession:
-    """One client. The board's calls block, so they run in a thread of the session, one after another."""
+class BoardSession(JsonSession):
+    """One client. The board's calls block, so they run in the thread of the session."""
+
+    subject: ClassVar[str] = "the board"
+    longest: ClassVar[int] = 1000
+    pace: ClassVar[float] = _LOOK_SECONDS
 
     def __init__(self, client: WebClient) -> None:
-        self._client = client
         self._pressed: set[int] = set()
-        self._work: asyncio.Queue[Callable[[Board], None]] = asyncio.Queue(_MOST_WAITING)
-        self._thread = ThreadPoolExecutor(1, "board-session")
-        self._faults = Faults(_log, "serving the board")
-        self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(self._faults.of_task)
+        self._opening: Future[Board] | None = None
+        self._board: Board | None = None
+        self._boards: list[str] = []
+        self._sent = ""
+        handlers: Mapping[str, Handler] = {
+            "press": self._press,
+            "release": self._release,
+            "person": self._move_person,
+        }
+        super().__init__(client, handlers)
 
-    def received_text(self, text: str) -> None:
-        """Take over an operation."""
-        if not self._client.may_write:
-            self._send_error("this token is read-only: the board cannot be changed with it")
-            return
+    def refusal(self) -> str:
+        """See :meth:`JsonSession.refusal`."""
+        return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
+
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        (name,) = fields
+        return name, fields
+
+    async def started(self) -> None:
+        """Open the board."""
+        name = self.client.request.query.get("board") or None
         try:
-            work = self._operation(json.loads(text))
-        except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
-            self._send_error(f"not an operation of the board: {error}")
-            return
-        try:
-            self._work.put_nowait(work)
-        except asyncio.QueueFull:
-            self._send_error("the board is too slow: an operation was dropped")
+            place = Place.find(name)
+            self._boards = await self.in_thread(place.names)
+            # A board that is opened is started where it does not run: a program.
+            if name and name not in self._boards and not self.client.is_owner:
+                raise BoardError(
+                    f"there is no board [{place.name}]: {self.client.why_not_owner('start boards')}"
+                )
+            self._opening = self._thread.submit(Board, name)
+            self._board = await asyncio.wrap_future(self._opening)
+            self._boards = await self.in_thread(place.names)
+        except BoardError as error:
+            self.send_error(str(error))
 
-    def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
-        self._send_error("binary messages have no meaning here")
+    async def follow(self) -> float | None:
+        """Send what has changed."""
+        if self._board is None:
+            return None
+        state = {**state_of(self._board), "boards": self._boards, "writes": self.client.may_write}
+        text = json.dumps(state)
+        if text != self._sent:
+            self._sent = text
+            self.client.send_text_message("board", text.encode(), newest_only=True)
+        return _LOOK_SECONDS
 
-    def ended(self) -> None:
+    async def left(self) -> None:
         """Release what the client holds down, and disconnect from the board."""
-        self.task.cancel()
+        if self._opening:
+            await asyncio.wrap_future(self._thread.submit(_leave, self._opening, self._pressed))
 
-    def _operation(self, fields: Mapping[str, Any]) -> Callable[[Board], None]:
-        ((name, value),) = fields.items()
-        if name == "person":
-            position = None if value is None else (float(value[0]), float(value[1]))
-            return lambda board: board.move_person(position)
-        if name not in ("press", "release") or not isinstance(value, int):
-            raise ValueError(str(name)[:80])
-        return partial(self._press if name == "press" else self._release, value)
-
-    def _press(self, pin: int, board: Board) -> None:
-        board.press(pin)
+    async def _press(self, fields: Fields) -> None:
+        pin = _pin(fields["press"])
+        # Released in any case, also where the client leaves before the answer.
         self._pressed.add(pin)
+        await self.in_thread(partial(self._opened().press, pin))
 
-    def _release(self, pin: int, board: Board) -> None:
-        board.release(pin)
+    async def _release(self, fields: Fields) -> None:
+        pin = _pin(fields["release"])
+        await self.in_thread(partial(self._opened().release, pin))
         self._pressed.discard(pin)
 
-    async def _run(self) -> None:
-        """Open the board and mirror it; when cancelled, leave it before this returns."""
-        loop = asyncio.get_running_loop()
-        name = self._client.request.query.get("board") or None
-        opening = self._thread.submit(Board, name)
-        try:
-            board = await asyncio.wrap_future(opening)
-            await self._mirror(board)
-        except BoardError as error:
-            self._send_error(str(error))
-        except Exception as error:  # noqa: BLE001 - the page would wait for a board that nobody mirrors
-            self._faults.report(error)
-            self._send_error(f"the dashboard failed to show the board: {type(error).__name__}")
-        finally:
-            # In any case: a page that is closed meanwhile would cancel what waits for the thread.
-            leaving = loop.run_in_executor(self._thread, _leave, opening, self._pressed)
-            self._thread.shutdown(wait=False)
-            await asyncio.shield(leaving)
+    async def _move_person(self, fields: Fields) -> None:
+        place = fields["person"]
+        if place is not None and not (isinstance(place, list) and len(place) == 2):
+            raise TypeError("a person is at [x, y]")
+        position = (number(place[0]), number(place[1])) if place else None
+        await self.in_thread(partial(self._opened().move_person, position))
 
-    async def _mirror(self, board: Board) -> None:
-        """Carry out what the client sends, and send what has changed, until cancelled."""
-        loop = asyncio.get_running_loop()
-        boards = Place.find().names()
-        last = ""
-        while True:
-            while not self._work.empty():
-                work = self._work.get_nowait()
-                try:
-                    await loop.run_in_executor(self._thread, work, board)
-                except BoardError as error:
-                    self._send_error(str(error))
-            text = json.dumps({**state_of(board), "boards": boards, "writes": self._client.may_write})
-            if text != last:
-                last = text
-                self._client.send_text_message("board", text.encode(), newest_only=True)
-            await asyncio.sleep(_LOOK_SECONDS)
-
-    def _send_error(self, text: str) -> None:
-        self._client.send_text(json.dumps({"error": text[:300]}))
+    def _opened(self) -> Board:
+        if self._board is None:
+            raise BoardError("the board is not open")
+        return self._board
 
 
 def state_of(board: Board) -> dict[str, object]:
@@ -169,6 +144,14 @@ def state_of(board: Board) -> dict[str, object]:
         "person": list(state.person) if state.person else None,
         "fields": list(FIELDS),
     }
+
+
+def _pin(value: object) -> int:
+    if not isinstance(value, int):
+        raise TypeError(f"{value!r:.40} is not a pin")
+    if not 0 <= value < PINS:
+        raise BoardError(f"pin {value!s:.40} does not exist: BCM numbers are 0 to {PINS - 1}")
+    return value
 
 
 def _leave(opening: Future[Board], pressed: set[int]) -> None:

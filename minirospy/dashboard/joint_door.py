@@ -15,10 +15,12 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.bridge.tasks import Faults, keep_running
+from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
 from minirospy.errors import MinirospyError, ROSException, UrdfError, UsageError
+from minirospy.introspect.graph import why_illegal
 from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
 from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints
 from minirospy.urdf.elements import parse_xml
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from minirospy.aio.topics import Publisher
     from minirospy.bridge.graph import SharedGraph
     from minirospy.bridge.web.client import WebClient
+    from minirospy.introspect.snapshot import Changes
 
 __all__ = ["SUBPROTOCOL", "JointDoor", "JointSession"]
 
@@ -37,19 +40,18 @@ SUBPROTOCOL = "minirospy.joints.v1"
 
 _log = logging.getLogger(__name__)
 
-_LOOK_SECONDS = 0.05
 _RELOAD_SECONDS = 2.0
 _TOPIC = "joint_states"
 _FARTHEST = 1e6
-_Fields = Mapping[str, object]
 
 
-class JointDoor:
+class JointDoor(JsonDoor["JointSession"]):
     """Serves the joints of robot_description. ``always_publishes``: as the node joint_state_publisher_gui does."""
 
     def __init__(
         self, node: Node, graph: Callable[[], SharedGraph], *, always_publishes: bool = False
     ) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: JointSession(self, client))
         self.node = node
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
@@ -63,38 +65,45 @@ class JointDoor:
         """Counts descriptions that were read."""
         self.is_publishing = False
         self._graph = graph
-        self._sessions: set[asyncio.Task[None]] = set()
         self._values: dict[str, object] = {}
         self._publisher: Publisher[JointState] | None = None
         self._working: asyncio.Task[None] | None = None
-        self._sources: list[asyncio.Task[None]] = []
+        self._work_changed = asyncio.Event()
         self._faults = Faults(_log, "following and publishing joints")
+        self._sources: list[asyncio.Task[None]] = []
 
     # --- Door
 
-    def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
-        if SUBPROTOCOL in offered:
-            return SUBPROTOCOL
-        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
-
     def open(self, client: WebClient) -> JointSession:
-        """Start serving a client."""
-        session = JointSession(self, client)
-        self._sessions.add(session.task)
-        session.task.add_done_callback(self._left)
+        """See :meth:`JsonDoor.open`."""
+        if not self.sessions:
+            self._graph().watch(self._graph_changed)
         self.start_work()
-        return session
+        return super().open(client)
 
-    def _left(self, task: asyncio.Task[None]) -> None:
-        self._sessions.discard(task)
-        if not self._sessions and not self.always_publishes:
-            self.is_publishing = False
+    def left(self, session: JointSession) -> None:
+        """See :meth:`JsonDoor.left`: nothing is published for nobody."""
+        if not self.sessions:
+            self._graph().unwatch(self._graph_changed)
+            self.publish(is_on=False)
+
+    def _graph_changed(self, _: Changes) -> None:
+        self.changed()
+
+    def publish(self, *, is_on: bool) -> None:
+        """Publish from now on, or no more. Raise UsageError where clients may not publish the topic."""
+        topic = self.node.resolve(_TOPIC)
+        if is_on and not self._graph().filters.publishable(topic):
+            raise UsageError(f"topic [{topic}] may not be published by clients")
+        self.is_publishing = is_on or self.always_publishes
+        self._work_changed.set()
+        self.changed()
 
     async def close(self) -> None:
         """End all sessions, and publish nothing any more. Idempotent."""
+        await super().close()
         working, self._working = self._working, None
-        tasks = [*self._sessions, *self._sources, *([working] if working else [])]
+        tasks = [*self._sources, *([working] if working else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -115,24 +124,23 @@ class JointDoor:
         next_load = loop.time()
         next_message = loop.time()
 
-        while self._sessions or self.always_publishes or self._publisher:
+        while self.sessions or self.always_publishes or self._publisher:
+            self._work_changed.clear()
             now = loop.time()
             if now >= next_load:
                 next_load = now + _RELOAD_SECONDS
                 with contextlib.suppress(MinirospyError):  # no master for a while
                     await self.load()
-            pause = next_load - loop.time()
+            end = next_load
             if self.parameters and self.is_publishing:
                 if loop.time() >= next_message:
                     await self._publish()
                     next_message = max(next_message + 1 / self.parameters.rate, loop.time())
-                pause = min(pause, next_message - loop.time())
+                end = min(end, next_message)
             elif self._publisher:
                 publisher, self._publisher = self._publisher, None
                 await publisher.close()
-            else:
-                pause = min(pause, _LOOK_SECONDS)
-            await asyncio.sleep(max(0.0, pause))
+            await wait_until(self._work_changed, end)
 
     async def load(self, *, is_forced: bool = False) -> None:
         """Read the parameters, and the description again where one has changed. Raise MinirospyError."""
@@ -165,6 +173,7 @@ class JointDoor:
             self.joints = self.parameters = None
             self.why = str(error)
         self._follow(self.parameters.sources if self.parameters else [])
+        self.changed()
 
     def _follow(self, topics: Sequence[str]) -> None:
         """Follow the topics of source_list, and no others."""
@@ -179,12 +188,16 @@ class JointDoor:
                 async for state in subscription:
                     if self.joints:
                         self.joints.update(state.name, state.position, state.velocity, state.effort)
+                        self.changed()
             finally:
                 await subscription.close()
 
-        self._sources = [
-            asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)) for topic in topics
-        ]
+        self._sources = []
+        for topic in topics:
+            if why := why_illegal(topic):
+                self.warnings.append(f"The source_list parameter has [{topic[:200]}]: {why}")
+                continue
+            self._sources.append(asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)))
 
     async def _publish(self) -> None:
         from sensor_msgs.msg import JointState
@@ -202,24 +215,30 @@ class JointDoor:
             state.header.stamp = self.node.now()
             with contextlib.suppress(ROSException):  # the node is being shut down
                 await self._publisher.publish(state)
+        if self.parameters.delta > 0:
+            self.changed()
 
     def set(self, positions: Mapping[str, float]) -> None:
         """Set joints, within their limits. Raise UsageError on a joint that cannot be set."""
         free = self._free()
-        for name, position in positions.items():
+        for name in positions:
             if name not in free:
                 raise UsageError(f"there is no joint [{name[:200]}] that can be set")
+        for name, position in positions.items():
             free[name].position = min(max(position, free[name].lower), free[name].upper)
+        self.changed()
 
     def center(self) -> None:
         """Set all joints to their zeros."""
         for joint in self._free().values():
             joint.position = joint.zero
+        self.changed()
 
     def randomize(self) -> None:
         """Set all joints anywhere between their limits."""
         for joint in self._free().values():
             joint.position = random.uniform(joint.lower, joint.upper)
+        self.changed()
 
     def _free(self) -> dict[str, FreeJoint]:
         return self.joints.free if self.joints else {}
@@ -256,72 +275,52 @@ class JointDoor:
         return {"positions": positions, "publishing": self.is_publishing, "others": others}
 
 
-class JointSession:
+class JointSession(JsonSession):
     """One client."""
+
+    subject: ClassVar[str] = "joints"
 
     def __init__(self, door: JointDoor, client: WebClient) -> None:
         self._door = door
-        self._client = client
-        self._is_reload_wanted = False
-        self._generation = -1
+        self._generation = 0
         self._sent = ""
-        self._handlers: Mapping[str, Callable[[_Fields], None]] = {
-            "set": lambda fields: self._door.set(_positions(fields)),
-            "center": lambda _: self._door.center(),
-            "randomize": lambda _: self._door.randomize(),
+        handlers: Mapping[str, Handler] = {
+            "set": self._set,
+            "center": self._center,
+            "randomize": self._randomize,
             "publish": self._publish,
             "reload": self._reload,
         }
-        faults = Faults(_log, "serving joints")
-        self.task = asyncio.ensure_future(keep_running(self._run, faults))
+        super().__init__(client, handlers)
 
-    def received_text(self, text: str) -> None:
-        """Carry out an operation."""
-        if not self._client.may_write:
-            self._send_error("this token is read-only: it sets no joints")
-            return
-        try:
-            fields = json.loads(text)
-            self._handlers[fields["op"]](fields)
-        except UsageError as error:
-            self._send_error(str(error))
-        except (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError) as error:
-            self._send_error(f"not an operation on joints: {error}")
+    def refusal(self) -> str:
+        """See :meth:`JsonSession.refusal`."""
+        return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
-    def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
-        self._send_error("binary messages have no meaning here")
+    async def follow(self) -> None:
+        """Send the joints, where they have been read again, and their positions."""
+        if self._generation != self._door.generation:
+            self._generation = self._door.generation
+            self.send(self._door.description())
+        text = json.dumps({"state": self._door.state()})
+        if text != self._sent:
+            self._sent = text
+            self.client.send_text_message("state", text.encode(), newest_only=True)
 
-    def ended(self) -> None:
-        """End the session."""
-        self.task.cancel()
+    async def _set(self, fields: Fields) -> None:
+        self._door.set(_positions(fields))
 
-    async def _run(self) -> None:
-        self._client.send_text(json.dumps({"writes": self._client.may_write}))
-        while True:
-            if self._is_reload_wanted:
-                self._is_reload_wanted = False
-                try:
-                    await self._door.load(is_forced=True)
-                except MinirospyError as error:
-                    self._send_error(str(error))
-            if self._door.generation and self._generation != self._door.generation:
-                self._generation = self._door.generation
-                self._client.send_text(json.dumps(self._door.description()))
-            text = json.dumps({"state": self._door.state()})
-            if text != self._sent:
-                self._sent = text
-                self._client.send_text_message("state", text.encode(), newest_only=True)
-            await asyncio.sleep(_LOOK_SECONDS)
+    async def _center(self, _: Fields) -> None:
+        self._door.center()
 
-    def _publish(self, fields: _Fields) -> None:
-        self._door.is_publishing = bool(fields["on"]) or self._door.always_publishes
+    async def _randomize(self, _: Fields) -> None:
+        self._door.randomize()
 
-    def _reload(self, _: _Fields) -> None:
-        self._is_reload_wanted = True
+    async def _publish(self, fields: Fields) -> None:
+        self._door.publish(is_on=bool(fields["on"]))
 
-    def _send_error(self, text: str) -> None:
-        self._client.send_text(json.dumps({"error": text[:500]}))
+    async def _reload(self, _: Fields) -> None:
+        await self._door.load(is_forced=True)
 
 
 def _finite(value: float) -> float:
@@ -329,14 +328,11 @@ def _finite(value: float) -> float:
     return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
 
 
-def _positions(fields: _Fields) -> dict[str, float]:
+def _positions(fields: Fields) -> dict[str, float]:
     positions = fields["positions"]
     if not isinstance(positions, dict):
         raise TypeError("positions is an object")
-    found = {str(name): float(value) for name, value in positions.items()}
-    if not all(map(math.isfinite, found.values())):
-        raise ValueError("positions are finite numbers")
-    return found
+    return {name: number(value) for name, value in positions.items()}
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:

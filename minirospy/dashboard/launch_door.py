@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
-from collections.abc import Callable, Coroutine, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.bridge.tasks import Faults, keep_running
+from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession
 from minirospy.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.dashboard.launch_run import LaunchRun
 from minirospy.environment import Environment
@@ -31,58 +30,67 @@ __all__ = ["SUBPROTOCOL", "LaunchDoor", "LaunchSession"]
 
 SUBPROTOCOL = "minirospy.launch.v1"
 
-_log = logging.getLogger(__name__)
+_LOG_SECONDS = 0.2
+"""A file that grows reports nothing: it is looked at so often while a page shows it."""
 
-_OWNERS_ONLY = "start programs"
-_LOOK_SECONDS = 0.1
-_MOST_WAITING = 100
+_STOPPING_SECONDS = 0.2
 _MOST_RUNS = 50
+_MOST_ENDED = 20
+"""Launches that are kept when they have ended, with their last lines."""
+
 _TAIL_BYTES = 64 * 1024
 
-_T = TypeVar("_T")
-_Fields = Mapping[str, object]
 
-
-class LaunchDoor:
+class LaunchDoor(JsonDoor["LaunchSession"]):
     """Serves the launch files of the packages; all clients see the same launches."""
 
     def __init__(self, master_uri: str) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: LaunchSession(self, client))
         self.environment = Environment.read(master_uri=master_uri)
         self.packages = Packages(self.environment)
         self.files = LaunchFiles(self.packages)
         self.runs: dict[int, LaunchRun] = {}
-        self._sessions: set[asyncio.Task[None]] = set()
+        """The launches by id, in order; changed on the loop alone."""
+        self._restarting: set[int] = set()
 
-    def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
-        if SUBPROTOCOL in offered:
-            return SUBPROTOCOL
-        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
-
-    def open(self, client: WebClient) -> LaunchSession:
-        """Start serving a client."""
-        session = LaunchSession(self, client)
-        self._sessions.add(session.task)
-        session.task.add_done_callback(self._sessions.discard)
-        return session
-
-    def start(self, file: LaunchFile, args: Mapping[str, str]) -> None:
-        """Start a launch file. Raise MinirospyError. Reads folders, so it blocks."""
-        path = self.files.path_of(file)
-        # Sessions change the table while this thread reads it.
-        if sum(not run.is_ended for run in tuple(self.runs.values())) >= _MOST_RUNS:
+    def start(self, file: LaunchFile, path: Path, args: Mapping[str, str]) -> None:
+        """Start a launch file. Raise UsageError."""
+        if self.is_closed:
+            raise UsageError("the dashboard is shut down")
+        if sum(not run.is_ended for run in self.runs.values()) >= _MOST_RUNS:
             raise UsageError(f"{_MOST_RUNS} launch files run already")
-        run = LaunchRun(file.package, file.path, path, args, self.environment, self.packages)
+        on_change = self.post_change
+        run = LaunchRun(file.package, file.path, path, args, self.environment, self.packages, on_change)
         self.runs[run.id] = run
+        self.changed()
+
+    async def restart(self, run: LaunchRun) -> None:
+        """End a launch, and start its file again with the same arguments. Raise UsageError."""
+        if run.id in self._restarting:
+            return
+        self._restarting.add(run.id)
+        try:
+            run.stop()
+            await asyncio.get_running_loop().run_in_executor(None, run.join)
+            self.start(LaunchFile(run.package, run.file), run.path, run.args)
+            self.runs.pop(run.id, None)
+        finally:
+            self._restarting.discard(run.id)
+
+    def changed(self) -> None:
+        """See :meth:`JsonDoor.changed`; of the launches that have ended only the newest are kept."""
+        ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
+        for number in ended[:-_MOST_ENDED]:
+            del self.runs[number]
+        super().changed()
 
     async def close(self) -> None:
         """End all sessions and all launches, and wait for that."""
-        for task in list(self._sessions):
-            task.cancel()
-        await asyncio.gather(*self._sessions, return_exceptions=True)
+        self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
             run.stop()
+        await super().close()
         loop = asyncio.get_running_loop()
         await asyncio.gather(*(loop.run_in_executor(None, run.join) for run in runs))
 
@@ -100,9 +108,10 @@ class _Tail:
     def read(self) -> str:
         """Return what is new. Blocks."""
         if not self.node:
-            new = self.run.output.count - self._count
-            self._count += new
-            return "".join(f"{line}\n" for line in list(self.run.output.lines)[-new:]) if new else ""
+            lines, self._count = self.run.output.since(self._count)
+            return "".join(f"{line}\n" for line in lines)
+        # Looked up first: what is written until then is in the file.
+        has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
             return ""
@@ -116,24 +125,26 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Whole lines, unless one is endless: a character may be in two parts.
+        # Whole lines, unless one is endless, or the last one has no end: a character may be in two parts.
         end = data.rfind(b"\n") + 1
-        data = data[:end] if end else data if len(data) == _TAIL_BYTES else b""
+        is_whole = not end if len(data) == _TAIL_BYTES else has_exited
+        data = data if is_whole else data[:end]
         self._position += len(data)
         return data.decode("utf-8", "replace")
 
 
-class LaunchSession:
-    """One client. What reads files blocks, so it runs in a thread of the session, one after another."""
+class LaunchSession(JsonSession):
+    """One client. What reads files blocks, so it runs in the thread of the session."""
+
+    subject: ClassVar[str] = "launch files"
+    owners_only: ClassVar[str] = "start programs"
+    pace: ClassVar[float] = 0.1
 
     def __init__(self, door: LaunchDoor, client: WebClient) -> None:
         self._door = door
-        self._client = client
-        self._operations: asyncio.Queue[_Fields] = asyncio.Queue(_MOST_WAITING)
-        self._thread = ThreadPoolExecutor(1, "launch-session")
         self._tail: _Tail | None = None
         self._sent = ""
-        self._handlers: Mapping[str, Callable[[_Fields], Coroutine[object, object, None]]] = {
+        handlers: Mapping[str, Handler] = {
             "list": self._list,
             "describe": self._describe,
             "start": self._start,
@@ -141,78 +152,22 @@ class LaunchSession:
             "restart": self._restart,
             "remove": self._remove,
             "end": self._end_node,
-            "follow": self._follow,
+            "follow": self._follow_log,
         }
-        self._faults = Faults(_log, "serving launch files")
-        self.task = asyncio.ensure_future(self._run())
-        self.task.add_done_callback(self._faults.of_task)
+        super().__init__(client, handlers)
 
-    # --- from the connection
+    async def follow(self) -> float | None:
+        """Send the launches, where one has changed, and what is new in the log."""
+        # Before the rest is sent: what a launch does meanwhile is reported as a change.
+        is_stopping = any(run.is_stopping for run in self._door.runs.values())
+        self._send_launches()
+        is_growing = await self._send_log()
+        return _LOG_SECONDS if is_growing else _STOPPING_SECONDS if is_stopping else None
 
-    def received_text(self, text: str) -> None:
-        """Take over an operation."""
-        if not self._client.is_owner:
-            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
-            return
-        try:
-            fields = json.loads(text)
-            if not isinstance(fields, dict) or fields.get("op") not in self._handlers:
-                raise ValueError(text[:80])
-        except (ValueError, TypeError, RecursionError) as error:
-            self._send_error(f"not an operation on launch files: {error}")
-            return
-        try:
-            self._operations.put_nowait(fields)
-        except asyncio.QueueFull:
-            self._send_error("the launch is too slow: an operation was dropped")
+    async def _list(self, _: Fields) -> Fields:
+        return {"files": await self.in_thread(self._door.files.scan)}
 
-    def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
-        self._send_error("binary messages have no meaning here")
-
-    def ended(self) -> None:
-        """End the session; what it started runs on."""
-        self.task.cancel()
-
-    # --- the session's task
-
-    async def _run(self) -> None:
-        self._client.send_text(json.dumps({"writes": self._client.is_owner}))
-        if not self._client.is_owner:
-            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
-        try:
-            await keep_running(self._serve, self._faults)
-        finally:
-            self._thread.shutdown(wait=False)
-
-    async def _serve(self) -> None:
-        while True:
-            while not self._operations.empty():
-                await self._handle(self._operations.get_nowait())
-            if self._client.is_owner:
-                self._send_launches()
-                await self._send_log()
-            await asyncio.sleep(_LOOK_SECONDS)
-
-    async def _handle(self, fields: _Fields) -> None:
-        try:
-            await self._handlers[str(fields["op"])](fields)
-        except (MinirospyError, OSError) as error:
-            self._send_error(str(error))
-        except (ValueError, TypeError, LookupError) as error:
-            self._send_error(f"not an operation on launch files: {fields['op']}: {error!r}")
-        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
-            self._faults.report(error)
-            self._send_error(f"the dashboard failed on this operation: {type(error).__name__}")
-
-    async def _in_thread(self, work: Callable[[], _T]) -> _T:
-        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
-
-    async def _list(self, _: _Fields) -> None:
-        files = await self._in_thread(self._door.files.scan)
-        self._client.send_text(json.dumps({"files": files}))
-
-    async def _describe(self, fields: _Fields) -> None:
+    async def _describe(self, fields: Fields) -> Fields:
         file, args = _file(fields), _args(fields)
 
         def read() -> list[list[str | None]]:
@@ -220,39 +175,43 @@ class LaunchSession:
             docs = resolved_arg_docs(str(path), args, self._door.packages)
             return [[each.name, each.default, each.doc] for each in docs]
 
-        found = {"package": file.package, "file": file.path, "args": await self._in_thread(read)}
-        self._client.send_text(json.dumps({"describe": found}))
+        found = {"package": file.package, "file": file.path, "args": await self.in_thread(read)}
+        return {"describe": found}
 
-    async def _start(self, fields: _Fields) -> None:
+    async def _start(self, fields: Fields) -> None:
         file, args = _file(fields), _args(fields)
-        await self._in_thread(lambda: self._door.start(file, args))
+        path = await self.in_thread(partial(self._door.files.path_of, file))
+        self._door.start(file, path, args)
 
-    async def _stop(self, fields: _Fields) -> None:
+    async def _stop(self, fields: Fields) -> None:
         self._run_of(fields).stop()
 
-    async def _restart(self, fields: _Fields) -> None:
-        run = self._run_of(fields)
-        run.stop()
-        # Meanwhile this session does nothing else: others go on.
-        await self._in_thread(run.join)
-        self._door.runs.pop(run.id, None)
-        await self._in_thread(lambda: self._door.start(LaunchFile(run.package, run.file), run.args))
+    async def _restart(self, fields: Fields) -> None:
+        # This goes on where the page is closed; meanwhile the session shows how it goes.
+        self._door.spawn(self._report_restart(self._run_of(fields)))
 
-    async def _remove(self, fields: _Fields) -> None:
+    async def _report_restart(self, run: LaunchRun) -> None:
+        try:
+            await self._door.restart(run)
+        except MinirospyError as error:
+            self.send_error(str(error))
+
+    async def _remove(self, fields: Fields) -> None:
         run = self._run_of(fields)
         if not run.is_ended:
             raise UsageError(f"{run.package}/{run.file} runs: stop it first")
         self._door.runs.pop(run.id, None)
+        self._door.changed()
 
-    async def _end_node(self, fields: _Fields) -> None:
+    async def _end_node(self, fields: Fields) -> None:
         self._run_of(fields).end_node(str(fields["node"]), restarts=bool(fields.get("restarts")))
 
-    async def _follow(self, fields: _Fields) -> None:
+    async def _follow_log(self, fields: Fields) -> None:
         self._tail = (
             None if fields.get("id") is None else _Tail(self._run_of(fields), str(fields.get("node", "")))
         )
 
-    def _run_of(self, fields: _Fields) -> LaunchRun:
+    def _run_of(self, fields: Fields) -> LaunchRun:
         number = fields["id"]
         if not isinstance(number, int) or number not in self._door.runs:
             raise UsageError("this launch is not there any more")
@@ -260,34 +219,34 @@ class LaunchSession:
 
     def _send_launches(self) -> None:
         launches = []
-        # Threads of other sessions add launches meanwhile.
-        for run in tuple(self._door.runs.values()):
+        for run in self._door.runs.values():
             state = run.state()
             launches.append({**state._asdict(), "nodes": [node._asdict() for node in state.nodes]})
         text = json.dumps({"launches": launches})
         if text != self._sent:
             self._sent = text
-            self._client.send_text_message("launches", text.encode(), newest_only=True)
+            self.client.send_text_message("launches", text.encode(), newest_only=True)
 
-    async def _send_log(self) -> None:
+    async def _send_log(self) -> bool:
+        """Send what is new; return whether there may be more without a change of the launch."""
         tail = self._tail
         if tail is None:
-            return
-        text = await self._in_thread(tail.read)
+            return False
+        is_growing = bool(tail.node) and not tail.run.is_ended
+        text = await self.in_thread(tail.read)
         if text or tail.is_first:
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
-            self._client.send_text(json.dumps(found))
+            self.send(found)
+        # A file may have more than what is read at a time.
+        return is_growing or bool(tail.node and text)
 
-    def _send_error(self, text: str) -> None:
-        self._client.send_text(json.dumps({"error": text[:1000]}))
 
-
-def _file(fields: _Fields) -> LaunchFile:
+def _file(fields: Fields) -> LaunchFile:
     return LaunchFile(str(fields["package"]), str(fields["file"]))
 
 
-def _args(fields: _Fields) -> dict[str, str]:
+def _args(fields: Fields) -> dict[str, str]:
     args = fields.get("args", {})
     if not isinstance(args, dict):
         raise TypeError("args is an object")

@@ -55,18 +55,28 @@ class RunState(NamedTuple):
 
 
 class _Lines(Output):
-    """The lines of roslaunch itself, kept instead of printed."""
+    """The lines of roslaunch itself, kept instead of printed. ``on_change`` is called after each."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_change: Callable[[], object]) -> None:
         super().__init__(title=False)
-        self.lines: deque[str] = deque(maxlen=_MOST_LINES)
-        self.count = 0
+        self._on_change = on_change
+        self._lock = threading.Lock()
+        self._lines: deque[str] = deque(maxlen=_MOST_LINES)
+        self._count = 0
+
+    def since(self, count: int) -> tuple[list[str], int]:
+        """Return the lines after the first ``count``, as far as they are kept, and how many there were. From any thread."""
+        with self._lock:
+            new = min(self._count - count, len(self._lines))
+            return list(self._lines)[len(self._lines) - new :], self._count
 
     def _write(self, text: str, colour: str, level: int) -> None:
         if text:
-            self.count += 1
-            self.lines.append(text)
+            with self._lock:
+                self._count += 1
+                self._lines.append(text)
             self._to_log(text, level)
+            self._on_change()
 
 
 class _PageLauncher(Launcher):
@@ -79,17 +89,19 @@ class _PageLauncher(Launcher):
         packages: Packages,
         output: Output,
         on_end: Callable[[Process], None],
+        on_change: Callable[[], object],
     ) -> None:
         options = RunOptions(log=True, log_errors=True, summary=False, name="dashboard")
         super().__init__(spec, environment, packages, options, output)
         self._report = on_end
+        self.supervisor.on_change = on_change
 
     def _on_end(self, process: Process) -> None:
         self._report(process)
 
 
 class LaunchRun:
-    """One launch file, started in a thread. ``on_ended`` is called there when it has ended."""
+    """One launch file, started in a thread. ``on_change`` is called there when :meth:`state` or ``output`` has changed."""
 
     _ids: ClassVar[Iterator[int]] = itertools.count(1)
 
@@ -101,10 +113,12 @@ class LaunchRun:
         args: Mapping[str, str],
         environment: Environment,
         packages: Packages,
+        on_change: Callable[[], object] = lambda: None,
     ) -> None:
         self.id = next(self._ids)
         self.package, self.file, self.path, self.args = package, file, path, dict(args)
-        self.output = _Lines()
+        self.output = _Lines(on_change)
+        self._on_change = on_change
         self._environment = environment
         self._packages = packages
         self._state = "starting"
@@ -125,8 +139,18 @@ class LaunchRun:
         return self._state == "ended"
 
     @property
+    def is_stopping(self) -> bool:
+        """Return whether its nodes are being ended."""
+        return self._state == "stopping"
+
+    @property
     def _is_ending(self) -> bool:
         return self._state in ("stopping", "ended")
+
+    def has_exited(self, node: str) -> bool:
+        """Return whether a node was started, and does not run."""
+        process = self._known.get(node)
+        return process is not None and not process.is_running
 
     def state(self) -> RunState:
         """Return the state now. From any thread."""
@@ -150,6 +174,7 @@ class LaunchRun:
                 self._state = "stopping"
             if self._launcher:
                 self._launcher.stop("the page")
+        self._on_change()
 
     def join(self) -> None:
         """Wait until all of it has ended."""
@@ -160,7 +185,9 @@ class LaunchRun:
         launcher, process = self._launcher, self._known.get(name)
         if not launcher or not process or not process.is_running or self._state != "running":
             raise UsageError(f"node [{name[:200]}] does not run")
-        process.is_restarting = restarts
+        if process.is_ending:
+            raise UsageError(f"node [{name[:200]}] is being ended already")
+        process.is_ending, process.is_restarting = True, restarts
         threading.Thread(target=launcher.supervisor.end_process, args=(process,), daemon=True).start()
 
     def _run(self) -> None:
@@ -181,7 +208,9 @@ class LaunchRun:
         unknown = [name for name in self.args if name not in spec.args]
         if unknown:
             raise UsageError(f"the launch file declares no <arg> '{unknown[0]}'")
-        launcher = _PageLauncher(spec, self._environment, self._packages, self.output, self._node_ended)
+        launcher = _PageLauncher(
+            spec, self._environment, self._packages, self.output, self._node_ended, self._on_change
+        )
         self._nodes = list(spec.nodes)
         with self._lock:
             self._launcher = launcher
@@ -191,6 +220,7 @@ class LaunchRun:
         with self._lock:
             if not self._is_stopped:
                 self._state = "running"
+        self._on_change()
         status = launcher.watch()
         if status and not self._is_stopped:
             self._error = "a required node has died"
@@ -199,13 +229,18 @@ class LaunchRun:
         with self._lock:
             self._state = "stopping"
         self.state()
+        self._on_change()
         try:
             if self._launcher:
                 self._launcher.close()
         except (MinirospyError, OSError) as error:
             self._error = self._error or str(error)
+        except Exception as error:  # noqa: BLE001 - the page shows it
+            self._error = self._error or f"the launch did not end in order: {error!r}"
+            _log.exception("%s/%s", self.package, self.file)
         finally:
             self._state = "ended"
+            self._on_change()
 
     def _node_ended(self, process: Process) -> None:
         assert process.node

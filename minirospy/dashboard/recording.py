@@ -119,9 +119,11 @@ class Recording:
         status = self._process.exit_code
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
-        if status:
+        if status and self._process.is_ending and not size:
+            error = "it was stopped before it had started: nothing was recorded"
+        elif status:
             error = next(
-                (line for line in reversed(self._lines) if "ERROR" in line or "rror" in line),
+                (line for line in reversed(tuple(self._lines)) if "ERROR" in line or "rror" in line),
                 f"rosbag record ended with status {status}",
             )
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)

@@ -1,7 +1,7 @@
 """What the views need besides the Foxglove protocol, by JSON over WebSocket: requests about nodes, types and files.
 
 A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error": "..."}``.
-The requests are in ``ToolsSession._METHODS``. After ``watch`` it sends ``{"report": ...}`` every few seconds until ``unwatch``:
+The requests are in ``ToolsSession.handlers``. After ``watch`` it sends ``{"report": ...}`` every few seconds until ``unwatch``:
 the graph and all nodes, as minirospy/introspect/survey.py describes them.
 """
 
@@ -12,12 +12,15 @@ import json
 import logging
 import math
 import time
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import installed_type
-from minirospy.errors import MinirospyError, NotFoundError
+from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of, texts_of
+from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes
@@ -31,41 +34,37 @@ __all__ = ["SUBPROTOCOL", "ToolsDoor", "ToolsSession"]
 
 SUBPROTOCOL = "minirospy.tools.v1"
 
+_T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-_MOST_WAITING = 20
 _REPORT_SECONDS = 2.0
-_LARGEST_TEXT = 1_000_000
+_AT_ONCE = 4
+"""Requests of one client that are answered at the same time: nodes that do not answer take seconds."""
 
 
-class ToolsDoor:
+class ToolsDoor(JsonDoor["ToolsSession"]):
     """Serves the requests of pages. ``tool`` is the name by which nodes are called."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
-        self.tasks: set[asyncio.Task[None]] = set()
+        super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
+        self.parser = ThreadPoolExecutor(1, "tools-parser")
+        """Parses files, one after another: several at once would hold up the loop longer."""
         self._master_uri = master_uri
         self._tool = tool
         self._watching: set[ToolsSession] = set()
         self._reporting: asyncio.Task[None] | None = None
+        self._surveyor = ThreadPoolExecutor(1, "tools-survey")
         self._last: Survey | None = None
-
-    def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
-        if SUBPROTOCOL in offered:
-            return SUBPROTOCOL
-        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
-
-    def open(self, client: WebClient) -> ToolsSession:
-        """Start serving a client."""
-        return ToolsSession(self, client)
 
     async def close(self) -> None:
         """Cancel what still runs."""
-        self._watching.clear()
-        running = [*self.tasks, *([self._reporting] if self._reporting else [])]
-        for task in running:
-            task.cancel()
-        await asyncio.gather(*running, return_exceptions=True)
+        await super().close()
+        reporting, self._reporting = self._reporting, None
+        if reporting:
+            reporting.cancel()
+            await asyncio.gather(reporting, return_exceptions=True)
+        for threads in (self.parser, self._surveyor):
+            threads.shutdown(wait=False, cancel_futures=True)
 
     def graph(self) -> Graph:
         """Return the graph, with a separate connection to the master: calls run in threads."""
@@ -79,7 +78,7 @@ class ToolsDoor:
             faults = Faults(_log, "the report of the nodes")
             self._reporting = asyncio.ensure_future(keep_running(self._report, faults))
         elif self._last:
-            session.report(describe(self._last))
+            session.report(_report_of(describe(self._last)))
 
     def unwatch(self, session: ToolsSession) -> None:
         """End it; nobody queries the nodes while nobody watches."""
@@ -92,15 +91,16 @@ class ToolsDoor:
         while True:
             started = time.monotonic()
             try:
-                now = await asyncio.to_thread(self._survey)
-            except MinirospyError as error:
-                for session in tuple(self._watching):
-                    session.report({"trouble": str(error)})
+                # In one thread: where a survey is cancelled, the next one waits for its end.
+                now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
+            except (MinirospyError, OSError) as error:
+                fields: Mapping[str, object] = {"trouble": str(error)}
             else:
                 fields = describe(now, self._last)
                 self._last = now
-                for session in tuple(self._watching):
-                    session.report(fields)
+            data = _report_of(fields)
+            for session in tuple(self._watching):
+                session.report(data)
             # Nodes that answer slowly are not queried without a pause.
             await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
@@ -109,101 +109,105 @@ class ToolsDoor:
             return survey(graph)
 
 
-class ToolsSession:
-    """One client."""
+class ToolsSession(JsonSession):
+    """One client. Its requests are answered as they are done, each with its ``id``."""
+
+    subject: ClassVar[str] = "the graph"
+    most_waiting: ClassVar[int] = 20
 
     def __init__(self, door: ToolsDoor, client: WebClient) -> None:
         self._door = door
-        self._client = client
         self._running: set[asyncio.Task[None]] = set()
-        self._faults = Faults(_log, "a request of a page")
+        self._threads = ThreadPoolExecutor(_AT_ONCE, "tools")
+        handlers: Mapping[str, Handler] = {
+            "watch": self._watch,
+            "unwatch": self._unwatch,
+            "ping": self._ping,
+            "kill": self._kill,
+            "cleanup": self._cleanup,
+            "type": self._type,
+            "yaml": self._yaml,
+        }
+        super().__init__(client, handlers)
 
-    def received_text(self, text: str) -> None:
-        """Take over a request."""
-        try:
-            fields = json.loads(text)
-            number = int(fields["id"])
-            method = self._METHODS[fields["do"]]
-        except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
-            self._send({"error": f"not a request: {error}"[:300]})
-            return
-        if len(self._running) >= _MOST_WAITING:
-            self._send({"id": number, "error": "too many requests wait for their answers"})
-            return
-        task = asyncio.ensure_future(self._answer(number, method, fields))
-        for tasks in (self._running, self._door.tasks):
-            tasks.add(task)
-            task.add_done_callback(tasks.discard)
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`."""
+        number = fields["id"]
+        if not isinstance(number, int):
+            raise TypeError("id is an integer")
+        return text_of(fields, "do"), fields
 
-    def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
-        self._send({"error": "binary messages have no meaning here"})
+    async def started(self) -> None:
+        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
+
+    def take(self, name: str, fields: Fields) -> None:
+        """See :meth:`JsonSession.take`."""
+        if len(self._running) >= self.most_waiting:
+            self.send_error("too many requests wait for their answers", fields)
+            return
+        task = asyncio.ensure_future(self.carry_out(name, fields))
+        self._running.add(task)
+        task.add_done_callback(self._running.discard)
+
+    def send_answer(self, answer: object, fields: Fields) -> None:
+        """See :meth:`JsonSession.send_answer`."""
+        self.send({"id": fields["id"], "result": answer})
+
+    def send_error(self, text: str, fields: Fields | None = None) -> None:
+        """See :meth:`JsonSession.send_error`."""
+        self.send({**({"id": fields["id"]} if fields else {}), "error": text[:500]})
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """See :meth:`JsonSession.in_thread`: in one of several threads."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     def ended(self) -> None:
-        """End what runs for this client."""
+        """See :meth:`JsonSession.ended`."""
+        super().ended()
         self._door.unwatch(self)
-        for task in self._running:
+        for task in tuple(self._running):
             task.cancel()
+        self._threads.shutdown(wait=False, cancel_futures=True)
 
-    async def _answer(
-        self,
-        number: int,
-        method: Callable[[ToolsSession, Mapping[str, object]], Awaitable[object]],
-        fields: Mapping[str, object],
-    ) -> None:
-        try:
-            result = await method(self, fields)
-        except (MinirospyError, LookupError, ValueError, TypeError) as error:
-            self._send({"id": number, "error": str(error)[:500]})
-        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
-            self._faults.report(error)
-            self._send(
-                {"id": number, "error": f"the dashboard failed on this request: {type(error).__name__}"}
-            )
-        else:
-            self._send({"id": number, "result": result})
-
-    def report(self, fields: Mapping[str, object]) -> None:
+    def report(self, data: bytes) -> None:
         """Send a report; an older one that waits is dropped."""
-        self._client.send_text_message("report", json.dumps({"report": fields}).encode(), newest_only=True)
+        self.client.send_text_message("report", data, newest_only=True)
 
-    def _send(self, fields: Mapping[str, object]) -> None:
-        self._client.send_text(json.dumps(fields))
-
-    async def _watch(self, _: Mapping[str, object]) -> object:
+    async def _watch(self, _: Fields) -> Fields:
         self._door.watch(self)
         return {}
 
-    async def _unwatch(self, _: Mapping[str, object]) -> object:
+    async def _unwatch(self, _: Fields) -> Fields:
         self._door.unwatch(self)
         return {}
 
-    async def _ping(self, fields: Mapping[str, object]) -> object:
+    async def _ping(self, fields: Fields) -> Fields:
         """Return the seconds that a call to ``node`` takes."""
+
+        name = text_of(fields, "node")
 
         def ping() -> float:
             with self._door.graph() as graph:
-                return ping_node(graph, find_node(graph, str(fields["node"])))
+                return ping_node(graph, find_node(graph, name))
 
-        return {"seconds": await asyncio.to_thread(ping)}
+        return {"seconds": await self.in_thread(ping)}
 
-    async def _kill(self, fields: Mapping[str, object]) -> object:
+    async def _kill(self, fields: Fields) -> Fields:
         """Request ``node`` to shut down."""
         self._require_writing("shuts down no node")
+        name = text_of(fields, "node")
 
         def kill() -> None:
             with self._door.graph() as graph:
-                kill_node(graph, find_node(graph, str(fields["node"])), "requested in the dashboard")
+                kill_node(graph, find_node(graph, name), "requested in the dashboard")
 
-        await asyncio.to_thread(kill)
+        await self.in_thread(kill)
         return {}
 
-    async def _cleanup(self, fields: Mapping[str, object]) -> object:
+    async def _cleanup(self, fields: Fields) -> list[str]:
         """Unregister those of ``nodes`` that still do not answer, as `rosnode cleanup` does; return their names."""
         self._require_writing("unregisters no node")
-        wanted = fields["nodes"]
-        if not isinstance(wanted, list):
-            raise TypeError("nodes: not a list of names")
+        wanted = texts_of(fields, "nodes")
 
         def clean() -> list[str]:
             with self._door.graph() as graph:
@@ -212,38 +216,31 @@ class ToolsSession:
                     forget_node(graph, node)
                 return [node.name for node in silent]
 
-        return await asyncio.to_thread(clean)
+        return await self.in_thread(clean)
 
-    async def _type(self, fields: Mapping[str, object]) -> object:
+    async def _type(self, fields: Fields) -> Fields:
         """Return the full definition of the message type ``name``, of the packages that are installed here."""
-        name = str(fields["name"])
-        found = await asyncio.to_thread(installed_type, name)
+        name = text_of(fields, "name")
+        found = await self.in_thread(partial(installed_type, name))
         if found is None:
             raise NotFoundError("message type", name, ())
         return {"definition": found.definition}
 
     def _require_writing(self, what: str) -> None:
-        if not self._client.may_write:
-            raise ValueError(f"this token is read-only: it {what}")
+        if not self.client.may_write:
+            raise UsageError(f"this token is read-only: it {what}")
 
-    async def _yaml(self, fields: Mapping[str, object]) -> object:
+    async def _yaml(self, fields: Fields) -> Fields:
         """Return the values of a file of rqt_reconfigure or dynparam by name."""
-        text = str(fields["text"])
-        if len(text) > _LARGEST_TEXT:
-            raise ValueError("the file is too large")
-        values = await asyncio.to_thread(parameter_values, text)
+        text = text_of(fields, "text")
+        loop = asyncio.get_running_loop()
+        values = await loop.run_in_executor(self._door.parser, parameter_values, text)
         # JSON has no infinity.
         return {
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
             for name, value in values.items()
         }
 
-    _METHODS: ClassVar[Mapping[str, Callable[[ToolsSession, Mapping[str, object]], Awaitable[object]]]] = {
-        "watch": _watch,
-        "unwatch": _unwatch,
-        "ping": _ping,
-        "kill": _kill,
-        "cleanup": _cleanup,
-        "type": _type,
-        "yaml": _yaml,
-    }
+
+def _report_of(fields: Fields) -> bytes:
+    return json.dumps({"report": fields}).encode()

@@ -7,6 +7,7 @@ import json
 import os
 import struct
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -324,7 +325,7 @@ def test_recording_is_kept_where_its_page_closes_while_it_starts(
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
     assert gate.reached.wait(60)
     page.socket.close()
-    wait_until(lambda: not door._sessions)
+    wait_until(lambda: not door.sessions)
     gate.opened.set()
     wait_until(lambda: door.recording is not None)
 
@@ -356,7 +357,7 @@ def test_bag_is_closed_where_its_page_closes_while_it_opens(
     page.send("open", name="a.bag")
     assert gate.reached.wait(60)
     page.socket.close()
-    wait_until(lambda: not door._sessions)
+    wait_until(lambda: not door.sessions)
     gate.opened.set()
     assert closed.wait(60)
 
@@ -397,11 +398,63 @@ def test_who_has_no_token_neither_records_nor_opens(client: Callable[..., Client
     assert "only who has the token may record or open bags" in json_error(page)
 
 
+def test_page_that_shows_a_paused_bag_looks_only_when_something_changes(
+    client: Callable[..., Client], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_bag(folder / "a.bag", 2)
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("show", topics=["/chatter"])
+    page.binary(1, text_body("message 0"))
+    page.send("step")
+    page.binary(1, text_body("message 1"))
+    looks: list[object] = []
+    follow = BagSession.follow
+
+    async def counted(session: BagSession) -> float | None:
+        looks.append(session)
+        return await follow(session)
+
+    monkeypatch.setattr(BagSession, "follow", counted)
+    # Nothing happens: what is measured is that nothing is done.
+    time.sleep(1.0)
+    assert len(looks) <= 2
+    # The player reaches the end by itself.
+    page.send("play", paused=False, rate=10)
+    page.next("state", lambda state: state["ended"])
+
+
+def test_stop_waits_for_a_recording_that_is_being_started(
+    serve: Callable[..., Served],
+    client: Callable[..., Client],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gate = Gate()
+
+    class Slow(Recording):
+        def __init__(self, *words: Any) -> None:
+            gate.pass_through()
+            super().__init__(*words)
+
+    monkeypatch.setattr(bag_door, "Recording", Slow)
+    served = serve()
+    page, other = client(served), client(served)
+    page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
+    assert gate.reached.wait(60)
+    other.send("stop")
+    other.send("list")
+    gate.opened.set()
+    done = other.next("recording", lambda found: found and found["is_ended"])
+    assert done["name"] == "run.bag"
+    assert done["error"] in ("", "it was stopped before it had started: nothing was recorded")
+
+
 def test_session_goes_on_after_a_fault(
     client: Callable[..., Client], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     faults = iter([ZeroDivisionError])
-    follow = BagSession._follow
+    follow = BagSession._follow_bag
 
     async def failing(session: BagSession, bag: OpenBag) -> None:
         for fault in faults:
@@ -411,7 +464,7 @@ def test_session_goes_on_after_a_fault(
     def bags(_: BagFolder) -> list[object]:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(BagSession, "_follow", failing)
+    monkeypatch.setattr(BagSession, "_follow_bag", failing)
     monkeypatch.setattr(BagFolder, "bags", bags)
     make_bag(folder / "one.bag")
     page = client()
@@ -419,4 +472,5 @@ def test_session_goes_on_after_a_fault(
     assert json_error(page) == "the dashboard failed on this operation: ZeroDivisionError"
     page.send("open", name="one.bag")
     page.next("bag")
+    assert json_error(page) == "the dashboard failed to show bags: ZeroDivisionError"
     page.next("state")

@@ -14,6 +14,7 @@ from minirospy.bridge.access import Access
 from minirospy.dashboard import board_door
 from minirospy.dashboard.board_door import SUBPROTOCOL
 from minirospy.gpio.board import Board
+from tests.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -63,17 +64,40 @@ def test_button_is_released_when_the_page_is_closed(serve: Callable[..., Served]
 
 def test_another_board_is_named_in_the_address(serve: Callable[..., Served]) -> None:
     name = f"other-{Board.__name__}"
-    with opened(serve(), f"?board={name}") as socket:
+    with opened(serve(), f"?board={name}", TOKEN) as socket:
         assert state(socket, lambda each: True)["name"] == name
 
 
+def test_board_is_started_only_by_who_has_the_token(serve: Callable[..., Served]) -> None:
+    with opened(serve(), "?board=nobodys") as socket:
+        assert (
+            "only who has the token may start boards" in state(socket, lambda each: "error" in each)["error"]
+        )
+        socket.send('{"press": 11}')
+        assert "not open" in state(socket, lambda each: "error" in each)["error"]
+    with Board("nobodys"), opened(serve(), "?board=nobodys") as socket:
+        assert state(socket, lambda each: True)["name"] == "nobodys"
+
+
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"press": "x"}', '{"person": [1]}', '{"fly": 1}', '{"press": 1, "a": 2}']
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"press": "x"}',
+        '{"person": [1]}',
+        '{"fly": 1}',
+        '{"press": 1, "a": 2}',
+        '{"person": [1' + "0" * 400 + ", 0]}",
+        '{"person": [NaN, 0]}',
+        '{"person": [' + "[" * 900,
+    ],
 )
 def test_what_is_not_an_operation_is_refused_with_one_line(serve: Callable[..., Served], text: str) -> None:
     with opened(serve()) as socket:
         socket.send(text)
-        assert "not an operation of the board" in state(socket, lambda each: "error" in each)["error"]
+        assert "not an operation on the board" in state(socket, lambda each: "error" in each)["error"]
 
 
 def test_pin_that_does_not_exist_is_refused(serve: Callable[..., Served]) -> None:

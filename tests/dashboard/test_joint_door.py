@@ -15,7 +15,8 @@ from sensor_msgs.msg import JointState
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from minirospy.bridge.access import Access
+from minirospy.bridge.access import Access, NameFilter
+from minirospy.bridge.graph import Filters
 from minirospy.dashboard.joint_door import SUBPROTOCOL, JointDoor
 from minirospy.introspect.snapshot import fetch
 from minirospy.runtime.rpc.master_proxy import MasterProxy
@@ -222,6 +223,71 @@ def test_read_only_client_sets_nothing(serve: Callable[..., Served], client: Cal
     assert page.next("writes") is False
     page.send("publish", on=True)
     assert "read-only" in page.next("error")
+
+
+def test_source_with_an_illegal_name_is_warned_of_and_the_others_followed(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, source_list=["no name!", "/from_robot", ""])
+    page = client(served)
+    warnings = page.next("joints")["warnings"]
+    assert [each for each in warnings if "[no name!]: that is not a legal name" in each]
+    page.send("set", positions={"shoulder": 1.5})
+    page.next("state", lambda state: state["positions"]["shoulder"] == 1.5)
+    set_params(served, source_list=[])
+    page.next("joints", lambda joints: joints["sources"] == [])
+
+
+@pytest.mark.parametrize("name", ["rate", "delta"])
+def test_parameter_that_is_no_number_is_named(
+    serve: Callable[..., Served], client: Callable[..., Client], name: str
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, **{name: float("nan")})
+    page = client(served)
+    found = page.next("why", bool)
+    assert f"The {name} parameter is [nan]: it is a number" in found
+
+
+def test_joints_are_set_all_or_none(serve: Callable[..., Served], client: Callable[..., Client]) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    page = client(served)
+    page.next("joints")
+    page.send("set", positions={"shoulder": 1.5, "none": 1})
+    assert "there is no joint [none]" in page.next("error")
+    page.send("set", positions={"lift": 0.2})
+    page.send("set", positions={"lift": 0.15})
+    state = page.next("state", lambda state: state["positions"]["lift"] == 0.15)
+    assert state["positions"]["shoulder"] == 0
+
+
+def test_topic_that_clients_may_not_publish_is_not_published(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve(filters=Filters(publishable=NameFilter.of(deny=["/joint_states"])))
+    set_params(served, robot_description=ROBOT)
+    page = client(served)
+    page.next("joints")
+    page.send("publish", on=True)
+    assert "topic [/joint_states] may not be published by clients" in page.next("error")
+
+
+def test_another_publisher_of_the_joints_is_named(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    page = client(served)
+    page.next("joints")
+    node = served.node("arm")
+
+    async def advertise() -> None:
+        await node.advertise("/joint_states", JointState)
+
+    served.run(advertise())
+    page.next("state", lambda state: state["others"] == ["/arm"])
 
 
 def test_node_of_launch_files_publishes_without_a_page(master: str) -> None:

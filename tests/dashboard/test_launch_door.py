@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,14 +19,14 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.dashboard import launch_door
-from minirospy.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSession
-from minirospy.dashboard.launch_run import RunState
+from minirospy.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSession, _Tail
+from minirospy.dashboard.launch_files import LaunchFile
+from minirospy.dashboard.launch_run import LaunchRun, _Lines
 from tests.dashboard.conftest import TOKEN
 from tests.dashboard.lamp import make_lamp
-from tests.waiting import until
+from tests.waiting import wait_until
 
 if TYPE_CHECKING:
-    from minirospy.bridge.web.client import WebClient
     from tests.dashboard.conftest import Served
 
 FILE = {"package": "lamp", "file": "launch/lamp.launch"}
@@ -218,32 +220,139 @@ def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
     assert "only who has the token may start programs" in page.error()
 
 
-def test_launch_that_is_added_while_launches_are_reported() -> None:
-    runs: dict[int, object] = {}
+class Run:
+    """A launch that has ended, or is told to."""
 
-    class Run:
-        def state(self) -> RunState:
-            # As the thread of another session does.
-            runs[len(runs)] = self
-            return RunState(1, "lamp", "lamp.launch", {}, "running", "", [])
+    def __init__(self, number: int) -> None:
+        self.id = number
+        self.package, self.file, self.args, self.path = (
+            "lamp",
+            "lamp.launch",
+            dict[str, str](),
+            Path("lamp.launch"),
+        )
+        self.is_ended = True
+        self.stopped = threading.Event()
+        self.joined = threading.Event()
 
-    runs[0] = Run()
-    sent: list[bytes] = []
-    client = SimpleNamespace(
-        is_owner=True,
-        send_text=lambda _: None,
-        send_text_message=lambda _, data, newest_only: sent.append(data),
+    def stop(self) -> None:
+        self.stopped.set()
+
+    def join(self) -> None:
+        assert self.joined.wait(60)
+
+
+def test_launches_that_have_ended_are_limited() -> None:
+    async def work() -> list[int]:
+        door = LaunchDoor("http://127.0.0.1:1")
+        for number in range(30):
+            door.runs[number] = cast("LaunchRun", Run(number))
+        door.runs[3].is_ended = False  # type: ignore[misc]
+        door.changed()
+        return list(door.runs)
+
+    assert asyncio.run(work()) == [3, *range(10, 30)]
+
+
+def test_restart_is_completed_where_its_page_closes(
+    client: Callable[..., Client], serve: Callable[..., Served]
+) -> None:
+    served = serve()
+    page, other = client(served), client(served)
+    run = Run(77)
+    assert served.dashboard
+    door = served.dashboard._launches
+    started: list[LaunchFile] = []
+
+    async def add() -> None:
+        door.runs[77] = cast("LaunchRun", run)
+        door.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
+
+    served.run(add())
+    page.send("restart", id=77)
+    assert run.stopped.wait(60)
+    page.socket.close()
+    other.send("restart", id=77)
+    run.joined.set()
+    wait_until(lambda: 77 not in door.runs)
+    assert started == [("lamp", "lamp.launch")]
+
+
+def test_nothing_is_started_once_the_dashboard_closes(
+    client: Callable[..., Client], serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served = serve()
+    page = client(served)
+    page.send("list")
+    page.next(lambda found: "files" in found)
+    assert served.dashboard
+    door = served.dashboard._launches
+    reached, go_on = threading.Event(), threading.Event()
+    path_of = door.files.path_of
+
+    def slow(file: LaunchFile) -> Path:
+        reached.set()
+        assert go_on.wait(60)
+        return path_of(file)
+
+    monkeypatch.setattr(door.files, "path_of", slow)
+    page.send("start", **FILE, args={"needed": "yes"})
+    assert reached.wait(60)
+    served.run(door.close())
+    go_on.set()
+    served.run(served.dashboard.close())
+    for thread in threading.enumerate():
+        if "LaunchSession" in thread.name or "launch-session" in thread.name:
+            thread.join(60)
+    assert not door.runs
+
+
+def test_lines_since_a_number_are_neither_lost_nor_repeated() -> None:
+    lines = _Lines(lambda: None)
+    total, seen, count = 1500, list[str](), 0
+    writing = threading.Thread(target=lambda: [lines.say(str(number)) for number in range(total)])
+    writing.start()
+    while len(seen) < total and (writing.is_alive() or count < total):
+        new, count = lines.since(count)
+        seen += new
+    writing.join()
+    assert seen == [str(number) for number in range(total)]
+
+
+def test_last_line_without_an_end_is_shown_when_its_node_has_exited(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.write_bytes(b"first\nPassword: ")
+    has_exited = [False]
+    run = SimpleNamespace(log_file=lambda _: log, has_exited=lambda _: has_exited[0])
+    tail = _Tail(cast("LaunchRun", run), "/node")
+    assert tail.read() == "first\n"
+    has_exited[0] = True
+    assert tail.read() == "Password: "
+    assert tail.read() == ""
+
+
+def test_page_that_shows_launches_looks_at_them_only_when_they_change(
+    client: Callable[..., Client], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = client()
+    (tmp_path / "lamp" / "launch" / "quiet.launch").write_text(
+        '<launch><node pkg="lamp" type="talk.py" name="talker" args="a b"/></launch>'
     )
+    page.send("start", package="lamp", file="launch/quiet.launch")
+    page.run(lambda run: run["state"] == "running" and node(run, "/talker")["pid"])
+    looks: list[object] = []
+    monkeypatch.setattr(LaunchSession, "follow", counted(LaunchSession.follow, looks))
+    # Nothing happens: what is measured is that nothing is done.
+    time.sleep(1.0)
+    assert len(looks) <= 2
 
-    async def work() -> None:
-        session = LaunchSession(cast(LaunchDoor, SimpleNamespace(runs=runs)), cast("WebClient", client))
-        await until(lambda: not (not sent and not session.task.done()))
-        session.ended()
-        with contextlib.suppress(asyncio.CancelledError):
-            await session.task
 
-    asyncio.run(work())
-    assert len(json.loads(sent[0])["launches"]) == 1
+def counted(method: Any, calls: list[object]) -> Any:
+    async def follow(session: object) -> Any:
+        calls.append(session)
+        return await method(session)
+
+    return follow
 
 
 def test_session_goes_on_after_a_fault(
@@ -252,10 +361,10 @@ def test_session_goes_on_after_a_fault(
     faults = iter([ZeroDivisionError])
     tail = LaunchSession._send_log
 
-    async def failing(session: LaunchSession) -> None:
+    async def failing(session: LaunchSession) -> bool:
         for fault in faults:
             raise fault
-        await tail(session)
+        return await tail(session)
 
     def describe(*_: object) -> list[object]:
         raise ZeroDivisionError
@@ -264,6 +373,7 @@ def test_session_goes_on_after_a_fault(
     monkeypatch.setattr(launch_door, "resolved_arg_docs", describe)
     page = client()
     page.send("describe", **FILE, args={})
-    assert page.error() == "the dashboard failed on this operation: ZeroDivisionError"
+    while page.error() != "the dashboard failed on this operation: ZeroDivisionError":
+        pass
     page.send("list")
     assert page.next(lambda found: "files" in found)["files"]

@@ -74,7 +74,8 @@ def test_values_of_a_file_are_read(serve: Callable[..., Served]) -> None:
         assert "is not a dictionary" in tools.request(do="yaml", text="- 1")["error"]
         bomb = "a0: &a0 [1, 1]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" for n in range(1, 60))
         assert "unfold to more than" in tools.request(do="yaml", text=bomb)["error"]
-        assert "too large" in tools.request(do="yaml", text="a" * 1_000_001)["error"]
+        tools.socket.send(json.dumps({"id": 8, "do": "yaml", "text": "a" * 300_000}))
+        assert "256000 characters at most" in tools.receive()["error"]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +94,7 @@ def test_values_of_a_file_are_read(serve: Callable[..., Served]) -> None:
 def test_what_is_not_a_request_is_refused(serve: Callable[..., Served], text: str) -> None:
     with Tools(serve()) as tools:
         tools.socket.send(text)
-        assert tools.receive()["error"].startswith("not a request")
+        assert tools.receive()["error"].startswith("not an operation on the graph")
         tools.socket.send(b"\0")
         assert "binary" in tools.receive()["error"]
         assert tools.request(do="yaml", text="a: 1")["result"] == {"a": 1}
@@ -164,7 +165,7 @@ def test_cleanup_unregisters_nodes_that_do_not_answer_and_no_others(serve: Calla
             assert "nothing listens at their port on '127.0.0.1'" in node_in(found, "/dead")["trouble"]
             assert "rosnode cleanup" in node_in(found, "/dead")["advice"]
             assert tools.request(do="cleanup", nodes=["/dead", "/alive"])["result"] == ["/dead"]
-            assert "not a list" in tools.request(do="cleanup", nodes="/alive")["error"]
+            assert "is a list" in tools.request(do="cleanup", nodes="/alive")["error"]
         state: Any = master.getSystemState("/test")
     publishers = dict(map(tuple, state[2][0]))
     assert publishers["/nothing"] == ["/dead_too"]
@@ -188,6 +189,70 @@ def test_definition_of_a_type_is_that_of_the_packages(serve: Callable[..., Serve
         assert "no_such/Type" in tools.request(do="type", name="no_such/Type")["error"]
 
 
+@pytest.mark.parametrize(
+    "error",
+    [OSError("no space"), RecursionError("too deep"), OverflowError("too large"), ZeroDivisionError("by 0")],
+)
+def test_request_that_fails_in_any_way_is_answered(
+    serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail(_: str) -> None:
+        raise error
+
+    monkeypatch.setattr(tools_door, "parameter_values", fail)
+    with Tools(serve()) as tools:
+        answer = tools.request(do="yaml", text="a: 1")["error"]
+        assert str(error) in answer or answer == "the dashboard failed on this operation: ZeroDivisionError"
+        assert "node is missing" in tools.request(do="ping")["error"]
+
+
+def test_survey_that_fails_is_reported_and_repeated(
+    serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    survey = tools_door.survey
+    failed = threading.Event()
+
+    def fail_once(graph: Any) -> Any:
+        if not failed.is_set():
+            failed.set()
+            raise OSError("no more files")
+        return survey(graph)
+
+    monkeypatch.setattr(tools_door, "survey", fail_once)
+    monkeypatch.setattr(tools_door, "_REPORT_SECONDS", 0.05)
+    with Tools(serve()) as tools:
+        tools.request(do="watch")
+        report(tools, lambda each: "no more files" in each.get("trouble", ""))
+        report(tools, lambda each: "nodes" in each)
+
+
+def test_surveys_do_not_pile_up_where_watching_is_switched_on_and_off(
+    serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running, most = [0], [0]
+    lock, go_on = threading.Lock(), threading.Event()
+    survey = tools_door.survey
+
+    def slow(graph: Any) -> Any:
+        with lock:
+            running[0] += 1
+            most[0] = max(most[0], running[0])
+        go_on.wait(60)
+        with lock:
+            running[0] -= 1
+        return survey(graph)
+
+    monkeypatch.setattr(tools_door, "survey", slow)
+    with Tools(serve()) as tools:
+        for _ in range(5):
+            tools.request(do="watch")
+            tools.request(do="unwatch")
+        tools.request(do="watch")
+        go_on.set()
+        report(tools, lambda each: "nodes" in each)
+    assert most == [1]
+
+
 def test_request_that_fails_is_answered_and_reports_go_on(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,7 +272,7 @@ def test_request_that_fails_is_answered_and_reports_go_on(
     monkeypatch.setattr(tools_door, "survey", failing)
     monkeypatch.setattr(tools_door, "ping_node", ping)
     with Tools(served) as tools:
-        failed = "the dashboard failed on this request: ZeroDivisionError"
+        failed = "the dashboard failed on this operation: ZeroDivisionError"
         assert tools.request(do="ping", node="/talker")["error"] == failed
         tools.request(do="watch")
         report(tools, lambda each: node_in(each, "/talker"))
