@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 from minirospy.aio.node import Node
@@ -63,10 +64,15 @@ class Dashboard:
 
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""
-        # Players publish until their sessions end, and the graph is the bridge's.
-        await self._bags.close()
-        await self._joints.close()
-        await self._launches.close()
-        await self.bridge.close()
-        await self._board.close()
-        await self._tools.close()
+        async with AsyncExitStack() as closing:
+            # In reverse, and all, whichever fails. Players publish until their sessions end, and the graph is the bridge's.
+            for part in (
+                self._tools,
+                self._board,
+                self.bridge,
+                self.rviz,
+                self._launches,
+                self._joints,
+                self._bags,
+            ):
+                closing.push_async_callback(part.close)

@@ -8,13 +8,15 @@
 from __future__ import annotations
 
 import asyncio
-import json
-import logging
-from collections.abc import Sequence
+import contextlib
+import shutil
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
-from minirospy.bridge.tasks import Faults
+from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
 from minirospy.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
 from minirospy.errors import BridgeError, RvizFileError
 
@@ -25,9 +27,7 @@ __all__ = ["SUBPROTOCOL", "RvizDoor", "RvizSession", "read_file"]
 
 SUBPROTOCOL = "minirospy.rviz.v1"
 
-_log = logging.getLogger(__name__)
-
-_MOST_WAITING = 20
+_T = TypeVar("_T")
 
 
 def read_file(path: Path) -> dict[str, object] | None:
@@ -42,97 +42,90 @@ def read_file(path: Path) -> dict[str, object] | None:
     return parse_rviz(text, str(path))
 
 
-class RvizDoor:
+def _write_file(path: Path, text: str) -> None:
+    """Write a file whole or not at all: one that is half written would be lost. Raise RvizFileError."""
+    # A link stays one, and its target keeps its rights.
+    file = path.resolve()
+    part = file.with_name(f".{file.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copymode(file, part)
+        part.replace(file)
+    except (OSError, ValueError) as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        why = error.strerror if isinstance(error, OSError) else None
+        raise RvizFileError(str(path), 0, why or str(error)) from None
+
+
+class RvizDoor(JsonDoor["RvizSession"]):
     """Serves the file of the command, if there is one."""
 
     def __init__(self, file: Path | None = None) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
         self.file = file
-        self.working: set[asyncio.Task[None]] = set()
+        self.thread = ThreadPoolExecutor(1, "rviz-files")
+        """Of all sessions: files that are parsed at the same time hold up the loop longer, and may be written over each other."""
 
-    def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
-        if SUBPROTOCOL in offered:
-            return SUBPROTOCOL
-        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
-
-    def open(self, client: WebClient) -> RvizSession:
-        """Start serving a client."""
-        return RvizSession(client, self)
+    async def close(self) -> None:
+        """End all sessions; what is being saved is completed."""
+        await super().close()
+        self.thread.shutdown(wait=False)
 
 
-class RvizSession:
-    """One client; its operations read and parse in threads, one after another."""
+class RvizSession(JsonSession):
+    """One client; its operations read and parse in the door's thread."""
 
-    def __init__(self, client: WebClient, door: RvizDoor) -> None:
-        self._client = client
+    subject: ClassVar[str] = ".rviz files"
+    longest: ClassVar[int] = 600_000
+    most_waiting: ClassVar[int] = 20
+
+    def __init__(self, door: RvizDoor, client: WebClient) -> None:
         self._door = door
-        self._turn = asyncio.Lock()
-        self._waiting = 0
-        self._faults = Faults(_log, "an operation on an .rviz file")
+        handlers: Mapping[str, Handler] = {
+            "read": self._read,
+            "parse": self._parse,
+            "format": self._format,
+            "save": self._save,
+        }
+        super().__init__(client, handlers)
 
-    def received_text(self, text: str) -> None:
-        """Carry out an operation, and send its answer."""
-        if self._waiting >= _MOST_WAITING:
-            self._send({"error": "too many operations wait for their answers"})
-            return
-        self._waiting += 1
-        task = asyncio.ensure_future(self._answer(text))
-        task.add_done_callback(self._answered)
-        self._door.working.add(task)
-        task.add_done_callback(self._door.working.discard)
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        (name,) = fields
+        return name, fields
 
-    def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
-        self._send({"error": "binary messages have no meaning here"})
+    async def started(self) -> None:
+        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
 
-    def ended(self) -> None:
-        """Forget the client; an operation that has started is finished."""
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """See :meth:`JsonSession.in_thread`: in that of the door."""
+        return await asyncio.get_running_loop().run_in_executor(self._door.thread, work)
 
-    def _answered(self, _: asyncio.Task[None]) -> None:
-        self._waiting -= 1
-
-    async def _answer(self, text: str) -> None:
-        loop = asyncio.get_running_loop()
-        async with self._turn:
-            try:
-                answer = await loop.run_in_executor(None, self._operate, text)
-            except (RvizFileError, BridgeError) as error:
-                answer = {"error": str(error)[:500]}
-            except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
-                answer = {"error": f"not an operation on .rviz files: {error}"[:500]}
-            except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
-                self._faults.report(error)
-                answer = {"error": f"the dashboard failed on this operation: {type(error).__name__}"}
-            self._send(answer)
-
-    def _operate(self, text: str) -> dict[str, object]:
-        ((name, value),) = json.loads(text).items()
-        if name == "read":
-            return self._read()
-        if name == "parse" and isinstance(value, str):
-            return {"config": parse_rviz(value)}
-        if name == "format" and isinstance(value, dict):
-            return {"text": format_rviz(value)}
-        if name == "save" and isinstance(value, dict):
-            return self._save(format_rviz(value))
-        raise ValueError(str(name)[:80])
-
-    def _read(self) -> dict[str, object]:
+    async def _read(self, _: Fields) -> Fields:
         file = self._file()
-        return {"config": read_file(file), "name": file.name, "writes": self._client.is_owner}
+        config = await self.in_thread(partial(read_file, file))
+        return {"config": config, "name": file.name, "writes": self.client.is_owner}
 
-    def _save(self, text: str) -> dict[str, object]:
-        file = self._file()
-        if not self._client.is_owner:
-            raise BridgeError(self._client.why_not_owner("save the file"))
-        parse_rviz(text)
-        # Whole or not at all: a file that is half written would be lost.
-        part = file.with_name(f".{file.name}.part")
-        try:
-            part.write_text(text, encoding="utf-8")
-            part.replace(file)
-        except OSError as error:
-            raise RvizFileError(str(file), 0, error.strerror or str(error)) from None
+    async def _parse(self, fields: Fields) -> Fields:
+        return {"config": await self.in_thread(partial(parse_rviz, text_of(fields, "parse")))}
+
+    async def _format(self, fields: Fields) -> Fields:
+        return {"text": await self.in_thread(partial(format_rviz, _config(fields["format"])))}
+
+    async def _save(self, fields: Fields) -> Fields:
+        file, config = self._file(), _config(fields["save"])
+        if not self.client.is_owner:
+            raise BridgeError(self.client.why_not_owner("save the file"))
+
+        def save() -> None:
+            text = format_rviz(config)
+            parse_rviz(text)
+            _write_file(file, text)
+
+        # The page may be closed meanwhile: what was to be saved is.
+        await asyncio.shield(self._door.spawn(self.in_thread(save)))
         return {"name": file.name}
 
     def _file(self) -> Path:
@@ -140,5 +133,8 @@ class RvizSession:
             raise BridgeError("the dashboard was not started with a .rviz file (rviz -d FILE)")
         return self._door.file
 
-    def _send(self, answer: dict[str, object]) -> None:
-        self._client.send_text(json.dumps(answer))
+
+def _config(value: object) -> dict[str, object]:
+    if not isinstance(value, dict):
+        raise TypeError("the contents of a file are an object")
+    return value

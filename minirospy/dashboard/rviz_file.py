@@ -1,50 +1,43 @@
-"""The YAML of .rviz files: text -> plain values -> text that RViz reads. Pure."""
+"""The YAML of .rviz files: text -> plain values -> text that RViz reads. Pure.
+
+Both are done here, in one pass: PyYAML's own loading and dumping take seconds for a file of 200 kB, or, where they are
+compiled, give no other thread its turn meanwhile.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import yaml
 
 from minirospy.errors import RvizFileError
 
+if TYPE_CHECKING:
+    from yaml.events import Event
+
 __all__ = ["MOST_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MOST_CHARACTERS = 1_000_000
+MOST_CHARACTERS = 200_000
 """RViz's own files have some ten thousand."""
 
 _MANAGER = "Visualization Manager"
 _MOST_DEPTH = 50
+_TEXT_TAGS = (None, "!", "tag:yaml.org,2002:str")
+_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
-
-class _Loader(yaml.SafeLoader):
-    """Reads numbers, booleans and null; what else YAML 1.1 guesses (dates, octal numbers) stays text, as in RViz."""
-
-    yaml_implicit_resolvers = {}
-
-
-_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|false)$"), list("tf"))
-_Loader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(?:~|null|)$"), ["~", "n", ""])
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:int", re.compile(r"^-?(?:0|[1-9][0-9]{0,14})$"), list("-0123456789")
+_SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
+    (re.compile(r"true|false"), lambda text: text == "true"),
+    (re.compile(r"~|null|"), lambda _: None),
+    (re.compile(r"-?(?:0|[1-9][0-9]{0,14})"), int),
+    (re.compile(r"-?(?:[0-9]+\.[0-9]*(?:[eE][-+]?[0-9]{1,3})?|[0-9]+[eE][-+][0-9]{1,3})"), float),
 )
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^-?(?:[0-9]+\.[0-9]*(?:[eE][-+]?[0-9]{1,3})?|[0-9]+[eE][-+][0-9]{1,3})$"),
-    list("-0123456789"),
-)
+"""What is no text; what else YAML 1.1 guesses (dates, octal numbers) stays one, as in RViz."""
 
-
-class _Dumper(yaml.SafeDumper):
-    """Writes lists one step to the right of their name, as RViz does, and ``~`` for nothing."""
-
-    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
-        return super().increase_indent(flow, False)
-
-
-_Dumper.add_representer(type(None), lambda dumper, _: dumper.represent_scalar("tag:yaml.org,2002:null", "~"))
+_PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
+"""Texts that need no quotes, unless another reader takes them for a number."""
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
@@ -52,55 +45,129 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     if len(text) > MOST_CHARACTERS:
         raise RvizFileError(name, 0, f"more than {MOST_CHARACTERS} characters")
     try:
-        # Aliases would let a small text become a large one.
-        depth = 0
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            line = event.start_mark.line + 1 if event.start_mark else 0
-            if isinstance(event, yaml.AliasEvent):
-                raise RvizFileError(name, line, f"a file of RViz has no aliases (*{event.anchor})")
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if depth > _MOST_DEPTH:
-                raise RvizFileError(name, line, "nested too deeply")
-        value = yaml.load(text, Loader=_Loader)
+        value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        # The compiled parser names the line after the last one for what is missing there.
+        line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise RvizFileError(name, 0, f"not YAML: {str(error).splitlines()[0]}") from None
-    except (LookupError, AttributeError, TypeError):
-        # What the library raises for tags such as !!bool and !!timestamp on other text.
-        raise RvizFileError(name, 0, "not YAML: a tag (!!) does not fit its value") from None
 
     if not isinstance(value, dict) or not isinstance(value.get(_MANAGER), dict):
         raise RvizFileError(name, 0, f'not a file of RViz: it has no "{_MANAGER}"')
-    return _with_text_keys(value)
+    return value
 
 
-def _with_text_keys(value: Mapping[object, object]) -> dict[str, object]:
-    return {
-        key if isinstance(key, str) else yaml.safe_dump(key).splitlines()[0]: _plain(each)
-        for key, each in value.items()
-    }
+def _built(events: Iterator[Event], name: str) -> object:
+    """Return the value of the document. Raise RvizFileError."""
+    result: list[object] = []
+    # The collections that are open, with the key that waits for its value; the first one is the stream.
+    stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
+    for event in events:
+        line = event.start_mark.line + 1 if event.start_mark else 0
+        value: object
+        match event:
+            case yaml.AliasEvent(anchor=anchor):
+                # They would let a small text become a large one.
+                raise RvizFileError(name, line, f"a file of RViz has no aliases (*{anchor})")
+            case yaml.DocumentStartEvent() if result:
+                raise RvizFileError(name, line, "more than one document")
+            case yaml.NodeEvent() if (tag := getattr(event, "tag", None)) not in _TEXT_TAGS:
+                raise RvizFileError(name, line, f"a file of RViz has no tags ({str(tag)[:80]})")
+            case yaml.ScalarEvent():
+                value = _scalar(event)
+            case yaml.CollectionStartEvent():
+                stack.append(([] if isinstance(event, yaml.SequenceStartEvent) else {}, []))
+                if len(stack) > _MOST_DEPTH:
+                    raise RvizFileError(name, line, "nested too deeply")
+                continue
+            case yaml.CollectionEndEvent():
+                value, _ = stack.pop()
+            case _:
+                continue
+
+        parent, waiting = stack[-1]
+        if isinstance(parent, list):
+            parent.append(value)
+        elif waiting:
+            parent[waiting.pop()] = value
+        elif isinstance(event, yaml.ScalarEvent):
+            waiting.append(event.value)
+        else:
+            raise RvizFileError(name, line, "a name that is a list or a map")
+    return result[0] if result else None
 
 
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return _with_text_keys(value)
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    # What a tag of the text makes: sets, dates, bytes.
-    return value if value is None or isinstance(value, str | int | float) else str(value)
+def _scalar(event: yaml.ScalarEvent) -> object:
+    text = str(event.value)
+    if event.implicit[0]:
+        for pattern, read in _SCALARS:
+            if pattern.fullmatch(text):
+                value = read(text)
+                is_number = not isinstance(value, float) or math.isfinite(value)
+                return value if is_number else str(value)
+    return text
 
 
 def format_rviz(config: Mapping[str, object]) -> str:
-    """Return the text of a .rviz file."""
-    return yaml.dump(
-        dict(config),
-        Dumper=_Dumper,
-        default_flow_style=False,
-        sort_keys=True,
-        allow_unicode=True,
-        width=10_000,
+    """Return the text of a .rviz file: sorted names, lists one step to the right of their name, as RViz writes them."""
+    return "".join(f"{line}\n" for line in _lines(config)) or "{}\n"
+
+
+def _lines(value: Mapping[str, object] | list[object]) -> Iterator[str]:
+    """Yield the lines of a map or a list that is not empty."""
+    if isinstance(value, list):
+        for each in value:
+            yield from _after("-", each, " ")
+        return
+    for name in sorted(value):
+        yield from _after(f"{_text(name)}:", value[name], "\n")
+
+
+def _after(start: str, value: object, separator: str) -> Iterator[str]:
+    """Yield the lines of what follows a name or a dash."""
+    if not isinstance(value, dict | list) or not value:
+        yield f"{start} {_word(value)}"
+        return
+    below = _lines(value)
+    if separator == "\n":
+        yield start
+    else:
+        yield f"{start} {next(below)}"
+    yield from (f"  {line}" for line in below)
+
+
+def _word(value: object) -> str:
+    match value:
+        case None:
+            return "~"
+        case bool():
+            return str(value).lower()
+        case float():
+            return _number(value)
+        case int() | dict() | list():
+            return str(value)
+        case _:
+            return _text(str(value))
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return f"'{value}'"
+    digits, _, exponent = repr(value).partition("e")
+    return f"{digits if '.' in digits else digits + '.0'}e{exponent}" if exponent else digits
+
+
+def _text(text: str) -> str:
+    others = yaml.SafeLoader.yaml_implicit_resolvers.get(text[:1], ())
+    if _PLAIN.fullmatch(text) and not any(pattern.match(text) for _, pattern in others):
+        return text
+    if text.isprintable():
+        return "'" + text.replace("'", "''") + "'"
+    return (
+        '"'
+        + "".join(
+            each if each.isprintable() and each not in '"\\' else f"\\U{ord(each):08x}" for each in text
+        )
+        + '"'
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+import stat
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +14,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
 import pytest
+import yaml
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
@@ -76,11 +79,14 @@ def test_file_of_rviz_is_written_as_it_was_read() -> None:
         ("a: &x 1\nb: *x", "x.rviz:2: a file of RViz has no aliases (*x)"),
         ("[" * 60, "x.rviz:1: nested too deeply"),
         ("a: \0", "x.rviz: not YAML: "),
-        ("x" * 1_000_001, "x.rviz: more than 1000000 characters"),
-        ("a: !!python/object:os.system x", "x.rviz:1: not YAML: could not determine a constructor"),
-        ("a: !!bool x", "x.rviz: not YAML: a tag"),
-        ("a: !!timestamp x", "x.rviz: not YAML: a tag"),
-        ("a: !!int ''", "x.rviz: not YAML: a tag"),
+        ("x" * 200_001, "x.rviz: more than 200000 characters"),
+        (
+            "a: !!python/object:os.system x",
+            "x.rviz:1: a file of RViz has no tags (tag:yaml.org,2002:python/object",
+        ),
+        ("a: 1\nb: !!bool x", "x.rviz:2: a file of RViz has no tags (tag:yaml.org,2002:bool)"),
+        ("? [a]\n: 1", "x.rviz:1: a name that is a list or a map"),
+        ("a: 1\n---\nb: 1", "x.rviz:2: more than one document"),
     ],
     ids=range(12),
 )
@@ -138,7 +144,7 @@ def test_text_of_the_browser_is_read_and_written(opened: Callable[..., Callable[
     assert "was not started with a .rviz file" in send({"save": config})["error"]
 
 
-@pytest.mark.parametrize("number", ["1.0e999", "!!float .nan"])
+@pytest.mark.parametrize("number", ["1.0e999", "-1.0e999"])
 def test_number_that_json_has_not_is_text(number: str) -> None:
     found = parse_rviz(f"Visualization Manager: {{Size: {number}}}")
     json.dumps(found, allow_nan=False)
@@ -153,14 +159,147 @@ def test_operations_that_wait_are_limited() -> None:
         session = door.open(client)
         for _ in range(100):
             session.received_text('{"parse": "a: 1"}')
-        assert len(door.working) <= 20
-        await asyncio.gather(*door.working)
+        while len(sent) < 100:
+            await asyncio.sleep(0.01)
         session.received_text('{"parse": "a: 1"}')
-        await asyncio.gather(*door.working)
+        while len(sent) < 101:
+            await asyncio.sleep(0.01)
+        await door.close()
 
     asyncio.run(work())
-    assert len(sent) == 101
     assert sum("too many operations" in each for each in sent) == 80
+
+
+def test_file_that_cannot_be_saved_leaves_nothing_behind(
+    opened: Callable[..., Callable[[object], Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, _: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    send = opened(tmp_path / "my.rviz")
+    monkeypatch.setattr(Path, "replace", fail)
+    assert "No space left" in send({"save": parse_rviz(FILE)})["error"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there, and files have no mode")
+def test_saved_file_stays_a_link_with_its_mode(
+    opened: Callable[..., Callable[[object], Any]], tmp_path: Path
+) -> None:
+    target, link = tmp_path / "target.rviz", tmp_path / "my.rviz"
+    target.write_text(FILE, encoding="utf-8")
+    target.chmod(0o600)
+    link.symlink_to(target)
+    assert opened(link)({"save": parse_rviz(FILE)}) == {"name": "my.rviz"}
+    assert link.is_symlink()
+    assert parse_rviz(target.read_text(encoding="utf-8")) == parse_rviz(FILE)
+    assert stat.S_IMODE(target.stat().st_mode) == 0o600
+
+
+def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> None:
+    configs = [{"Visualization Manager": {"Displays": [str(number)] * 10_000}} for number in range(4)]
+    file = tmp_path / "my.rviz"
+    sent: list[str] = []
+    client = cast("WebClient", SimpleNamespace(send_text=sent.append, is_owner=True))
+
+    async def work() -> None:
+        door = RvizDoor(file)
+        for config in configs:
+            door.open(client).received_text(json.dumps({"save": config}))
+        while len(sent) < len(configs):
+            await asyncio.sleep(0.01)
+        await door.close()
+
+    asyncio.run(work())
+    assert all(json.loads(each) == {"name": "my.rviz"} for each in sent), sent
+    assert parse_rviz(file.read_text(encoding="utf-8")) in configs
+
+
+def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
+    file = tmp_path / "my.rviz"
+    client = cast("WebClient", SimpleNamespace(send_text=lambda _: None, is_owner=True))
+
+    async def work() -> None:
+        door = RvizDoor(file)
+        door.open(client).received_text(json.dumps({"save": parse_rviz(FILE)}))
+        while not door._tasks:
+            await asyncio.sleep(0)
+        await door.close()
+
+    asyncio.run(work())
+    assert parse_rviz(file.read_text(encoding="utf-8")) == parse_rviz(FILE)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "~",
+        "true",
+        "yes",
+        "12",
+        "012",
+        "1.5",
+        "1e5",
+        "0x1F",
+        "12:30:45",
+        "2026-01-01",
+        ".inf",
+        "a: b",
+        "a:",
+        "a #b",
+        "#b",
+        "- a",
+        "---",
+        "'",
+        '"',
+        "\\",
+        " a ",
+        "a\nb",
+        "\x07\x85\u2028",
+        "Größe 🤖",
+        "160; 160; 164",
+        "/tf",
+        "*a",
+        "&a",
+        "!a",
+        "[a",
+        "{a",
+        "a, b",
+        "%a",
+        "@a",
+        "=",
+        "<<",
+        "null",
+    ],
+)
+def test_texts_and_names_are_read_as_they_were_written(text: str) -> None:
+    config: dict[str, object] = {"Visualization Manager": {text: text, "in a list": [text, {text: [text]}]}}
+    written = format_rviz(config)
+    assert parse_rviz(written) == config
+    # Another reader of YAML 1.1, as Python's, takes it for the same text.
+    assert yaml.safe_load(written) == config
+
+
+def test_values_are_written_as_another_reader_reads_them() -> None:
+    values = [
+        1,
+        -5,
+        0.5,
+        1e-05,
+        1e300,
+        0.029999999329447746,
+        True,
+        False,
+        None,
+        [],
+        {},
+        [[]],
+        [[1], {"a": []}],
+    ]
+    config: dict[str, object] = {"Visualization Manager": {"values": values}}
+    assert parse_rviz(format_rviz(config)) == config
+    assert yaml.safe_load(format_rviz(config)) == config
 
 
 @pytest.mark.parametrize(
