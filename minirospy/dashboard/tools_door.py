@@ -113,6 +113,7 @@ class ToolsSession(JsonSession):
     """One client. Its requests are answered as they are done, each with its ``id``."""
 
     subject: ClassVar[str] = "the graph"
+    longest: ClassVar[int] = 100_000
     most_waiting: ClassVar[int] = 20
 
     def __init__(self, door: ToolsDoor, client: WebClient) -> None:

@@ -31,8 +31,19 @@ export class Dock {
   }
 
   close() {
-    for (const pane of this.panes.values()) pane.view.close();
+    for (const pane of this.panes.values()) this.closeView(pane);
     this.panes.clear();
+  }
+
+  /** Close the view of a pane; what fails there is not that of others. */
+  closeView(pane) {
+    const { view } = pane;
+    pane.view = null;
+    try {
+      view?.close();
+    } catch (error) {
+      reportError(error);
+    }
   }
 
   /** Show another layout. */
@@ -51,7 +62,7 @@ export class Dock {
     const ids = new Set(wanted.map((node) => node.id));
     for (const [id, pane] of this.panes) {
       if (ids.has(id)) continue;
-      pane.view.close();
+      this.closeView(pane);
       pane.element.remove();
       this.panes.delete(id);
     }
@@ -106,7 +117,7 @@ export class Dock {
   open(node) {
     const pane = this.panes.get(node.id);
     if (pane.view && pane.body.dataset.view === node.view) return;
-    pane.view?.close();
+    this.closeView(pane);
     fill(pane.body);
     pane.body.dataset.view = node.view;
     const [title, View] = Object.hasOwn(this.views, node.view) ? this.views[node.view] : [node.view, Unknown];
@@ -122,7 +133,12 @@ export class Dock {
       },
       open: (view, words) => this.reach(view, wordsOf(words), node),
     };
-    pane.view = new View(this.link, new URLSearchParams(node.words), pane.body, place);
+    try {
+      pane.view = new View(this.link, new URLSearchParams(node.words), pane.body, place);
+    } catch (error) {
+      reportError(error);
+      pane.view = new Failed(pane.body, error);
+    }
   }
 
   activate(id) {
@@ -212,7 +228,7 @@ export class Dock {
   reach(view, words, source) {
     for (const node of this.layout.panes()) {
       const pane = this.panes.get(node.id);
-      if (node.view !== view || node === source || !pane.view.accept?.(words)) continue;
+      if (node.view !== view || node === source || !pane.view?.accept?.(words)) continue;
       this.reveal(node);
       return;
     }
@@ -319,6 +335,14 @@ export class Dock {
 /** Return what a pane shows, for its head: the values of its settings. */
 function about(node) {
   return [...new URLSearchParams(node.words).values()].filter((each) => each.startsWith("/")).join(" ");
+}
+
+class Failed {
+  constructor(main, error) {
+    main.append(h("p", { class: "error", role: "alert" }, t("This view failed: {why}", { why: error.message })));
+  }
+
+  close() {}
 }
 
 class Unknown {

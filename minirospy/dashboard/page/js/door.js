@@ -1,5 +1,7 @@
 // A WebSocket to a part of the server with a protocol of its own (bags, launch files, joints): connects again by itself, as the link does.
 
+import { t } from "./texts.js";
+
 const FIRST_DELAY_MS = 300;
 const LONGEST_DELAY_MS = 4000;
 
@@ -46,6 +48,7 @@ export class Door {
 
   send(fields) {
     if (this.isOpen) this.socket.send(JSON.stringify(fields));
+    else if (!this.isClosed) this.handlers.error?.(t("Not connected: this was not done. Try again in a moment."));
   }
 
   close() {

@@ -10,6 +10,8 @@ export const GERMAN = {
   "Board: press its buttons while they are held": "Board: seine Taster drücken, solange sie gehalten werden",
   "Layouts: move a pane (its dots) or a divider; Board: move the person": "Anordnungen: einen Bereich (an seinen Punkten) oder eine Trennlinie verschieben; Board: die Person bewegen",
   "Close what is open": "Schließen, was offen ist",
+  "Not connected: this was not done. Try again in a moment.": "Nicht verbunden: das wurde nicht ausgeführt. Gleich noch einmal versuchen.",
+  "This view failed: {why}": "Diese Ansicht hat versagt: {why}",
   // names of views
   "Layouts": "Anordnungen", "Topics": "Topics", "Console": "Konsole", "Plot": "Kurven", "Graph": "Graph", "Image": "Bild", "Board": "Board", "Turtlesim": "Turtlesim",
   "Teleop": "Fahren", "Diagnostics": "Diagnose", "Panels": "Anzeigen", "Publish": "Senden", "Services": "Services", "Parameters": "Parameter", "Reconfigure": "Einstellen", "3D": "3D",

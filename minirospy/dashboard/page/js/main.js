@@ -97,7 +97,14 @@ function placeOf(name) {
 function route() {
   const { view, words } = addressOf(location.hash);
   const chosen = Object.hasOwn(VIEWS, view) ? view : "topics";
-  current?.close();
+  // What fails in one view does not keep a person in it.
+  const closing = current;
+  current = null;
+  try {
+    closing?.close();
+  } catch (error) {
+    reportError(error);
+  }
   const [title, View] = VIEWS[chosen];
   main.dataset.view = chosen;
   fill(main);

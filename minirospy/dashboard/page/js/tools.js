@@ -1,6 +1,9 @@
 // The page's side of the tools' door: requests that the Foxglove protocol has no message for, and reports that come by themselves.
 
+import { t } from "./texts.js";
+
 const RETRY_MS = 1000;
+const LONGEST = 95_000; // characters of a request, as the server's limit
 
 export class Tools {
   constructor(link) {
@@ -15,9 +18,12 @@ export class Tools {
   /** Send a request, {do: NAME, ...}; the promise has its result. */
   request(fields) {
     const id = this.nextId++;
+    const text = JSON.stringify({ ...fields, id });
     return new Promise((resolve, reject) => {
+      // The server cannot say which request it has not read.
+      if (text.length > LONGEST) throw new Error(t("it is too large"));
       this.answers.set(id, { resolve, reject });
-      this.send(JSON.stringify({ ...fields, id }));
+      this.send(text);
     });
   }
 

@@ -437,6 +437,7 @@ class Player {
     if (!this.bag) return;
     const view = new DataView(data);
     const row = this.rows[view.getUint16(1, true)];
+    if (!row) return;
     const time = view.getFloat64(3, true);
     const isMoment = view.getUint8(0) === MOMENT;
     const { bag } = this;
@@ -449,8 +450,10 @@ class Player {
       if (isMoment) this.cards.get(row.name)?.show(message, time);
       if (!isMoment && IMAGES.has(row.type)) {
         const image = await pictureOf(message);
-        if (bag !== this.bag) return;
-        row.thumbnails.set(time, small(image, IMAGE_ROW - 6));
+        const isWanted = bag === this.bag;
+        if (isWanted) row.thumbnails.set(time, small(image, IMAGE_ROW - 6));
+        image.close?.();
+        if (!isWanted) return;
         const apart = row.thumbnails.get(time).width + 6;
         if (apart !== row.apart) {
           row.apart = apart;
@@ -603,20 +606,26 @@ class Card {
       this.tree.show(message);
       return;
     }
+    // While one is decoded only the newest waits, which may be the last one: the player is paused there.
+    this.next = message;
     if (this.isDecoding) return;
     this.isDecoding = true;
-    try {
-      const image = await pictureOf(message);
-      if (this.canvas.width !== image.width || this.canvas.height !== image.height) {
-        this.canvas.width = image.width;
-        this.canvas.height = image.height;
+    while (this.next) {
+      const newest = this.next;
+      this.next = null;
+      try {
+        const image = await pictureOf(newest);
+        if (this.canvas.width !== image.width || this.canvas.height !== image.height) {
+          this.canvas.width = image.width;
+          this.canvas.height = image.height;
+        }
+        this.canvas.getContext("2d").drawImage(image, 0, 0);
+        image.close?.();
+      } catch (error) {
+        this.fail(error.message);
       }
-      this.canvas.getContext("2d").drawImage(image, 0, 0);
-    } catch (error) {
-      this.fail(error.message);
-    } finally {
-      this.isDecoding = false;
     }
+    this.isDecoding = false;
   }
 
   fail(text) {

@@ -19,6 +19,7 @@ function collect(link) {
   end ??= link.subscribe({ topic: "/rosout_agg", mode: "all" }, (item) => {
     for (const each of item.lines ?? []) {
       const line = lineOf(each);
+      line.number = removed + lines.length;
       lines.push(line);
       counts.set(line.level, (counts.get(line.level) ?? 0) + 1);
     }
@@ -98,8 +99,8 @@ export class Console {
     }
     if (cut) {
       const before = this.shown.length;
-      const oldest = lines[0];
-      const index = this.shown.findIndex((each) => each.stamp >= oldest.stamp);
+      // By number: stamps of nodes differ, and simulated time may start again.
+      const index = this.shown.findIndex((each) => each.number >= removed);
       this.shown.splice(0, index < 0 ? before : index);
       this.list.removed(before - this.shown.length);
     }

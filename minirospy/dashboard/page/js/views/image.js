@@ -16,6 +16,7 @@ export class Image {
     this.end = null;
     this.pixels = null;
     this.isDecoding = false;
+    this.next = null; // the newest that came meanwhile
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
     this.isActual = h("input", { type: "checkbox", onchange: () => this.fit() });
     this.about = h("span", { class: "muted" });
@@ -33,6 +34,7 @@ export class Image {
   }
 
   close() {
+    this.isClosed = true;
     this.ending();
     this.observer.disconnect();
     clearInterval(this.timer);
@@ -54,7 +56,7 @@ export class Image {
     this.place.remember({ topic });
     this.end?.();
     this.end = null;
-    this.pixels = null;
+    this.pixels = this.next = null;
     this.canvas.width = this.canvas.height = 0;
     this.rate = new Rate();
     if (topic) this.subscribe();
@@ -67,21 +69,26 @@ export class Image {
 
   async received(item) {
     this.rate.add(performance.now() / 1000, item.count ?? 0, item.bytes ?? 0);
-    if (item.error || this.isDecoding) {
-      if (item.error) setText(this.problem, item.error);
+    if (item.error) {
+      setText(this.problem, item.error);
       return;
     }
+    this.next = item.message;
+    if (this.isDecoding) return;
     this.isDecoding = true;
-    const { topic } = this;
-    try {
-      const found = "encoding" in item.message ? pixelsOf(item.message) : await decompressed(item.message);
-      if (topic === this.topic) this.show(found, item.message);
-      setText(this.problem, "");
-    } catch (error) {
-      setText(this.problem, error.message);
-    } finally {
-      this.isDecoding = false;
+    while (this.next && !this.isClosed) {
+      const [message, { topic }] = [this.next, this];
+      this.next = null;
+      try {
+        const found = "encoding" in message ? pixelsOf(message) : await decompressed(message);
+        if (topic === this.topic && !this.isClosed) this.show(found, message);
+        else found.bitmap?.close();
+        setText(this.problem, "");
+      } catch (error) {
+        setText(this.problem, error.message);
+      }
     }
+    this.isDecoding = false;
   }
 
   show(found, message) {

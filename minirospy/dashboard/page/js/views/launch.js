@@ -211,7 +211,8 @@ export class Launch {
       const level = /\b(ERROR|FATAL|Traceback|died)\b/.test(line) ? "error" : /\bWARN/.test(line) ? "warn" : null;
       this.text.append(level ? h("span", { class: level }, line) : document.createTextNode(line));
     }
-    while (this.text.textContent.length > MOST_LOG) this.text.firstChild.remove();
+    let length = this.text.textContent.length;
+    for (; length > MOST_LOG; this.text.firstChild.remove()) length -= this.text.firstChild.textContent.length;
     if (isFirst && !text) this.text.append(h("span", { class: "muted" }, t("It has printed nothing yet.")));
     if (isAtEnd || isFirst) this.text.scrollTop = this.text.scrollHeight;
   }

@@ -47,6 +47,8 @@ export class Layouts {
   // --- what is shown
 
   show(text, name, words = null) {
+    if (this.isClosed) return; // what is shown now would never be closed
+    this.asked = null; // what was awaited is no longer wanted
     let layout;
     try {
       layout = Layout.parse(text);
@@ -70,26 +72,32 @@ export class Layouts {
       return;
     }
     const [, , text] = PRESETS[name];
-    this.show(text ?? classroom(await this.group()), "", { preset: name });
+    if (text) {
+      this.show(text, "", { preset: name });
+      return;
+    }
+    const asked = this.asked = {};
+    const group = await this.group();
+    if (this.asked === asked) this.show(classroom(group), "", { preset: name });
   }
 
   /** Return the boards of the server's machine and the topics, once they are known. */
   async group() {
     this.report(t("Looking for boards and robots …"));
+    const endings = [];
     const soon = (react) => new Promise((resolve) => { react(resolve); setTimeout(() => resolve(null), WAIT_MS); });
     const [boards] = await Promise.all([
       soon((resolve) => {
         const socket = new WebSocket(this.link.address(), this.link.protocols("minirospy.board.v1"));
-        socket.onmessage = ({ data }) => {
-          resolve(JSON.parse(data).boards);
-          socket.close();
-        };
+        endings.push(() => socket.close());
+        socket.onmessage = ({ data }) => resolve(JSON.parse(data).boards);
         socket.onerror = () => resolve(null);
       }),
       soon((resolve) => {
         if (this.link.channels.size) resolve();
-        else this.link.addEventListener("channels", () => { if (this.link.channels.size) resolve(); });
+        else endings.push(this.link.watch(["channels"], () => { if (this.link.channels.size) resolve(); }));
       })]);
+    for (const end of endings) end();
     return { boards: boards ?? [], topics: [...this.link.channels.keys(), ...this.link.graph.subscribed.keys()] };
   }
 

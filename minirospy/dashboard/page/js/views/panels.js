@@ -96,10 +96,11 @@ export class Panels {
   }
 
   put() {
-    const path = this.path.value.trim();
+    const typed = this.path.value.trim();
+    const path = typed.startsWith("/") ? typed : `/${typed}`;
     const settings = Object.fromEntries([...this.settings.querySelectorAll("[name]")].map((each) => [each.name, each.value.trim()]));
     const isService = KINDS[this.kind.value].isWriter && !splitOrNull(path, this.link.channels.keys()) && Boolean(splitOrNull(path, this.link.services.keys()));
-    const spec = { kind: this.kind.value, path: path.startsWith("/") ? path : `/${path}`, label: this.label.value.trim(), isService, ...settings };
+    const spec = { kind: this.kind.value, path, label: this.label.value.trim(), isService, ...settings };
     if (path.length < 2) {
       setText(this.problem, t("Type a topic and a field, as /button_state/data."));
       return;
@@ -205,6 +206,10 @@ class Panel {
       return;
     }
     const [name, steps] = found;
+    if (this.name && name !== this.name && this.isAdvertised) {
+      this.link.unpublish(this.name);
+      this.isAdvertised = false;
+    }
     this.advertise(name);
     if (name === this.name) return;
     this.end?.();

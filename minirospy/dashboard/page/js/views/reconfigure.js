@@ -9,7 +9,7 @@ const UPDATES = "/parameter_updates";
 const SERVICE = "/set_parameters";
 const TYPE = "dynamic_reconfigure/ConfigDescription";
 const NOTE_MS = 6000;
-const LARGEST_FILE = 1_000_000;
+const LARGEST_FILE = 90_000; // the server parses no more
 
 export class Reconfigure {
   constructor(link, words, main, place) {

@@ -1,0 +1,157 @@
+"""Faults of one part of the page, which are not those of others: views that fail, connections that are lost, what comes late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tests.dashboard.conftest import Served, serve
+from tests.interop.browser import Page
+from tests.interop.page_modules import needs_node, run_script
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+
+__all__ = ["browse", "serve"]
+
+FAKE_SOCKET = """
+globalThis.WebSocket = class {
+  static OPEN = 1;
+  constructor() { this.readyState = 0; this.sent = []; globalThis.socket = this; }
+  send(text) { this.sent.push(text); }
+  close() { this.readyState = 3; this.onclose?.(); }
+};
+const link = { address: () => "", protocols: () => [] };
+"""
+
+
+@needs_node
+def test_click_while_a_door_is_not_connected_is_reported_not_lost_in_silence() -> None:
+    found = run_script(
+        "Door",
+        "js/door.js",
+        f"""{FAKE_SOCKET}
+        const said = [];
+        const door = new Door(link, "x", {{ error: (text) => said.push(text) }});
+        door.send({{ op: "start" }});
+        const early = said.length;
+        socket.readyState = 1;
+        door.send({{ op: "start" }});
+        const sent = socket.sent.length;
+        door.close();
+        door.send({{ op: "start" }});
+        return {{ early, sent, said }};""",
+    )
+    assert found["early"] == 1
+    assert found["sent"] == 1
+    assert found["said"] == ["Not connected: this was not done. Try again in a moment."]
+
+
+@needs_node
+def test_request_that_is_too_long_for_the_server_is_answered() -> None:
+    found = run_script(
+        "Tools",
+        "js/tools.js",
+        f"""{FAKE_SOCKET}
+        const tools = new Tools(link);
+        const why = await tools.request({{ do: "yaml", text: "x".repeat(250_000) }}).catch((error) => error.message);
+        return [why, tools.answers.size, tools.waiting.length];""",
+    )
+    assert found == ["it is too large", 0, 0]
+
+
+DOCK = """(async () => {
+  const [{ Dock }, { Layout }] = await Promise.all([import("/js/dock.js"), import("/js/layout.js")]);
+  window.endedViews = [];
+  const view = (name, fails = "") => class {
+    constructor(link, words, main) { if (fails === "open") throw new Error(`${name} cannot be made`); main.append(name); }
+    close() { window.endedViews.push(name); if (fails === "close") throw new Error(`${name} cannot be closed`); }
+  };
+  const views = { a: ["A", view("a", "close")], b: ["B", view("b")], c: ["C", view("c", "open")] };
+  const place = document.createElement("div");
+  place.style.height = "400px";
+  document.body.append(place);
+  window.reported = [];
+  addEventListener("error", (event) => { window.reported.push(event.message); event.preventDefault(); });
+  const dock = new Dock({}, Layout.parse("row(a,b,c)"), views, () => {});
+  place.append(dock.element);
+  const text = place.innerText;
+  dock.close();
+  return { text, closed: window.endedViews, reported: window.reported };
+})()"""
+
+
+@needs_chromium
+def test_view_that_fails_leaves_the_other_views_of_a_layout_alone(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(DOCK)
+    assert found["closed"] == ["a", "b"]
+    assert "This view failed: c cannot be made" in found["text"]
+    assert [each.rpartition("Error: ")[2] for each in found["reported"]] == [
+        "c cannot be made",
+        "a cannot be closed",
+    ]
+
+
+@needs_chromium
+def test_layout_that_is_left_while_it_looks_for_robots_shows_nothing_later(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(
+        """(async () => {
+          const { Layouts } = await import("/js/views/layout.js");
+          let made = 0;
+          let listeners = 0;
+          const view = class { constructor() { made += 1; } close() { made -= 1; } };
+          const link = new EventTarget();
+          Object.assign(link, {
+            channels: new Map(), graph: { subscribed: new Map() },
+            address: () => `ws://${location.host}/`, protocols: (name) => [name],
+            watch(names, react) { listeners += 1; react(); return () => { listeners -= 1; }; },
+          });
+          const names = ["topics", "plot", "console", "board", "turtlesim", "teleop", "graph", "image", "nodes", "diagnostics"];
+          const views = Object.fromEntries(names.map((name) => [name, [name, view]]));
+          const place = { views, remember() {}, isActive: () => true, open() {} };
+          const main = document.createElement("div");
+          document.body.append(main);
+          const layouts = new Layouts(link, new URLSearchParams("preset=classroom"), main, place);
+          const looking = layouts.group();
+          layouts.close();
+          await looking;
+          await new Promise((resolve) => setTimeout(resolve, 3500)); // longer than it looks
+          return { made, listeners };
+        })()"""
+    )
+    assert found == {"made": 0, "listeners": 0}
+
+
+@needs_chromium
+def test_console_keeps_no_lines_that_were_cut_when_stamps_go_back(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(
+        """(async () => {
+          const { Console } = await import("/js/views/console.js");
+          let received = null;
+          const link = { services: new Map(), subscribe(entry, react) { received = react; return () => {}; } };
+          const main = document.createElement("div");
+          document.body.append(main);
+          const view = new Console(link, new URLSearchParams(), main, { remember() {} });
+          view.list.element.style.height = "200px"; // else all rows are seen, and are elements
+          const line = (index, stamp) => ({ seconds: stamp, message: {
+            header: { stamp: { secs: stamp, nsecs: 0 } }, level: 2, name: "/a", msg: String(index),
+            file: "", line: 1, function: "" } });
+          const many = (count, stamp) => Array.from({ length: count },
+            (_, index) => line(index, stamp - Math.floor(index / 1000)));
+          // Simulated time starts again.
+          for (let round = 0; round < 3; round++) received({ lines: many(30_000, 1000 - round * 100) });
+          const shown = view.shown.length;
+          view.close();
+          return shown;
+        })()"""
+    )
+    assert found <= 50_000
