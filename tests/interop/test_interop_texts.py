@@ -100,7 +100,7 @@ def test_views_have_no_text_without_its_german_one(
         # What a view shows of the graph has come when the next one is opened: this is not a wait for it.
         page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
     missing = [each for each in page.evaluate("[...window.missing]") if not each.startswith("/")]
-    names = {"\u00d7", "←", "→", "✎", "?", ", .", "1 2", "/", "x", "y", "theta", "GPIO 2"}
+    names = {"\u00d7", "←", "→", "✎", "?", ", .", "1 2", "/", "x", "y", "theta", "GPIO 2", "RViz"}
     data = (
         "/talker_",
         "LED GPIO",
