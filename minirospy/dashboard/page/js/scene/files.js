@@ -5,7 +5,7 @@ import { t } from "../texts.js";
 import { writeView } from "./config.js";
 
 const PROTOCOL = "minirospy.rviz.v1";
-const MOST_BYTES = 1_000_000;
+const MOST_BYTES = 200_000;
 
 /** Send one operation to the server; return a promise of its answer. */
 function requested(link, operation) {
