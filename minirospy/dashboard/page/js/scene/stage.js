@@ -242,14 +242,19 @@ export class Stage {
     return far > 0 ? origin.clone().addScaledVector(direction, far) : null;
   }
 
-  /** Return the point of an object there, else of the ground; null for neither. */
-  pick(x, y, objects) {
+  /** Return what the ray there meets of objects, the nearest first. */
+  hits(x, y, objects) {
     const caster = this.ray(x, y);
     const isFlat = this.view.kind === "top";
     caster.params.Points.threshold = (isFlat ? 1 : this.view.distance) * (5 / this.pixelsPerMetre);
     caster.params.Line2 = { threshold: 4 };
+    return caster.intersectObjects(objects, true).filter(({ object }) => object.visible && !object.userData.isUnpicked);
+  }
+
+  /** Return the point of an object there, else of the ground; null for neither. */
+  pick(x, y, objects) {
+    const hits = this.hits(x, y, objects);
     // Of points the one next to the ray, not the first that the threshold lets through.
-    const hits = caster.intersectObjects(objects, true).filter(({ object }) => object.visible && !object.userData.isUnpicked);
     const solid = hits.find(({ distanceToRay }) => distanceToRay === undefined);
     const dots = hits.filter(({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3);
     if (dots.length) {

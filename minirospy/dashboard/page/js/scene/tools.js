@@ -2,23 +2,14 @@
 
 import { Group } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
+import { schema } from "./schemas.js";
 import { arrow, bodyMaterial, discard, segments } from "./shapes.js";
 import { fromYaw } from "./transforms.js";
 
-const LINE = "=".repeat(80);
-const DEFINITIONS = {
-  "std_msgs/Header": "uint32 seq\ntime stamp\nstring frame_id",
-  "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z",
-  "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
-  "geometry_msgs/Pose": "Point position\nQuaternion orientation",
-  "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance",
-};
-const schema = (own, ...others) => [own, ...others.map((name) => `MSG: ${name}\n${DEFINITIONS[name]}`)].join(`\n${LINE}\n`);
-const POSE = ["std_msgs/Header", "geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"];
 const PUBLISHED = {
-  "geometry_msgs/PoseWithCovarianceStamped": schema("Header header\nPoseWithCovariance pose", "geometry_msgs/PoseWithCovariance", ...POSE),
-  "geometry_msgs/PoseStamped": schema("Header header\nPose pose", ...POSE),
-  "geometry_msgs/PointStamped": schema("Header header\nPoint point", "std_msgs/Header", "geometry_msgs/Point"),
+  "geometry_msgs/PoseWithCovarianceStamped": schema("Header header\nPoseWithCovariance pose"),
+  "geometry_msgs/PoseStamped": schema("Header header\nPose pose"),
+  "geometry_msgs/PointStamped": schema("Header header\nPoint point"),
 };
 const DEVIATION = 0.5; // metres, of RViz's pose estimate
 const TURN = Math.PI / 12; // its deviation in radians

@@ -68,7 +68,7 @@ export class Markers extends TopicDisplay {
     }
     if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} markers", { count: MOST }));
 
-    const made = this.make(marker);
+    const made = makeMarker(marker, this);
     this.drop(key);
     const lifetime = secondsOf(marker.lifetime);
     const item = this.add(made.object, marker.header.frame_id, secondsOf(marker.header.stamp), marker.frame_locked);
@@ -116,28 +116,29 @@ export class Markers extends TopicDisplay {
     }
   }
 
-  /** Return {object, label, offset} of a marker; its frame's transform is applied around it. Throws Error. */
-  make(marker) {
-    const build = MAKERS[marker.type];
-    if (!build) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
-    const numbers = [...Object.values(marker.pose.position), ...Object.values(marker.pose.orientation), ...Object.values(marker.scale)];
-    if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contained invalid floating point values (nans or infs)"));
-    const group = new Group();
-    const pose = fromMessage(marker.pose);
-    const made = build(marker, this);
-    group.userData.kind = KINDS[marker.type];
-    if (made.text !== undefined) {
-      const { r, g, b, a } = marker.color;
-      const label = this.context.stage.labels.add({ text: made.text, kind: "marker", metres: marker.scale.z, color: `rgb(${[r, g, b].map((part) => Math.round(part * 255)).join(" ")} / ${a})` });
-      return { object: group, label, offset: new Vector3(...pose.p) };
-    }
-    const placed = new Group();
-    placed.add(made);
-    placed.position.set(...pose.p);
-    placed.quaternion.set(...pose.q);
-    group.add(placed);
-    return { object: group, label: null };
+}
+
+/** Return {object, label, offset} of a marker; its frame's transform is applied around it. Throws Error. */
+export function makeMarker(marker, display) {
+  const build = MAKERS[marker.type];
+  if (!build) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
+  const numbers = [...Object.values(marker.pose.position), ...Object.values(marker.pose.orientation), ...Object.values(marker.scale)];
+  if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contained invalid floating point values (nans or infs)"));
+  const group = new Group();
+  const pose = fromMessage(marker.pose);
+  const made = build(marker, display);
+  group.userData.kind = KINDS[marker.type];
+  if (made.text !== undefined) {
+    const { r, g, b, a } = marker.color;
+    const label = display.context.stage.labels.add({ text: made.text, kind: "marker", metres: marker.scale.z, color: `rgb(${[r, g, b].map((part) => Math.round(part * 255)).join(" ")} / ${a})` });
+    return { object: group, label, offset: new Vector3(...pose.p) };
   }
+  const placed = new Group();
+  placed.add(made);
+  placed.position.set(...pose.p);
+  placed.quaternion.set(...pose.q);
+  group.add(placed);
+  return { object: group, label: null };
 }
 
 function body(geometry) {
