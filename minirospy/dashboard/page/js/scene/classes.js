@@ -59,6 +59,8 @@ export const CLASSES = {
     ["Topic", topic, ""], ["Alpha", number, 0.7], ["Color Scheme", scheme(["map", "costmap", "raw"]), "map"], ["Draw Behind", bool, false]] },
   Marker: { types: ["visualization_msgs/Marker"], topicKey: "Marker Topic", settings: [["Marker Topic", topic, "visualization_marker"]] },
   MarkerArray: { types: ["visualization_msgs/MarkerArray", "visualization_msgs/Marker"], topicKey: "Marker Topic", settings: [["Marker Topic", topic, "visualization_marker_array"]] },
+  InteractiveMarkers: { types: ["visualization_msgs/InteractiveMarkerUpdate"], topicKey: "Update Topic", settings: [
+    ["Update Topic", topic, ""], ["Show Descriptions", bool, true], ["Show Axes", bool, false]] },
   Path: { types: ["nav_msgs/Path"], settings: [
     ["Topic", topic, ""], ["Line Style", scheme(["Lines", "Billboards"]), "Lines"], ["Line Width", number, 0.03, (settings) => settings["Line Style"] === "Billboards"],
     ["Color", color, "25; 255; 0"], ["Alpha", number, 1], ["Buffer Length", number, 1],

@@ -20,7 +20,7 @@ export function newConfig() {
       "Global Options": { "Background Color": BACKGROUND, "Default Light": true, "Fixed Frame": "", "Frame Rate": 30 },
       Name: "root",
       Tools: [
-        { Class: "rviz/MoveCamera" }, { Class: "rviz/FocusCamera" }, { Class: "rviz/Measure" },
+        { Class: "rviz/Interact", "Hide Inactive Objects": true }, { Class: "rviz/MoveCamera" }, { Class: "rviz/FocusCamera" }, { Class: "rviz/Measure" },
         { Class: "rviz/SetInitialPose", Topic: "/initialpose" }, { Class: "rviz/SetGoal", Topic: "/move_base_simple/goal" },
         { Class: "rviz/PublishPoint", "Single click": true, Topic: "/clicked_point" }],
       Value: true,

@@ -19,6 +19,7 @@ export class Context {
     this.refused = "";
     this.seen = -1;
     this.isFresh = true;
+    this.isInteracting = true; // with interactive markers
     this.lastLook = 0;
     this.lastTime = null;
     const listen = (topic, isStatic) => link.subscribe({ topic, mode: "all", isOwn: true }, ({ lines = [], error }) => {

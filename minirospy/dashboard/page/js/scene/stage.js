@@ -58,6 +58,7 @@ export class Stage {
     this.ratio = 0;
     this.coarser = 0; // pictures that were too slow, less those that were not
     this.onTick = () => {};
+    this.onAim = () => {}; // before each picture, with its camera
     this.onView = () => {};
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(frame);
@@ -112,6 +113,7 @@ export class Stage {
     if (!this.isStale) return;
     this.isStale = false;
     this.aim();
+    this.onAim(this.camera);
     this.started = performance.now();
     this.renderer.render(this.scene, this.camera);
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

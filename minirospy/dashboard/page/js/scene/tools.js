@@ -2,6 +2,7 @@
 
 import { Group } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
+import { Grips } from "./grips.js";
 import { schema } from "./schemas.js";
 import { arrow, bodyMaterial, discard, segments } from "./shapes.js";
 import { fromYaw } from "./transforms.js";
@@ -34,6 +35,7 @@ export class Tools {
     this.preview = null;
     this.advertised = new Set();
     this.measured = { from: null, label: null, line: null };
+    this.grips = new Grips(view, t(TOOLS.move.hint));
     const { canvas } = view.stage;
     const on = (name, react) => canvas.addEventListener(name, react);
     on("pointerdown", (event) => this.down(event));
@@ -50,11 +52,13 @@ export class Tools {
 
   close() {
     this.clear();
+    this.grips.close();
     for (const topic of this.advertised) this.view.link.unpublish(topic);
   }
 
   choose(name) {
     this.clear();
+    this.grips.leave();
     this.name = name;
     this.view.stage.canvas.dataset.tool = name;
     const { topic, type } = this.target(name);
@@ -98,9 +102,11 @@ export class Tools {
     if (this.pointers.size > 1) {
       // Two fingers: not the tool, but the view.
       this.held = null;
+      this.grips.cancel();
       this.dropPreview();
       return;
     }
+    if (this.name === "move" && this.grips.down(event, x, y)) return;
     this.held = { x, y, button: event.button, start: null };
     if (this.name === "move" || event.button !== 0) return;
     event.preventDefault();
@@ -115,6 +121,7 @@ export class Tools {
       this.pinch(event.pointerId, x, y);
       return;
     }
+    if (this.grips.move(event, x, y)) return;
     const { held } = this;
     if (!held) {
       this.hover(x, y);
@@ -133,6 +140,7 @@ export class Tools {
 
   up(event) {
     this.pointers.delete(event.pointerId);
+    if (this.grips.up(event, ...this.at(event))) return;
     const { held } = this;
     this.held = null;
     if (held?.start && event.type === "pointerup") {
@@ -179,6 +187,7 @@ export class Tools {
       const to = stage.pick(x, y, this.view.pickable());
       if (to) this.measure(to);
     }
+    if (this.name === "move") this.grips.hover(x, y);
     const ground = stage.ground(x, y);
     this.view.showPlace(ground && stage.camera.position.distanceTo(ground) < 3000 ? ground : null);
   }

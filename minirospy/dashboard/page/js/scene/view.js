@@ -8,6 +8,7 @@ import { Config, readView, writeView } from "./config.js";
 import { Context } from "./context.js";
 import { Cloud } from "./displays/cloud.js";
 import { Axes, Grid, TF } from "./displays/frames.js";
+import { InteractiveMarkers } from "./displays/interactive.js";
 import { MapDisplay } from "./displays/map.js";
 import { Markers } from "./displays/markers.js";
 import { GridCells, Linked, Odometry, Path, PointStamped, Polygon, Pose, PoseArray, Range, Wrench } from "./displays/poses.js";
@@ -19,7 +20,7 @@ import { TOOLS, Tools } from "./tools.js";
 
 const DISPLAYS = {
   __proto__: null, // a file may name a class constructor
-  Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, Path, Pose,
+  Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, InteractiveMarkers, Path, Pose,
   PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera: Linked };
 const KEY = "3d"; // of what the browser keeps
 const MOST_AUTOMATIC = 20; // displays that are added without a click
@@ -60,6 +61,7 @@ export class SceneView {
     this.context = new Context(link, this.stage, () => { this.panel.isStale = true; });
     this.tools = new Tools(this);
     this.stage.onTick = () => this.context.tick(this.displays.values());
+    this.stage.onAim = (camera) => { for (const display of this.displays.values()) display.face?.(camera); };
     this.stage.onView = () => this.viewChanged();
     this.toggleSide(localStorage.getItem(`${KEY} side`) !== "hidden" && innerWidth > 700);
     this.apply();
@@ -291,6 +293,9 @@ export class SceneView {
   // --- the bars
 
   chosen(name) {
+    // Handles of interactive markers are for the mouse; another tool has it.
+    this.context.isInteracting = name === "move";
+    this.stage.invalidate();
     for (const button of this.toolbar.children) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
   }
 
