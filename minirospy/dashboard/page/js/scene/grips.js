@@ -81,7 +81,8 @@ export class Grips {
     event.preventDefault();
     this.held = { control, point, button: event.button, at: [x, y], drag: null, isChanged: false, reported: performance.now() };
     if (event.button === 2) return true;
-    this.report(MOUSE_DOWN, { point });
+    // As RViz: a pose comes before each press and release.
+    for (const each of [POSE_UPDATE, MOUSE_DOWN]) this.report(each, { point });
     if (isDragged(control.mode) && point) this.startDrag(x, y);
     if (event.pointerType === "touch" && control.shown.menu.length) this.held.long = setTimeout(() => this.openMenu(this.end()), LONG_MS);
     return true;
@@ -142,13 +143,12 @@ export class Grips {
     if (this.held) this.end();
   }
 
-  /** Report the last pose and the end; return what was held. */
+  /** Report the last pose, and the end; return what was held. */
   end(point = null) {
     const { held } = this;
     clearTimeout(held.long);
     clearInterval(held.timer);
-    if (held.isChanged) this.tell();
-    if (held.button === 0) this.report(MOUSE_UP, { point });
+    if (held.button === 0) for (const each of [POSE_UPDATE, MOUSE_UP]) this.report(each, { point });
     if (held.drag) {
       held.control.shown.release();
       this.light(this.current(), 0);

@@ -58,7 +58,7 @@ const shape = (type, q, scale, [r, g, b], rest) => ({
 const point = (x, y, z) => ({ x, y, z });
 
 function textShape(text, scale) {
-  const found = shape(9, IDENTITY.q, [0, 0, 0.25 * scale], [1, 1, 1], { text });
+  const found = shape(9, IDENTITY.q, [0, 0, 0.15 * scale], [1, 1, 1], { text });
   found.pose.position.z = 1.2 * scale;
   found.color.a = 1;
   return found;

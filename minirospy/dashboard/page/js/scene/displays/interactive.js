@@ -38,7 +38,7 @@ export class Shown {
     this.axes = axes(this.scale, this.scale * 0.05);
     this.object.add(this.axes);
     for (const control of this.controls) this.build(control);
-    if (this.description) this.write({ text: this.description, metres: 0.25 * this.scale });
+    if (this.description) this.write({ text: this.description, metres: 0.15 * this.scale });
   }
 
   build(control) {
@@ -285,7 +285,7 @@ export class InteractiveMarkers extends TopicDisplay {
     try {
       await this.context.link.publish(`${this.space}/feedback`, TYPE, FEEDBACK, {
         header: { seq: 0, stamp: isLocked ? { secs: 0, nsecs: 0 } : header.stamp, frame_id: isLocked ? header.frame_id : this.context.fixedFrame },
-        client_id: this.clientId, marker_name: name, control_name: control.name, event_type: event, pose: toMessage(isLocked ? pose : compose(outer, pose)),
+        client_id: this.clientId, marker_name: name, control_name: event === MENU_SELECT ? "" : control.name, event_type: event, pose: toMessage(isLocked ? pose : compose(outer, pose)),
         menu_entry_id: entry, mouse_point: { x, y, z }, mouse_point_valid: point !== null });
       this.clearStatus("Feedback");
     } catch (error) {
