@@ -187,7 +187,7 @@ export const GERMAN = {
   "Loading …": "Lädt …", "The 3D view cannot be shown: {why}": "Die 3D-Ansicht lässt sich nicht zeigen: {why}", "Fixed frame": "Festes Koordinatensystem",
   "fixed frame": "festes Koordinatensystem", "View": "Ansicht", "of": "von", "Target frame": "Ziel der Ansicht", "Tools": "Werkzeuge", "Displays": "Anzeigen",
   "Back to the view at the start": "Zurück zur Ansicht vom Anfang", "Orbit": "Umkreisen", "Top down": "Von oben", "automatic": "automatisch",
-  "click: press": "Klick: drücken", "click: menu": "Klick: Menü", "drag: move the marker": "ziehen: den Marker bewegen", "right click, or hold: menu": "Rechtsklick oder halten: Menü",
+  "click: larger or smaller": "Klick: größer oder kleiner", "click: press": "Klick: drücken", "click: menu": "Klick: Menü", "drag: move the marker": "ziehen: den Marker bewegen", "right click, or hold: menu": "Rechtsklick oder halten: Menü",
   "A page starts no programs: {command}": "Eine Seite startet keine Programme: {command}",
   "automatic: {name}": "automatisch: {name}", "the view turns around {place}": "die Ansicht dreht sich um {place}", "{place} in {frame}": "{place} in {frame}",
   "The scene: drag to turn, with shift to move, wheel to zoom": "Die Szene: ziehen dreht, mit Umschalt verschieben, Rad zoomt", "Move camera": "Kamera bewegen",

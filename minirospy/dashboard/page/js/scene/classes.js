@@ -87,7 +87,9 @@ export const CLASSES = {
     ["Topic", topic, ""], ["Force Color", color, "204; 51; 51"], ["Torque Color", color, "204; 204; 51"], ["Alpha", number, 1],
     ["Force Arrow Scale", number, 2], ["Torque Arrow Scale", number, 2], ["Arrow Width", number, 0.5], ["Hide Small Values", bool, true]] },
   Image: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", isLinked: true, settings: [["Image Topic", topic, ""]] },
-  Camera: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", isLinked: true, settings: [["Image Topic", topic, ""]] },
+  Camera: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", settings: [
+    ["Image Topic", topic, ""], ["Image Rendering", scheme(["background and overlay", "background", "overlay"]), "background and overlay"],
+    ["Overlay Alpha", number, 0.5, (settings) => settings["Image Rendering"] !== "background"], ["Zoom Factor", number, 1]] },
 };
 CLASSES.Wrench = CLASSES.WrenchStamped;
 const OFFERED_ONCE = new Set(["Camera", "Wrench"]);

@@ -128,9 +128,10 @@ export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, si
       size: { value: size }, isMetres: { value: isMetres ? 1 : 0 }, pixels: { value: 1 }, opacity: { value: alpha }, isRound: { value: isRound ? 1 : 0 },
       isFlat: { value: colors ? 0 : 1 }, flatColor: { value: new Vector3(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255) } } });
   const found = new Points(geometry, material);
+  const viewport = { copy({ w }) { this.height = w; return this; } };
   found.onBeforeRender = (renderer, scene, camera) => {
     // Half the height of the picture, times the projection: pixels of a metre at w = 1.
-    material.uniforms.pixels.value = renderer.domElement.height * 0.5 * camera.projectionMatrix.elements[5];
+    material.uniforms.pixels.value = renderer.getCurrentViewport(viewport).height * 0.5 * camera.projectionMatrix.elements[5];
     material.uniformsNeedUpdate = true;
   };
   return found;

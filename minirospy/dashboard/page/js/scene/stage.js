@@ -49,7 +49,10 @@ export class Stage {
     this.view = { kind: "orbit", distance: 10, focus: [0, 0, 0], pitch: 0.785, yaw: 0.785, scale: 50, angle: 0, target: "<Fixed Frame>" };
     this.base = { p: [0, 0, 0], yaw: 0 }; // of the target frame
     this.labels = new Labels();
-    frame.append(this.canvas, this.labels.element);
+    this.insets = new Set(); // other cameras' views: {canvas, texture, background, aim(), show()}
+    this.corner = document.createElement("div");
+    this.corner.className = "insets";
+    frame.append(this.canvas, this.labels.element, this.corner);
 
     this.isStale = true;
     this.fence = null;
@@ -76,6 +79,7 @@ export class Stage {
     this.renderer.forceContextLoss();
     this.canvas.remove();
     this.labels.element.remove();
+    this.corner.remove();
   }
 
   get camera() {
@@ -115,12 +119,51 @@ export class Stage {
     this.aim();
     this.onAim(this.camera);
     this.started = performance.now();
+    for (const inset of this.insets) this.drawInset(inset);
     this.renderer.render(this.scene, this.camera);
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
     this.labels.draw(this);
     this.drawn += 1;
     this.canvas.dataset.drawn = this.drawn;
+  }
+
+  addInset(inset) {
+    this.insets.add(inset);
+    this.corner.append(inset.canvas);
+  }
+
+  removeInset(inset) {
+    this.insets.delete(inset);
+    inset.canvas.remove();
+  }
+
+  /** Draw the scene as another camera sees it into a corner of the canvas, from where its view is copied. */
+  drawInset(inset) {
+    const camera = inset.aim();
+    inset.canvas.hidden = !camera;
+    if (!camera) return;
+    const { renderer, scene } = this;
+    const { width: across, height: along } = inset.texture.image;
+    const isLarge = inset.canvas.classList.contains("large");
+    const width = Math.min(this.width * (isLarge ? 0.9 : 0.34), (this.height * (isLarge ? 0.85 : 0.4) * across) / along);
+    const height = (width * along) / across;
+    const { background } = scene;
+    scene.background = inset.background ?? background;
+    this.lightFrom(camera);
+    renderer.setViewport(0, 0, width, height);
+    renderer.setScissor(0, 0, width, height);
+    renderer.setScissorTest(true);
+    renderer.render(scene, camera);
+    renderer.setScissorTest(false);
+    renderer.setViewport(0, 0, this.width, this.height);
+    scene.background = background;
+    this.lightFrom(this.camera);
+
+    const ratio = renderer.getPixelRatio();
+    const [x, y] = [width, height].map((size) => Math.max(1, Math.floor(size * ratio)));
+    inset.show(this.canvas, 0, this.canvas.height - y, x, y);
+    inset.canvas.style.width = `${width}px`;
   }
 
   isFinished() {
@@ -194,6 +237,10 @@ export class Stage {
     }
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
+    this.lightFrom(camera);
+  }
+
+  lightFrom(camera) {
     this.light.position.copy(camera.position);
     this.light.target.position.copy(camera.position).add(camera.getWorldDirection(new Vector3()));
   }
