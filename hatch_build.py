@@ -6,10 +6,12 @@ checkout, where everything else already is.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import sys
 import zipfile
+from base64 import urlsafe_b64encode
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -22,6 +24,9 @@ ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
 """The environment variable with the address of the repository, set by whoever publishes: docs/release.md."""
 
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
+
+_PAGE = re.compile(r"minirospy/dashboard/page/(?!vendor/).*\.(js|css)")
+_COMMENT = re.compile(r"//.*|/\*((?!\*/).)*\*/")
 
 
 def project_urls(address: str) -> dict[str, str]:
@@ -57,6 +62,47 @@ def readme_of_wheel(text: str, url: str = "") -> str:
     if url:
         return _LINK.sub(lambda link: f"[{link[1]}]({url.rstrip('/')}/{link[2]})", text)
     return _LINK.sub(lambda link: link[1] if link[1] == link[2] else f"{link[1]} ({link[2]})", text)
+
+
+def lean(text: str) -> str:
+    """Return a script or style of the page without its comments' lines and indentation; what is in `...` stays as it is."""
+    if text.count("`") % 2:
+        return text
+    lines = []
+    is_literal = False
+    for line in text.splitlines():
+        short = line.strip()
+        if not is_literal and (not short or _COMMENT.fullmatch(short)):
+            continue
+        lines.append(line if is_literal else short)
+        is_literal ^= line.count("`") % 2 == 1
+    return "\n".join(lines) + "\n"
+
+
+def compress(wheel: Path) -> None:
+    """Write a wheel's files again, in their order and with their dates: the page lean, all as small as deflate makes them."""
+    packed = wheel.with_suffix(".packed")
+    changed: dict[str, bytes] = {}
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(packed, "w") as new:
+        for info in old.infolist():
+            data = old.read(info)
+            if _PAGE.fullmatch(info.filename):
+                data = changed[info.filename] = lean(data.decode()).encode()
+            elif info.filename.endswith(".dist-info/RECORD"):
+                data = "".join(
+                    _recorded(line, changed) for line in data.decode().splitlines(keepends=True)
+                ).encode()
+            new.writestr(info, data, zipfile.ZIP_DEFLATED, 9)
+    packed.replace(wheel)
+
+
+def _recorded(line: str, changed: dict[str, bytes]) -> str:
+    """Return a line of a RECORD with the hash and size of what has changed (the specification of binary distributions)."""
+    name = line.partition(",")[0]
+    if name not in changed:
+        return line
+    digest = urlsafe_b64encode(hashlib.sha256(changed[name]).digest()).rstrip(b"=").decode()
+    return f"{name},sha256={digest},{len(changed[name])}\n"
 
 
 class DescribeProject(MetadataHookInterface):
@@ -112,11 +158,6 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         }
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Compress a wheel as well as zlib can: hatchling leaves zlib's default level."""
-        if self.target_name != "wheel" or version == "editable":
-            return
-        smaller = Path(artifact_path).with_suffix(".smaller")
-        with zipfile.ZipFile(artifact_path) as wheel, zipfile.ZipFile(smaller, "w") as packed:
-            for entry in wheel.infolist():
-                packed.writestr(entry, wheel.read(entry), zipfile.ZIP_DEFLATED, compresslevel=9)
-        smaller.replace(artifact_path)
+        """Compress the wheel: it is copied to small computers."""
+        if self.target_name == "wheel" and version != "editable":
+            compress(Path(artifact_path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
@@ -9,11 +10,12 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from base64 import urlsafe_b64encode
 from pathlib import Path
 
 import pytest
 
-from hatch_build import ADDRESS_VARIABLE, project_urls
+from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls
 from tools.release import faults_of_metadata
 
 ROOT = Path(__file__).parents[1]
@@ -121,6 +123,55 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
 
     assert wheel.stat().st_size < MOST_BYTES
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
+
+
+def test_compressed_wheel_has_the_same_files(tmp_path: Path) -> None:
+    wheel = tmp_path / "x.whl"
+    texts = {"b/z.py": "spam " * 2000, "a.py": Path(__file__).read_text(encoding="utf-8")}
+    with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, text in texts.items():
+            info = zipfile.ZipInfo(name, (2020, 2, 2, 0, 0, 0))
+            info.external_attr = 0o100755 << 16
+            archive.writestr(info, text)
+
+    before = wheel.stat().st_size
+    compress(wheel)
+    assert wheel.stat().st_size < before
+    assert [path.name for path in tmp_path.iterdir()] == ["x.whl"]
+    with zipfile.ZipFile(wheel) as archive:
+        assert {name: archive.read(name).decode() for name in archive.namelist()} == texts
+        assert archive.namelist() == list(texts)
+        assert {(info.date_time, info.external_attr >> 16) for info in archive.infolist()} == {
+            ((2020, 2, 2, 0, 0, 0), 0o100755)
+        }
+
+
+def test_record_fits_the_files_of_the_wheel(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        record = next(name for name in archive.namelist() if name.endswith(".dist-info/RECORD"))
+        lines = [line.rsplit(",", 2) for line in archive.read(record).decode().splitlines()]
+        assert sorted(name for name, _, _ in lines) == sorted(archive.namelist())
+        for name, digest, size in lines:
+            if name == record:
+                continue
+            data = archive.read(name)
+            found = urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            assert (digest, size) == (f"sha256={found}", str(len(data))), name
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("// about\n\n/** Return. */\nif (x) {\n  y(); // why\n}\n", "if (x) {\ny(); // why\n}\n"),
+        ("/* a */ b(); /* c */\n", "/* a */ b(); /* c */\n"),
+        # Lines of a literal are its text.
+        ("  a = `\n  // b\n\n  c`;\n  d();\n", "a = `\n  // b\n\n  c`;\nd();\n"),
+        ("  a = `b`;\n  // c\n", "a = `b`;\n"),
+        ("  a = '`';\n  // b\n", "  a = '`';\n  // b\n"),
+    ],
+)
+def test_files_of_the_page_are_lean(text: str, wanted: str) -> None:
+    assert lean(text) == wanted
 
 
 def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
