@@ -1,8 +1,8 @@
 """The fast tests on every Python from 3.10 on that is found: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
 
 Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its test.
-Versions as arguments (`python tools/pythons.py 3.10 3.14t`) choose some; a path of an interpreter is taken as it is. What stands
-behind `--` goes to pytest. Exit status: 1 where a test failed on one of them.
+Versions as arguments (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`) choose some; a path of an interpreter is taken as
+it is. What stands behind `--` goes to pytest. Exit status: 1 where a test failed on one of them.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ def main(words: Sequence[str]) -> int:
     split = list(words).index("--") if "--" in words else len(words)
     chosen, arguments = words[:split], list(words[split + 1 :])
     pythons = [word for word in chosen if os.sep in word]
-    names = {word for word in chosen if os.sep not in word}
+    names = [word for word in chosen if os.sep not in word]
     found = find_pythons() if names or not chosen else {}
-    if missing := names - set(found):
-        sys.exit(f"not found: {', '.join(sorted(missing))}; there are {', '.join(found)}")
-    pythons += [path for name, path in found.items() if name in names or not chosen]
+    try:
+        pythons += [found[name] for name in (choose(names, list(found)) if names else found)]
+    except LookupError as error:
+        sys.exit(error.args[0])
 
     failed = []
     for python in pythons:
@@ -46,6 +47,15 @@ def main(words: Sequence[str]) -> int:
     if failed:
         print(f"failed on Python {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
+
+
+def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
+    """Return the versions that words choose of those found, which are in order. Raise LookupError."""
+    with_gil = [name for name in found if not name.endswith("t")] or list(found)
+    names = {{"oldest": with_gil[0], "newest": with_gil[-1]}.get(word, word) for word in words}
+    if missing := names - set(found):
+        raise LookupError(f"not found: {', '.join(sorted(missing))}; there are {', '.join(found)}")
+    return [name for name in found if name in names]
 
 
 def _version(python: str) -> str:
