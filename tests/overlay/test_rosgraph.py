@@ -105,7 +105,7 @@ def test_connection_headers_over_a_socket() -> None:
     one, other = socket.socketpair()
     with one, other:
         other.settimeout(30)
-        sent = rosgraph.network.write_ros_handshake_header(one, {"topic": "/t", "tcp_nodelay": 1})
+        sent = rosgraph.network.write_ros_handshake_header(one, {"topic": "/t", "tcp_nodelay": b"1"})
         one.sendall(b"rest")
         buffer = BytesIO()
         assert rosgraph.network.read_ros_handshake_header(other, buffer, 7) == {
