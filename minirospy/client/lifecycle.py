@@ -6,7 +6,6 @@ Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 from __future__ import annotations
 
 import contextlib
-import enum
 import logging
 import threading
 import traceback
@@ -14,8 +13,8 @@ from collections.abc import Callable, Iterable
 
 from minirospy import errors
 from minirospy.client.deferral import Deferral, is_main_thread
-from minirospy.client.shutdown import Phase, ShutdownMachine
-from minirospy.clock import SignalSafeEvent
+from minirospy.client.shutdown import Awareness, Phase, ShutdownMachine, ThreadState
+from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Lifecycle", "ROSInterruptException"]
 
@@ -30,16 +29,9 @@ class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
     """
 
 
-class _Awareness(enum.Enum):
-    """The knowledge that a thread of the program has of the shutdown."""
-
-    NONE = 0  # it has not called is_shutdown(), or not since the shutdown ended a sleep of it
-    POLLS = 1
-    NOTIFIED = 2  # by is_shutdown() or an exception: what it does now is its clean-up
-
-
 class _ThisThread(threading.local):
-    awareness = _Awareness.NONE
+    def __init__(self, main: ThreadState) -> None:
+        self.state = main if is_main_thread() else ThreadState()
 
 
 class _Interrupting:
@@ -85,7 +77,7 @@ class Lifecycle:
 
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
-        self._this_thread = _ThisThread()
+        self._this_thread = _ThisThread(self.machine.main)
 
     def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
         """Call ``hook`` when the node shuts down, or now where it has; ``hooks``: a list above, by default the first.
@@ -94,8 +86,7 @@ class Lifecycle:
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        # A signal that is dispatched in between would shut down without this hook.
-        with self.deferral, self._lock:
+        with self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
                 return
@@ -139,6 +130,14 @@ class Lifecycle:
         """
         return _Interrupting(self, interrupt)
 
+    def spin(self) -> None:
+        """Wait until the node shuts down."""
+        try:
+            wait_for_event(self.shutting_down, None)
+        except KeyboardInterrupt:
+            self.signal_shutdown("keyboard interrupt")
+        self.poll_shutdown()
+
     @property
     def is_shutdown_requested(self) -> bool:
         """Return whether a shutdown has started: its hooks may still be running."""
@@ -153,13 +152,13 @@ class Lifecycle:
     @property
     def is_notified(self) -> bool:
         """Return whether the calling thread was notified of the shutdown."""
-        return self._this_thread.awareness is _Awareness.NOTIFIED
+        return self._this_thread.state.awareness is Awareness.NOTIFIED
 
     def poll_shutdown(self) -> bool:
         """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
         self.deferral.poll()
-        is_shutdown = self.is_shutdown()
-        self._record(_Awareness.NOTIFIED if is_shutdown else _Awareness.POLLS)
+        is_shutdown = self.shutting_down.is_set()
+        self._this_thread.state.awareness = Awareness.NOTIFIED if is_shutdown else Awareness.POLLS
         return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
@@ -168,19 +167,21 @@ class Lifecycle:
         In a loop that polls is_shutdown() the sleep just ends early, as with rospy: the loop will poll, and what follows
         it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
         """
-        if self._this_thread.awareness is not _Awareness.POLLS:
+        state = self._this_thread.state
+        if state.awareness is not Awareness.POLLS:
             raise self.interrupted("ROS shutdown request")
-        self._this_thread.awareness = _Awareness.NONE
+        state.awareness = Awareness.CUT_SHORT
 
     def interrupted(self, text: str) -> ROSInterruptException:
         """Return the error that notifies the calling thread of the shutdown, for it to raise."""
-        self._record(_Awareness.NOTIFIED)
+        self._this_thread.state.awareness = Awareness.NOTIFIED
         return ROSInterruptException(text)
 
-    def _record(self, awareness: _Awareness) -> None:
-        self._this_thread.awareness = awareness
-        if is_main_thread():
-            self.machine.main_ends_by_itself = True
+    def is_interrupt(self, error: BaseException) -> bool:
+        """Return whether an error that ends the program, or a thread of it, is the one that was to interrupt it."""
+        if isinstance(error, KeyboardInterrupt) and self.machine.signals:
+            return True
+        return isinstance(error, errors.ROSInterruptException) and self.is_shutdown()
 
     def _run(self, hooks: Iterable[Callable[[], object]]) -> None:
         # A hook may add another: it runs last.

@@ -179,11 +179,7 @@ class Session:
         """Wait until the node shuts down. Raises ROSInitException before init_node."""
         if not self.initialized and not self.is_shutdown() and not self.is_fork:
             raise ROSInitException("client code must call rospy.init_node() first")
-        try:
-            wait_for_event(self.lifecycle.shutting_down, None)
-        except KeyboardInterrupt:
-            self.lifecycle.signal_shutdown("keyboard interrupt")
-        self.lifecycle.poll_shutdown()
+        self.lifecycle.spin()
 
     def shut_down_at_exit(self) -> None:
         """Shut down at the program's exit. Where another thread does that, let it finish first."""

@@ -7,9 +7,8 @@ is touched here: :mod:`minirospy.client.signals` is the shell that performs the 
 from __future__ import annotations
 
 import enum
-import math
 
-__all__ = ["Action", "Phase", "ShutdownMachine"]
+__all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
 _GRACE_SECONDS = 0.5
 """How long the main thread has to start the hooks, and again to notice that is_shutdown() is true."""
@@ -32,27 +31,45 @@ class Action(enum.Enum):
     RUN_HOOKS = "shut down in a thread of the library: the main thread does not run Python code"
     INTERRUPT = "raise ROSInterruptException in the main thread"
     KEYBOARD_INTERRUPT = "raise KeyboardInterrupt in the main thread"
-    STOP_LEAVING = "wait for the master no longer, if the node does"
+    STOP_LEAVING = "wait for the master no longer"
     REPORT = "print what the process still waits for"
     EXIT = "end the process"
+
+
+class Awareness(enum.IntEnum):
+    """The knowledge that a thread of the program has of the shutdown."""
+
+    NONE = 0  # it has never called is_shutdown()
+    POLLS = 1
+    CUT_SHORT = 2  # it polls; since the shutdown ended its sleep it has not yet
+    NOTIFIED = 3  # by is_shutdown() or an exception: what it does now is its clean-up
+
+
+class ThreadState:
+    """The shutdown as one thread of the program sees it."""
+
+    __slots__ = ("awareness",)
+
+    def __init__(self) -> None:
+        self.awareness = Awareness.NONE
 
 
 class ShutdownMachine:
     """The rules: what is done about a signal, and how long after it.
 
     Time is whatever the caller passes as ``now``, in seconds. One thread calls :meth:`signal` and :meth:`tick`; any thread
-    may set the public attributes.
+    may set :attr:`phase` and the awareness of :attr:`main`.
     """
 
     def __init__(self) -> None:
-        self.phase = Phase.RUNNING
+        self.main = ThreadState()
+        self.main_has_ended = False
         self.runs_in_main = False
         """Whether the main thread itself runs the hooks, and leaves the graph."""
-        self.main_ends_by_itself = False
-        """Whether the main thread needs no exception: it has ended, or does what it does in view of the shutdown."""
+        self.phase = Phase.RUNNING
         self.signals = 0
-        self._signalled = math.inf
-        self._free = math.inf
+        self._signalled = 0.0
+        self._free: float | None = None
         """When the main thread could first notice that is_shutdown() is true."""
         self._done: set[Action] = set()
 
@@ -65,22 +82,32 @@ class ShutdownMachine:
         if self.signals > 2:
             return [Action.EXIT]
 
-        if self.phase is Phase.LEAVING and self.runs_in_main:
+        is_leaving = self.phase is Phase.LEAVING
+        if is_leaving and self.runs_in_main:
             # It is in no code of the program's.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
-        return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT]
+        return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
 
     def tick(self, now: float) -> list[Action]:
         """Return what is due after a signal; each action once."""
-        if self.signals and self.phase >= (Phase.LEFT if self.runs_in_main else Phase.DOWN):
-            self._free = min(self._free, now)
+        if not self.signals:
+            return []
+        if self._free is None and self.phase >= (Phase.LEFT if self.runs_in_main else Phase.DOWN):
+            self._free = now
 
-        is_due = {
-            Action.RUN_HOOKS: now >= self._signalled + _GRACE_SECONDS and self.phase is Phase.RUNNING,
-            Action.INTERRUPT: now >= self._free + _GRACE_SECONDS and not self.main_ends_by_itself,
-            Action.REPORT: now >= self._signalled + _REPORT_SECONDS,
-        }
-        due = [action for action in is_due if is_due[action] and action not in self._done]
+        due = []
+        if self.phase is Phase.RUNNING and now >= self._signalled + _GRACE_SECONDS:
+            due.append(Action.RUN_HOOKS)
+        if self._free is not None and now >= self._free + _GRACE_SECONDS and not self.main_ends_by_itself:
+            due.append(Action.INTERRUPT)
+        if now >= self._signalled + _REPORT_SECONDS:
+            due.append(Action.REPORT)
+        due = [action for action in due if action not in self._done]
         self._done.update(due)
         return due
+
+    @property
+    def main_ends_by_itself(self) -> bool:
+        """Return whether the main thread needs no exception: it has ended, or does what it does in view of the shutdown."""
+        return self.main_has_ended or self.main.awareness > Awareness.NONE

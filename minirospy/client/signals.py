@@ -45,17 +45,11 @@ class SignalWatchdog:
         ``is_sending()``: whether a link's lock is held, so that a hook that publishes might wait for its own thread.
         """
         self._lifecycle = lifecycle
+        self._machine = lifecycle.machine
         self._deferral = lifecycle.deferral
         self._deferral.dispatch = self._dispatch
+        self._stop_leaving = stop_leaving
         self._is_sending = is_sending
-        self._actions: dict[Action, Callable[[], object]] = {
-            Action.RUN_HOOKS: lambda: _start(lifecycle.signal_shutdown, f"signal-{self._number}", "shutdown"),
-            Action.INTERRUPT: lambda: self._nudge(Action.INTERRUPT),
-            Action.KEYBOARD_INTERRUPT: lambda: self._nudge(Action.KEYBOARD_INTERRUPT),
-            Action.STOP_LEAVING: stop_leaving,
-            Action.REPORT: lambda: report_waiting(is_leaving=self._lifecycle.machine.phase is Phase.LEAVING),
-            Action.EXIT: lambda: os._exit(_EXIT_STATUS),
-        }
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         """The handlers before, by the numbers of the signals."""
         self._number = int(signal.SIGINT)
@@ -65,8 +59,7 @@ class SignalWatchdog:
         """Whether a nudge is on its way to the handler."""
         self._nudging = threading.Lock()
         self._sending: socket.socket | None = None
-        self._arrived = self._handled = 0
-        """The signals of the user's that the file descriptor, and the handler, has reported: either may miss some."""
+        self._arrived = self._handled = self._nudges = 0
 
     @property
     def is_installed(self) -> bool:
@@ -89,7 +82,7 @@ class SignalWatchdog:
         if self._sending is None:
             receiving, self._sending = socket.socketpair()
             self._sending.setblocking(False)
-            _start(self._watch, receiving, "signals")
+            _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
             # An event loop's, which was installed first.
@@ -112,7 +105,7 @@ class SignalWatchdog:
         """Write what the program has printed while Ctrl-C still works; from here on the third is the system's business."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
-        if self._lifecycle.machine.signals > 1:
+        if self._machine.signals > 1:
             with self._nudging:
                 for number in self._previous:
                     signal.signal(number, signal.SIG_DFL)
@@ -122,12 +115,13 @@ class SignalWatchdog:
     def _on_signal(self, number: int, _: FrameType | None) -> None:
         self._number = number
         self._deferral.pending = True
-        is_nudge, self._is_nudge = self._is_nudge, False
-        self._handled += not is_nudge
+        self._handled += 1
         if self._sending is not None:
             # Wakes the watchdog also where an event loop has taken the file descriptor. No signal has the number 0.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
+
+        is_nudge, self._is_nudge = self._is_nudge, False
         if is_nudge and not self._deferral.is_active and not self._is_sending():
             with dispatching_signal():
                 self._dispatch()
@@ -143,51 +137,70 @@ class SignalWatchdog:
         if action is Action.KEYBOARD_INTERRUPT:
             raise KeyboardInterrupt
         # Meanwhile it may have been notified: what would be interrupted now is the program's clean-up.
-        if action is Action.INTERRUPT and not self._lifecycle.machine.main_ends_by_itself:
+        if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
     # --- the watchdog thread
 
     def _watch(self, receiving: socket.socket) -> None:
         """Feed the state machine with signals and time, and perform its actions, until :meth:`release`."""
-        machine, deferral = self._lifecycle.machine, self._deferral
-        now = waited = 0.0
+        machine, deferral = self._machine, self._deferral
+        now = deferred_at = 0.0
         with receiving, contextlib.suppress(ConnectionError):
             while True:
                 started = time.monotonic()
-                is_ticking = machine.signals or deferral.pending
-                receiving.settimeout(_TICK_SECONDS if is_ticking else None)
+                receiving.settimeout(_TICK_SECONDS if machine.signals or deferral.pending else None)
                 with contextlib.suppress(TimeoutError):
                     if not (numbers := receiving.recv(64)):
                         return
-                    self._arrived += sum(map(self._is_handled, numbers))
-                step = min(time.monotonic() - started, _MAX_STEP) if is_ticking else 0.0
-                now += step
+                    self._arrived += sum(self._is_handled(number) for number in numbers)
+                now += min(time.monotonic() - started, _MAX_STEP)
 
-                machine.main_ends_by_itself |= not threading.main_thread().is_alive()
-                actions = machine.tick(now)
-                while machine.signals < max(self._arrived, self._handled):
-                    actions += machine.signal(now)
-                for action in actions:
-                    self._actions[action]()
+                machine.main_has_ended = not threading.main_thread().is_alive()
+                for _ in range(self._new_signals()):
+                    self._perform(machine.signal(now))
+                self._perform(machine.tick(now))
 
-                waited = waited + step if deferral.pending else 0.0
-                if waited >= _DEFER_SECONDS:
+                if not deferral.pending:
+                    deferred_at = now
+                elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()
 
     def _is_handled(self, number: int) -> bool:
         return number in self._previous and signal.getsignal(number) == self._on_signal
 
-    def _nudge(self, interrupt: Action | None = None) -> None:
-        """Run the handler in the main thread, to raise ``interrupt`` there, and end a system call that it is in."""
-        if interrupt:
-            self._interrupt = interrupt
+    def _new_signals(self) -> int:
+        """Return how many signals of the user's have come that the machine has not counted.
+
+        An event loop may have taken the file descriptor: then only the handler reports a signal.
+        """
+        return max(0, max(self._arrived, self._handled) - self._nudges - self._machine.signals)
+
+    def _perform(self, actions: list[Action]) -> None:
+        for action in actions:
+            match action:
+                case Action.RUN_HOOKS:
+                    _start(
+                        self._lifecycle.signal_shutdown, f"signal-{self._number}", name="minirospy-shutdown"
+                    )
+                case Action.INTERRUPT | Action.KEYBOARD_INTERRUPT:
+                    self._interrupt = action
+                    self._nudge()
+                case Action.STOP_LEAVING:
+                    self._stop_leaving()
+                case Action.REPORT:
+                    report_waiting(is_leaving=self._machine.phase is Phase.LEAVING)
+                case Action.EXIT:
+                    os._exit(_EXIT_STATUS)
+
+    def _nudge(self) -> None:
+        """Run the handler in the main thread, and end a system call that it is in."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
                 # One at a time: the system makes one of two that were not delivered yet, and they have to be counted.
                 return
+            self._nudges += 1
             self._is_nudge = True
-            self._arrived -= 1
             if sys.platform == "win32":
                 # The only signal that ends time.sleep() there.
                 signal.raise_signal(signal.SIGINT)
@@ -196,4 +209,4 @@ class SignalWatchdog:
 
 
 def _start(target: Callable[..., object], argument: object, name: str) -> None:
-    threading.Thread(target=target, args=(argument,), name=f"minirospy-{name}", daemon=True).start()
+    threading.Thread(target=target, args=(argument,), name=name, daemon=True).start()

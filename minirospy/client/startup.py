@@ -22,14 +22,7 @@ from minirospy.client.session import Session, current_session, replace_session_i
 from minirospy.client.subscriber import Subscriber
 from minirospy.clock import SimulatedClock, wait_for_event
 from minirospy.environment import wrong_address
-from minirospy.errors import (
-    MasterUnreachableError,
-    ROSException,
-    ROSInitException,
-    ROSInterruptException,
-    RpcError,
-    RpcFault,
-)
+from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 
 __all__ = ["init_node", "start_clock"]
 
@@ -157,11 +150,7 @@ def _install_process_hooks() -> None:
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Return whether an error that ends the program, or a thread of it, is the one that was to interrupt it."""
-    lifecycle = current_session().lifecycle
-    if isinstance(error, KeyboardInterrupt) and lifecycle.machine.signals:
-        return True
-    return isinstance(error, ROSInterruptException) and lifecycle.is_shutdown()
+    return current_session().lifecycle.is_interrupt(error)
 
 
 def _wait_for_master(session: Session) -> None:

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import logging
 import signal
-import socket
 import sys
 import threading
-from collections.abc import Callable
-from typing import cast
 
 import pytest
 
-from minirospy.client import signals
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
-from minirospy.client.shutdown import Action, Phase, ShutdownMachine
+from minirospy.client.shutdown import Action, Awareness, Phase, ShutdownMachine
 from minirospy.client.signals import SignalWatchdog
 from minirospy.signal_dispatch import is_dispatching_signal
 
@@ -85,8 +81,12 @@ def test_second_signal_interrupts_a_main_thread_that_ignores_shutdown(
     assert timeline(machine, 0.2, 10.0) == [(2.0, Action.REPORT)]
 
 
-def test_a_main_thread_that_ends_by_itself_is_not_interrupted(machine: ShutdownMachine) -> None:
-    machine.main_ends_by_itself = True
+@pytest.mark.parametrize("awareness", [*list(Awareness)[1:], None])
+def test_a_main_thread_that_ends_by_itself_is_not_interrupted(
+    machine: ShutdownMachine, awareness: Awareness | None
+) -> None:
+    machine.main_has_ended = awareness is None
+    machine.main.awareness = awareness or Awareness.NONE
     machine.signal(0.0)
     machine.phase = Phase.LEFT
     assert timeline(machine, 0.0, 10.0) == [(2.0, Action.REPORT)]
@@ -96,7 +96,7 @@ def test_a_main_thread_that_is_notified_in_time_is_not_interrupted(machine: Shut
     machine.signal(0.0)
     machine.phase = Phase.LEFT
     assert timeline(machine, 0.0, 0.4) == []
-    machine.main_ends_by_itself = True
+    machine.main.awareness = Awareness.NOTIFIED
     assert timeline(machine, 0.5, 1.9) == []
 
 
@@ -109,7 +109,7 @@ def test_a_signal_after_another_shutdown_interrupts_half_a_second_later(machine:
 
 def test_the_second_signal_interrupts_and_the_third_ends(machine: ShutdownMachine) -> None:
     actions = [machine.signal(now) for now in (0.0, 0.1, 0.2, 0.3)]
-    assert actions == [[], [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT], [Action.EXIT], [Action.EXIT]]
+    assert actions == [[], [Action.KEYBOARD_INTERRUPT], [Action.EXIT], [Action.EXIT]]
 
 
 def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachine) -> None:
@@ -243,22 +243,6 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     assert lifecycle.left.is_set()
 
 
-def test_a_signal_while_a_hook_is_added_does_not_lose_the_hook(
-    lifecycle: Lifecycle, watchdog: SignalWatchdog
-) -> None:
-    ran: list[str] = []
-
-    class Interrupted(list[Callable[[], object]]):
-        def append(self, hook: Callable[[], object]) -> None:
-            watchdog._is_nudge = True
-            watchdog._on_signal(signal.SIGINT, None)
-            super().append(hook)
-
-    lifecycle.hooks = Interrupted()
-    lifecycle.add_hook(lambda: ran.append("hook"))
-    assert ran == ["hook"]
-
-
 def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycle) -> None:
     active: list[bool] = []
 
@@ -272,97 +256,9 @@ def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycl
     assert active == [False]
 
 
-class System:
-    """The clock, the file descriptor and the signals of a watchdog that a test runs in its own thread."""
-
-    def __init__(self, watchdog: SignalWatchdog, at: list[float], *, writes: bool, handles: bool) -> None:
-        """``at``: the times of the user's signals. ``writes``: no event loop has taken the file descriptor.
-
-        ``handles``: the main thread is not in C code.
-        """
-        self.now = 0.0
-        self.nudged: list[float] = []
-        self._watchdog = watchdog
-        self._at, self._end = at, at[-1] + 1.0
-        self._writes, self._handles = writes, handles
-        self._timeout: float | None = None
-        self._written = b""
-
-    def install(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(signals, "time", self)
-        monkeypatch.setattr(self._watchdog, "_is_handled", lambda number: number == signal.SIGINT)
-        monkeypatch.setattr(signal, "pthread_kill", self._nudge, raising=False)
-        monkeypatch.setattr(signal, "raise_signal", self._nudge)
-
-    def watch(self) -> None:
-        self._watchdog._watch(cast("socket.socket", self))
-
-    def _nudge(self, *_: object) -> None:
-        self.nudged.append(round(self.now, 3))
-        self._deliver()
-
-    def _deliver(self) -> None:
-        if self._writes:
-            self._written += bytes([signal.SIGINT])
-        if self._handles:
-            self._watchdog._on_signal(signal.SIGINT, None)
-
-    def monotonic(self) -> float:
-        return self.now
-
-    def settimeout(self, timeout: float | None) -> None:
-        self._timeout = timeout
-
-    def recv(self, _: int) -> bytes:
-        if self.now >= self._end:
-            return b""
-
-        if not self._written:
-            self.now = self._at[0] if self._timeout is None else self.now + self._timeout
-        if self._at and self.now >= self._at[0]:
-            self._at.pop(0)
-            self._deliver()
-        written, self._written = self._written, b""
-        if written or self._timeout is None:
-            # The handler writes a zero itself.
-            return written or b"\0"
-        raise TimeoutError
-
-    def __enter__(self) -> System:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-@pytest.mark.parametrize("writes", [True, False])
-def test_a_signal_is_dispatched_fifty_milliseconds_after_it_has_come(
-    lifecycle: Lifecycle, watchdog: SignalWatchdog, monkeypatch: pytest.MonkeyPatch, *, writes: bool
-) -> None:
-    """However long nothing happened before: until then the main thread's next call of rospy dispatches it."""
-    system = System(watchdog, [1000.0], writes=writes, handles=True)
-    system.install(monkeypatch)
-    lifecycle.machine.main_ends_by_itself = True
-    system.watch()
-    assert system.nudged == [pytest.approx(1000.05, abs=0.011)]
-    assert lifecycle.is_shutdown()
-
-
-@pytest.mark.parametrize(
-    ("writes", "handles"), [(True, True), (True, False), (False, True)], ids=["both", "descriptor", "handler"]
-)
-def test_a_nudge_is_not_counted_as_a_signal(
-    lifecycle: Lifecycle,
-    watchdog: SignalWatchdog,
-    monkeypatch: pytest.MonkeyPatch,
-    *,
-    writes: bool,
-    handles: bool,
-) -> None:
-    system = System(watchdog, [1000.0], writes=writes, handles=handles)
-    system.install(monkeypatch)
-    lifecycle.machine.main_ends_by_itself = True
-    for _ in range(3):
-        watchdog._nudge()
-    system.watch()
-    assert lifecycle.machine.signals == 1
+def test_a_nudge_is_no_signal_of_the_users(lifecycle: Lifecycle) -> None:
+    watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: False)
+    watchdog._arrived, watchdog._handled, watchdog._nudges = 5, 3, 4
+    assert watchdog._new_signals() == 1
+    lifecycle.machine.signal(0.0)
+    assert watchdog._new_signals() == 0
