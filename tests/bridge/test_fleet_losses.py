@@ -484,14 +484,14 @@ def test_the_missing_library_is_named(
     from minirospy.cli.fleet import main
 
     def missing(name: str, *_: object) -> object:
-        if name == "zenoh":
+        if name.partition(".")[0] == "zenoh":
             raise ImportError(name=name)
         return found(name)
 
     found = importlib.import_module
     monkeypatch.setattr("minirospy.bridge.fleet.network.importlib.import_module", missing)
     assert main(["status"]) == 1
-    assert "python -m pip install 'minirospy[fleet]'" in capsys.readouterr().err
+    assert "python -m pip install --upgrade 'minirospy[fleet]'" in capsys.readouterr().err
 
 
 def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:
