@@ -88,6 +88,7 @@ def _parser() -> Parser:
         action="append",
         default=[],
         metavar="ENDPOINT",
+        completer="nothing",
         help="the router of --zenoh, as 192.168.1.5 or tcp/robot.local:7447 (this machine's)",
     )
     parser.add_argument(
