@@ -94,7 +94,8 @@ def test_arrow_is_dragged_and_the_marker_follows(served: tuple[Served, Server], 
     # Along the axis only.
     assert events[-1]["place"] == pytest.approx([1, 0, 0.2], abs=0.03)
 
-    # The server has moved it: it is where it was dropped, and can be dragged back.
+    # The server has moved it: a page that comes later shows it where it was dropped, and it can be dragged back.
+    page, metre = opened(served[0], browse)
     drag(page, (1.78 * metre, 0.02 * metre), (0.78 * metre, 0))
     assert served[1].until("up")[-1]["place"] == pytest.approx([0, 0, 0.2], abs=0.03)
 
@@ -144,7 +145,8 @@ def test_button_is_clicked_and_menu_entry_chosen(served: tuple[Served, Server], 
     assert (event["marker"], event["control"], event["entry"]) == ("listed", "", 3)
     assert event["point"] == pytest.approx([-2, 2, 0.2], abs=0.1)
 
-    # The server has set its check box.
+    # The server has set its check box: it is ticked in a page that comes later.
+    page, metre = opened(served[0], browse)
     drag(page, (-2 * metre, -2 * metre), (-2 * metre, -2 * metre))
     page.click(".marker-menu button", "More")
     page.wait_text(".submenu button", "☑Checked")
