@@ -21,7 +21,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
-"""The environment variable with the address of the repository, set by whoever publishes: docs/release.md."""
+"""The environment variable with the address of the repository, set by the publisher: docs/release.md."""
 
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
 

@@ -1,8 +1,8 @@
 """Sessions of the page's doors: operations of a client come in as JSON, answers go out as JSON.
 
-A text is an object that names its operation, ``{"op": NAME, ...}``. Whoever may not carry it out, a text that is too long or
-is no operation, and whatever goes wrong are answered with one line, ``{"error": text}``. Operations are carried out one after
-another in a task of the session. What a client is shown is looked at when something has changed, not all the time.
+A text is an object that names its operation, ``{"op": NAME, ...}``. A client that may not carry it out, a text that is too long
+or is not an operation, and whatever goes wrong are answered with one line, ``{"error": text}``. Operations are carried out one
+after another in a task of the session. What a client is shown is looked at when something has changed, not all the time.
 """
 
 from __future__ import annotations

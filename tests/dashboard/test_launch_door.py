@@ -221,7 +221,7 @@ def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
 
 
 class Run:
-    """A launch that has ended, or is told to."""
+    """A launch that has ended, or is requested to."""
 
     def __init__(self, number: int) -> None:
         self.id = number
