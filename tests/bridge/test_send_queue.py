@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.bridge.web.queue import MOST_ANSWERS, SendQueue
+
+LIMIT = 1_000_000
+"""Bytes of a queue that a test fills."""
 
 
 def drained(queue: SendQueue) -> list[bytes]:
@@ -25,7 +30,7 @@ def test_messages_leave_in_the_order_of_arrival() -> None:
 
 
 def test_full_queue_drops_the_oldest_of_the_same_topic() -> None:
-    queue = SendQueue(limit=10)
+    queue = SendQueue(limit=10, entry_bytes=0)
     queue.put("small", (b"s",))
     for number in range(5):
         queue.put("image", (b"%d..." % number,))
@@ -35,7 +40,7 @@ def test_full_queue_drops_the_oldest_of_the_same_topic() -> None:
 
 
 def test_new_topic_displaces_the_one_that_holds_most() -> None:
-    queue = SendQueue(limit=10)
+    queue = SendQueue(limit=10, entry_bytes=0)
     queue.put("image", (b"11111",))
     queue.put("small", (b"s",))
     queue.put("image", (b"2222",))
@@ -44,7 +49,7 @@ def test_new_topic_displaces_the_one_that_holds_most() -> None:
 
 
 def test_message_larger_than_the_bound_waits_alone() -> None:
-    queue = SendQueue(limit=10)
+    queue = SendQueue(limit=10, entry_bytes=0)
     queue.put("small", (b"s",))
     queue.put("cloud", (bytes(50),))
     queue.put("cloud", (bytes(60),))
@@ -59,7 +64,7 @@ def test_only_the_newest_of_a_topic_waits_where_that_is_wanted() -> None:
 
 
 def test_discarded_topic_leaves_nothing_behind() -> None:
-    queue = SendQueue(limit=10)
+    queue = SendQueue(limit=10, entry_bytes=0)
     for _ in range(4):
         queue.put("a", (b"aaaa",))
     queue.put("b", (b"b",))
@@ -70,7 +75,7 @@ def test_discarded_topic_leaves_nothing_behind() -> None:
 
 
 def test_answers_are_kept_and_their_overrun_is_visible() -> None:
-    queue = SendQueue(limit=10)
+    queue = SendQueue(limit=10, entry_bytes=0)
     piece = bytes(1_000_000)
     while not queue.is_overrun:
         queue.put_answer((piece,))
@@ -78,9 +83,34 @@ def test_answers_are_kept_and_their_overrun_is_visible() -> None:
     assert queue.dropped == 0
 
 
+def test_small_messages_wait_in_no_more_memory_than_large_ones() -> None:
+    tracemalloc.start()
+    try:
+        memory = [filled(size) for size in (1, 100, 10_000)]
+    finally:
+        tracemalloc.stop()
+    assert all(each <= 1.2 * LIMIT for each in memory), memory
+
+
+def filled(size: int) -> int:
+    """Return the memory of a queue that is full of messages of this size."""
+    before, _ = tracemalloc.get_traced_memory()
+    queue = SendQueue(LIMIT)
+    while not queue.dropped:
+        queue.put("a", (bytes(15), bytearray(size)))
+    return tracemalloc.get_traced_memory()[0] - before
+
+
+def test_small_answers_that_nobody_reads_are_an_overrun() -> None:
+    queue = SendQueue()
+    while not queue.is_overrun:
+        queue.put_answer((b"1",))
+    assert len(queue) < MOST_ANSWERS / 300
+
+
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(1, 12)) | st.none()), st.integers(5, 30))
 def test_bound_holds_and_counts_add_up(steps: list[tuple[str, int] | None], limit: int) -> None:
-    queue = SendQueue(limit)
+    queue = SendQueue(limit, entry_bytes=0)
     put = popped = 0
     newest: dict[str, int] = {}
     for number, step in enumerate(steps):
@@ -101,7 +131,7 @@ def test_bound_holds_and_counts_add_up(steps: list[tuple[str, int] | None], limi
 
 
 def test_cleared_queue_holds_nothing() -> None:
-    queue = SendQueue(10)
+    queue = SendQueue(10, entry_bytes=0)
     queue.put("a", (b"12345",))
     queue.put_answer((b"123",))
     queue.clear()

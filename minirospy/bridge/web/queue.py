@@ -2,7 +2,8 @@
 
 Pure. A message waits under a key (its topic or subscription). Where the bound is passed, the key's own oldest message is
 dropped, then the oldest of the key that holds the most bytes; so a camera does not displace what is small. Answers
-(``put_answer``) are never dropped: a client that does not read them is disconnected by the caller.
+(``put_answer``) are never dropped: a client that does not read them is disconnected by the caller. Bytes are those of
+memory: of a message and of its place in the queue, which is larger than a small message.
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ from collections import Counter, OrderedDict, deque
 from collections.abc import Hashable
 from typing import NamedTuple
 
-__all__ = ["DEFAULT_LIMIT", "MOST_ANSWERS", "Piece", "SendQueue"]
+__all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MOST_ANSWERS", "Piece", "SendQueue"]
 
 DEFAULT_LIMIT = 10_000_000
 """Bytes of messages that may wait for a client."""
+
+ENTRY_BYTES = 350
+"""Bytes of memory that an entry takes besides its pieces: measured with Python 3.11 are 340 to 360."""
 
 MOST_ANSWERS = 64_000_000
 """Bytes of answers that may wait for a client which does not read them."""
@@ -23,6 +27,8 @@ Piece = bytes | memoryview | bytearray
 
 
 class _Entry(NamedTuple):
+    """A message or, with the key None, an answer; ``size``: of its pieces, and of itself."""
+
     key: Hashable | None
     pieces: tuple[Piece, ...]
     size: int
@@ -41,13 +47,13 @@ class _Waiting:
 class SendQueue:
     """The queue of one client, in the order of arrival."""
 
-    def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
-        """``limit``: bytes of messages; a single message may be larger, and then waits alone."""
+    def __init__(self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES) -> None:
+        """``limit``: bytes of messages, each with ``entry_bytes``; a single one may be larger, and then waits alone."""
         self.limit = limit
         self.size = 0
-        """Bytes of the messages that wait."""
+        """Bytes of the messages that wait, and of their entries."""
         self.answers = 0
-        """Bytes of the answers that wait."""
+        """The same of the answers."""
         self.sent = 0
         """Messages that were popped."""
         self.sent_bytes = 0
@@ -55,6 +61,7 @@ class SendQueue:
         """How many messages gave way to newer ones."""
         self.dropped_of: Counter[Hashable] = Counter()
         """The same by key, of the keys that are in use."""
+        self._entry_bytes = entry_bytes
         self._number = 0
         self._entries: OrderedDict[int, _Entry] = OrderedDict()
         self._waiting: dict[Hashable, _Waiting] = {}
@@ -70,7 +77,7 @@ class SendQueue:
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
         """Append a message; older ones are dropped where the bound is passed, with ``newest_only`` all of its key."""
-        size = sum(map(len, pieces))
+        size = sum(map(len, pieces)) + self._entry_bytes
         waiting = self._waiting.get(key)
         if waiting is None:
             waiting = self._waiting[key] = _Waiting()
@@ -89,7 +96,7 @@ class SendQueue:
 
     def put_answer(self, pieces: tuple[Piece, ...]) -> None:
         """Append what is never dropped."""
-        size = sum(map(len, pieces))
+        size = sum(map(len, pieces)) + self._entry_bytes
         self._number += 1
         self._entries[self._number] = _Entry(None, pieces, size)
         self.answers += size
@@ -106,7 +113,7 @@ class SendQueue:
         waiting.numbers.popleft()
         self._shrunk(entry.key, waiting, entry.size)
         self.sent += 1
-        self.sent_bytes += entry.size
+        self.sent_bytes += entry.size - self._entry_bytes
         return entry.pieces
 
     def discard(self, key: Hashable) -> None:
