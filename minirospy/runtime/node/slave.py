@@ -181,14 +181,15 @@ class SlaveApi:
         topic = names.resolve(topic, self._node.name)
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
-        offered = protocols if isinstance(protocols, list) else []
         host, port = self._node.environment.host, self._node.tcpros_port
         name = self._node.unix_name
-        if name and [PROTOCOL, self._node.this_host] in offered:
+        if name and isinstance(protocols, list) and [PROTOCOL, self._node.this_host] in protocols:
             return [SUCCESS, f"ready on {name}", [PROTOCOL, name, host, port]]
-        if not any(isinstance(entry, list) and entry[:1] == ["TCPROS"] for entry in offered):
-            return [FAILURE, "no supported protocol implementations", []]
-        return [SUCCESS, f"ready on {host}:{port}", ["TCPROS", host, port]]
+        return _refusal_before_tcpros(protocols) or [
+            SUCCESS,
+            f"ready on {host}:{port}",
+            ["TCPROS", host, port],
+        ]
 
     def shutdown(self, caller_id: str, reason: str = "") -> Answer:
         """Stop the node.
@@ -201,6 +202,27 @@ class SlaveApi:
             return [ERROR, f"this is {self._node.name}", 0]
         self._node.request_shutdown(f"external shutdown request from [{caller_id}]: [{reason}]")
         return [SUCCESS, "shutdown", 0]
+
+
+def _refusal_before_tcpros(protocols: object) -> Answer | None:
+    """Return rospy's answer to a list without TCPROS, or with an entry before it that is not a protocol; None for others."""
+    if not isinstance(protocols, (list, dict, str)):
+        kind = type(protocols).__name__
+        return [ERROR, f"Error: invalid arguments: {kind!r} object is not iterable", []]
+
+    for entry in protocols:
+        if not isinstance(entry, (list, dict, str)):
+            kind = type(entry).__name__
+            return [ERROR, f"Error: invalid arguments: {kind!r} object is not subscriptable", []]
+        if isinstance(entry, dict):
+            # Keys of XML-RPC are texts: none is rospy's number 0.
+            return [FAILURE, "Internal failure: 0", []]
+        if not entry:
+            kind = "list" if isinstance(entry, list) else "string"
+            return [FAILURE, f"Internal failure: {kind} index out of range", []]
+        if entry[0] == "TCPROS":
+            return None
+    return [FAILURE, "no supported protocol implementations", []]
 
 
 def _connection_text(link: InLink | OutLink, port: int) -> str:

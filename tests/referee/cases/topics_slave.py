@@ -57,3 +57,9 @@ outcome("paramUpdate, number as key", lambda: node.paramUpdate("/me", 3, 1))
 outcome("publisherUpdate, no URL", lambda: node.publisherUpdate("/me", "/topic", ["x"]))
 outcome("publisherUpdate, no list", lambda: node.publisherUpdate("/me", "/topic", 3))
 outcome("requestTopic, relative name", lambda: node.requestTopic("/me", "topic", [["TCPROS"]])[0])
+
+PROTOCOLS = ([3], [[]], ["TCPROS"], ["x"], [""], [{}], [["x"], 3], [["x"]], [], "x", "TCPROS", {"a": 1}, 3,
+             [["TCPROS"], 3], [True], [1.5], [["x"], []])  # fmt: skip
+for protocols in PROTOCOLS:
+    outcome(f"requestTopic, {protocols!r}", lambda: node.requestTopic("/me", "/topic", protocols)[:2])
+outcome("requestTopic of another topic", lambda: node.requestTopic("/me", "/nobody", [3]))
