@@ -54,14 +54,14 @@ def canonicalize(name: str) -> str:
     """Return ``name`` without doubled or trailing slashes."""
     if not name or name == "/":
         return name
-    return ("/" if name.startswith("/") else "") + "/".join(part for part in name.split("/") if part)
+    return ("/" if name[0] == "/" else "") + "/".join(part for part in name.split("/") if part)
 
 
 def namespace_of(name: str) -> str:
     """Return the namespace that contains ``name``, with a slash at its end: ``/a/b`` -> ``/a/``."""
     if not name:
         return "/"
-    stem = name.rstrip("/")
+    stem = name.removesuffix("/")
     return (stem[: stem.rfind("/") + 1] or "/") if "/" in stem else "/"
 
 
@@ -78,16 +78,15 @@ def join(namespace: str, name: str) -> str:
 
 def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
     """Return the global name of ``name`` as the node ``node_name`` (global) sees it, remapped."""
-    namespace = namespace_of(node_name)
     if not name:
-        return namespace
+        return namespace_of(node_name)
     name = canonicalize(name)
     if is_global(name):
         resolved = name
     elif is_private(name):
         resolved = canonicalize(node_name + "/" + name[1:])
     else:
-        resolved = namespace + name
+        resolved = namespace_of(node_name) + name
     return remappings.get(resolved, resolved) if remappings else resolved
 
 

@@ -28,12 +28,12 @@ def isstring(s: object) -> bool:
 
 def is_global(name: str | None) -> bool | str | None:
     """Return whether a name starts at the root; None and an empty name as they are."""
-    return name and name[:1] == SEP
+    return name and name[0] == SEP
 
 
 def is_private(name: str | None) -> bool | str | None:
     """Return whether a name starts with ``~``; None and an empty name as they are."""
-    return name and name[:1] == PRIV_NAME
+    return name and name[0] == PRIV_NAME
 
 
 def namespace(name: str) -> str:
@@ -47,12 +47,14 @@ def namespace(name: str) -> str:
 
 def ns_join(ns: str | None, name: str) -> str:
     """Return a name below a namespace; global and private names stay what they are."""
-    return names.join(ns, name) if ns else name
+    if is_private(name) or is_global(name) or not ns:
+        return name
+    return ns + name if ns == PRIV_NAME or ns[-1] == SEP else ns + SEP + name
 
 
 def canonicalize_name(name: str) -> str:
     """Return a name without doubled or trailing slashes; None and an empty name as they are."""
-    return names.canonicalize(name) if name else name
+    return names.canonicalize(name)
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
@@ -72,4 +74,4 @@ def make_global_ns(name: str) -> str:
     if is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
     name = name if is_global(name) else SEP + name
-    return name if name.endswith(SEP) else name + SEP
+    return name if name[-1] == SEP else name + SEP

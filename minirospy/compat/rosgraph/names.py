@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from minirospy import names as _names
 from minirospy.compat.ros_names import (
+    canonicalize_name,
     get_ros_namespace,
     is_global,
     is_private,
@@ -56,6 +57,7 @@ def is_legal_base_name(name: str | None) -> bool:
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
     """Return the global name of ``name`` as the node ``namespace_`` sees it, remapped."""
+    name = canonicalize_name(name)
     if not is_global(name) and not is_private(name):
         # Refuses what is not a name.
         namespace(namespace_)

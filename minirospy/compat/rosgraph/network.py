@@ -127,8 +127,8 @@ def _as_bytes(text: object) -> bytes:
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """Return the fields of a connection header, its length in front. Raises ROSHandshakeException."""
-    size = parse_length(header_str)
+    """Return the fields of a connection header, its length in front. Raises ROSHandshakeException, struct.error."""
+    (size,) = struct.unpack("<I", header_str[:LENGTH_BYTES])
     body = header_str[LENGTH_BYTES : LENGTH_BYTES + size]
     if len(body) < size:
         raise ROSHandshakeException(

@@ -3,22 +3,22 @@
 import genmsg.msgs
 import genpy.message
 import rosgraph.names as names
+import rosgraph.network as network
 import roslib.names
 import rospy.names
 from referee import show
 
-VALUES = (None, "", "a", "/a", "~a", "a b", "-a:=b", "~a:=b", 5, b"/a")
+VALUES = (None, "", "a", "/a", "~a", "a b", "-a:=b", "~a:=b", 5, b"/a", ["a"], {"a": 1}, ())
 
 
 def result(function, *arguments):
     """Return what a call gives, or the type of what it raises; what is false is False."""
     try:
         return repr(function(*arguments) or False)
-    except (TypeError, AttributeError):
-        # Which of the two depends on the first thing that is tried with the argument.
-        return "wrong type"
-    except Exception as error:  # noqa: BLE001 - whatever it is
+    except ValueError as error:
         return f"{type(error).__name__} {error}"
+    except Exception as error:  # noqa: BLE001 - whatever it is
+        return type(error).__name__
 
 
 for function in (
@@ -26,13 +26,16 @@ for function in (
     names.namespace, names.canonicalize_name, names.make_global_ns, names.make_caller_id, rospy.names.is_global,
     rospy.names.is_private, rospy.names.namespace, rospy.names.canonicalize_name, rospy.names.make_global_ns,
     roslib.names.resource_name_base, roslib.names.resource_name_package, roslib.names.package_resource_name,
-    roslib.names.is_legal_resource_name, roslib.names.is_legal_resource_base_name, genmsg.msgs.is_valid_msg_field_name,
-    genmsg.msgs.is_valid_msg_type, genmsg.msgs.is_builtin, genmsg.msgs.is_header_type, genmsg.msgs.bare_msg_type,
-    genpy.message.isstring, genpy.message.is_simple,
+    roslib.names.is_legal_resource_name, roslib.names.is_legal_resource_base_name,
 ):  # fmt: skip
     show(function.__name__, *(result(function, value) for value in VALUES))
-for namespace in (None, "", "/", "/ns", "ns"):
-    for value in (None, "", "a", "/a", "~a"):
+for function in (
+    genmsg.msgs.is_valid_msg_field_name, genmsg.msgs.is_valid_msg_type, genmsg.msgs.is_builtin,
+    genmsg.msgs.is_header_type, genmsg.msgs.bare_msg_type, genpy.message.isstring, genpy.message.is_simple,
+):  # fmt: skip
+    show(function.__name__, *(result(function, value) for value in VALUES[:10]))
+for namespace in (None, "", "/", "/ns", "ns", "ns//", "~", 5):
+    for value in (None, "", "a", "/a", "~a", 5, ["a"], {"a": 1}):
         show(
             repr(namespace),
             repr(value),
@@ -44,3 +47,5 @@ for namespace in (None, "", "/", "/ns", "ns"):
         )
 show(sorted(names.load_mappings(["a:=b", "~p:=1", "_q:=2", "__name:=n", "-x:=y", "/c:=d", "e"]).items()))
 show(names.anonymous_name("a") == names.anonymous_name("a"))
+for value in (None, b"", b"a", b"\0\0\0\0", b"\5\0\0\0", "abcd", (), []):
+    show(repr(value), result(network.decode_ros_handshake_header, value))
