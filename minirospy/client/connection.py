@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from minirospy.runtime.node.slave import connection_text
+
 if TYPE_CHECKING:
     from minirospy.runtime.node.topics import InLink
     from minirospy.runtime.transport.links import OutLink
@@ -37,6 +39,10 @@ class Connection(NamedTuple):
     md5sum: str | None = None
     is_latched: bool = False
     done: bool = False
+
+    def get_transport_info(self) -> str:
+        """Return the text of the Slave API's getBusInfo."""
+        return connection_text(self.link)
 
     def close(self) -> None:
         """End the link. A subscriber makes it again as long as the publisher is registered."""

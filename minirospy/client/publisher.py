@@ -259,6 +259,13 @@ class PublishedTopic(SharedTopic):
         """The links to subscribers."""
         return [connection_to_subscriber(link, self.resolved_name) for link in self.publication.links]
 
+    def get_stats(self) -> tuple[str, int, list[tuple[object, ...]]]:
+        """Return the row of the Slave API's getBusStats."""
+        rows: list[tuple[object, ...]] = [
+            (c.id, c.stat_bytes, c.stat_num_msg, not c.done) for c in self.connections
+        ]
+        return self.resolved_name, self.publication.sent_bytes, rows
+
     def get_num_connections(self) -> int:
         """Return how many links there are."""
         return len(self.publication.links)

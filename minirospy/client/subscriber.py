@@ -164,6 +164,12 @@ class SubscribedTopic(SharedTopic):
         """The links to publishers, as rospy shows them."""
         return [connection_to_publisher(link, self.resolved_name) for link in self.links]
 
+    def get_stats(self) -> tuple[str, list[tuple[object, ...]]]:
+        """Return the row of the Slave API's getBusStats."""
+        return self.resolved_name, [
+            (c.id, c.stat_bytes, c.stat_num_msg, -1, not c.done) for c in self.connections
+        ]
+
     def get_num_connections(self) -> int:
         """Return how many links there are."""
         return len(self.links)

@@ -107,6 +107,14 @@ class SharedTopic:
         """The links to the other ends, as rospy shows them."""
         raise NotImplementedError
 
+    def get_stats_info(self) -> list[tuple[object, ...]]:
+        """Return the rows of the Slave API's getBusInfo."""
+        name = self.resolved_name
+        return [
+            (c.id, c.endpoint_id, c.direction, c.transport_type, name, True, c.get_transport_info())
+            for c in self.connections
+        ]
+
     def leave(self, handle: Any) -> None:
         """One handle less; the last ends the topic."""
         raise NotImplementedError

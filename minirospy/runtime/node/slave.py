@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from minirospy.runtime.node.topics import InLink, Publication, Subscription
     from minirospy.runtime.transport.links import OutLink
 
-__all__ = ["SlaveApi"]
+__all__ = ["SlaveApi", "connection_text"]
 
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 """What masters write, rosmaster and ours."""
@@ -107,7 +107,7 @@ class SlaveApi:
         publications = [
             [
                 publication.topic,
-                sum(link.sent_bytes for link in publication.links),
+                publication.sent_bytes,
                 [[link.number, link.sent_bytes, link.sent, True] for link in publication.links],
             ]
             for publication in list(self._node.publications.values())
@@ -125,14 +125,13 @@ class SlaveApi:
     def get_bus_info(self, caller_id: str) -> Answer:
         """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
         rows: list[list[object]] = []
-        port = self._node.tcpros_port
         for publication in list(self._node.publications.values()):
             for out in publication.links:
-                what = _connection_text(out, port)
+                what = connection_text(out)
                 rows.append([out.number, out.peer, "o", out.transport, publication.topic, True, what])
         for subscription in list(self._node.subscriptions.values()):
             for link in subscription.links:
-                what = _connection_text(link, link.local_port)
+                what = connection_text(link)
                 rows.append([link.number, link.uri, "i", link.transport, subscription.topic, True, what])
         return [SUCCESS, "bus info", rows]
 
@@ -225,7 +224,7 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
     return [FAILURE, "no supported protocol implementations", []]
 
 
-def _connection_text(link: InLink | OutLink, port: int) -> str:
+def connection_text(link: InLink | OutLink) -> str:
     """Return a connection's text, of which `rosnode info` shows the numbers; none of a Unix socket, without a port."""
-    on = f" on port {port}" if link.transport == "TCPROS" else ""
+    on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

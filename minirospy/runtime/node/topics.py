@@ -96,6 +96,8 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
+        self.sent_bytes = 0
+        """Of the messages that had a subscriber, each once, with their lengths."""
         self.expected = 0
         """How many subscribers the master knew when this was registered."""
         self._on_link = on_link
@@ -116,6 +118,8 @@ class Publication:
                 links = self.links
         else:
             links = self.links
+        if links:
+            self.sent_bytes += len(frame) if isinstance(frame, bytes) else 4 + frame.size
         for link in links:
             link.send(frame)
         if self.queue_size is None:
@@ -441,9 +445,11 @@ class Subscription:
         except BaseException:
             sock.close()
             raise
+        # As rospy, whose count includes the header that it sends.
+        link = InLink(uri, address, sock, header, received_bytes=len(serialize_header(fields)))
         # Third-party nodes leave the topic out; user code reads it.
         header.setdefault("topic", self.topic)
-        return InLink(uri, address, sock, header)
+        return link
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
         """Return a socket that is connected to the publisher which gave this answer, and its address."""
@@ -462,7 +468,7 @@ class Subscription:
 
         def on_frame(frame: Frame) -> None:
             link.received += 1
-            link.received_bytes += len(frame)
+            link.received_bytes += 4 + len(frame)
             deliver(frame, header)
 
         def on_latched_frame(frame: Frame) -> None:

@@ -52,9 +52,10 @@ class OutLink:
     ) -> None:
         self.peer = peer
         self.address = "unknown"
+        self.local_port = 0
         self.transport = "TCPROS"
         self.queue_size = queue_size
-        self.sent_bytes = 0
+        self.sent_bytes = len(header)
         self.sent = 0
         self.dropped = 0
 
@@ -65,7 +66,8 @@ class OutLink:
             with contextlib.suppress(OSError):
                 host, port = sock.getpeername()[:2]
                 self.address = f"{host}:{port}"
-                self._is_same_host = host == sock.getsockname()[0]
+                own_host, self.local_port = sock.getsockname()[:2]
+                self._is_same_host = host == own_host
 
         self._sock = sock
         self._loop = loop

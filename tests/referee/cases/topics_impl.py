@@ -1,9 +1,14 @@
 """What programs do with the `impl` of a Publisher and a Subscriber: rosbridge and Jupyter's widgets among them."""
 
+import os
+import re
+
 import rospy
 from referee import eventually, outcome, show
-from std_msgs.msg import Int32
+from std_msgs.msg import Int32, String
 
+# Of ours: as ROS 1 and no more.
+os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[], disable_rosout=True)
 got = []
 
@@ -96,3 +101,26 @@ for topic in (met, meeting):
     show(connection.endpoint_id in (rospy.get_name(), rospy.get_node_uri()), isinstance(connection.id, int))
     show(connection.type, connection.md5sum, connection.is_latched, connection.done, connection.stat_num_msg)
     show(sorted(connection.header) if connection.header else None)
+
+# Statistics, as getBusStats and getBusInfo have them. The socket of the subscriber's end may be unknown in the real one.
+counted = rospy.Publisher("/counted", String, queue_size=5)
+readers = rospy.Subscriber("/counted", String, seen.append)
+show(eventually(lambda: counted.impl.connections and readers.impl.connections))
+del seen[:]
+for number in range(3):
+    counted.publish(str(number))
+    show(eventually(lambda: len(seen) == number + 1))
+name, sent, (row,) = counted.impl.get_stats()
+show(name, sent, row[1:], type(row).__name__)
+name, (row,) = readers.impl.get_stats()
+show(name, row[1:], type(row).__name__)
+for topic in (counted, readers):
+    (row,) = topic.impl.get_stats_info()
+    (connection,) = topic.impl.connections
+    text = connection.get_transport_info()
+    show(
+        row[1:6],
+        row[6] == text,
+        row[0] == connection.id,
+        re.sub(r"\d+|None", "N", text).replace("localhost", "N.N.N.N"),
+    )
