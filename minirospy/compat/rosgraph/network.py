@@ -112,8 +112,12 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
-    """Return a connection header's bytes, its length in front; names and values are str or bytes. Raises TypeError."""
-    fields = [_as_bytes(name) + b"=" + _as_bytes(value) for name, value in header.items()]
+    """Return a connection header's bytes, its length in front, fields sorted; names and values are str or bytes.
+
+    Raises TypeError.
+    """
+    pairs = sorted((_as_bytes(name), _as_bytes(value)) for name, value in header.items())
+    fields = [name + b"=" + value for name, value in pairs]
     body = b"".join(struct.pack("<I", len(field)) + field for field in fields)
     return struct.pack("<I", len(body)) + body
 

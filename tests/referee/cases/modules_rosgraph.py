@@ -56,7 +56,7 @@ for name in ("a\n", "a/b", "a//b", "1a", "", "/", "~a", "a b"):
 
 show("# headers")
 outcome("encode", lambda: network.encode_ros_handshake_header({"a": "b", "c": "d=e"}))
-for odd in ({"c": b"d"}, {b"c": "\xe4"}, {"a": b"\xff"}):
+for odd in ({"c": b"d"}, {b"c": "\xe4"}, {"a": b"\xff"}, {"b": "1", b"a": b"2", "B": "3"}):
     outcome(f"encode {odd}", lambda odd=odd: network.encode_ros_handshake_header(odd))
 for odd in ({"a": None}, {"a": 3}, {3: "a"}):
     try:
