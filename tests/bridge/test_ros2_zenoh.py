@@ -6,8 +6,9 @@ import importlib.metadata
 import json
 import queue
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +17,8 @@ from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import Ros2End
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.bridge.ros2.zenoh_keys import attachment, gid_of, parse_token
+from minirospy.bridge.ros2.zenoh_calls import MOST_UNDER_WAY, ZenohClient, ZenohServer
+from minirospy.bridge.ros2.zenoh_keys import Entity, Kind, attachment, gid_of, parse_token
 from minirospy.bridge.ros2.zenoh_node import ZenohNode
 from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
@@ -25,6 +27,7 @@ from minirospy.errors import BridgeError
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_zenoh_keys import SERVICE_HASHES, STRING_HASH
 from tests.conftest import free_port
+from tests.waiting import wait_until
 
 zenoh: Any = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
@@ -116,15 +119,6 @@ def numbered(sample: Any) -> tuple[int, bytes]:
     return int.from_bytes(data[:8], "little"), data[17:]
 
 
-def until(condition: Callable[[], object]) -> None:
-    pause = threading.Event()
-    for _ in range(int(LIMIT / 0.02)):
-        if condition():
-            return
-        pause.wait(0.02)
-    raise AssertionError("this does not happen")
-
-
 # --- topics
 
 
@@ -132,24 +126,26 @@ def test_the_graph_is_that_of_the_tokens(node: RmwNode, side: ZenohSide) -> None
     node.end(1, "MP", CHATTER, "2:1:,1:,:,:,,")
     leaving = node.end(2, "MS", CHATTER)
     node.end(3, "SS", SWITCH)
-    until(lambda: side.services() and side.ends("/chatter").subscribers and side.ends("/chatter").publishers)
+    wait_until(
+        lambda: side.services() and side.ends("/chatter").subscribers and side.ends("/chatter").publishers
+    )
     assert side.nodes() == [("peer", "/")]
     assert side.topics() == {"/chatter": ("std_msgs/String",)}
     assert side.services() == {"/switch": "std_srvs/SetBool"}
     assert side.ends("/chatter").publishers == (Ros2End("peer", "std_msgs/String", False, True),)
     assert side.ends("/chatter").subscribers == (Ros2End("peer", "std_msgs/String"),)
     leaving.undeclare()
-    until(lambda: not side.ends("/chatter").subscribers)
+    wait_until(lambda: not side.ends("/chatter").subscribers)
     node.session.close()
-    until(lambda: not side.nodes() and not side.topics())
+    wait_until(lambda: not side.nodes() and not side.topics())
 
 
 def test_messages_for_ros2_have_the_key_and_attachment_of_rmw_zenoh(node: RmwNode, side: ZenohSide) -> None:
     came = node.subscribe(CHATTER)
     node.end(1, "MS", CHATTER)
-    until(lambda: side.ends("/chatter").subscribers)
+    wait_until(lambda: side.ends("/chatter").subscribers)
     publisher = side.publisher("/chatter", "std_msgs/String", depth=7, is_latched=False)
-    until(lambda: publisher.subscribers == 1)
+    wait_until(lambda: publisher.subscribers == 1)
     publisher.publish(HELLO)
     publisher.publish(HELLO)
 
@@ -162,26 +158,26 @@ def test_messages_for_ros2_have_the_key_and_attachment_of_rmw_zenoh(node: RmwNod
         assert sample.payload.to_bytes() == HELLO
         assert numbered(sample) == (number, gid_of(token))
     publisher.close()
-    until(lambda: not any("/MP/" in each for each in node.tokens()))
+    wait_until(lambda: not any("/MP/" in each for each in node.tokens()))
 
 
 def test_messages_of_ros2_come_but_not_those_of_the_bridge(node: RmwNode, side: ZenohSide) -> None:
     came: queue.Queue[bytes] = queue.Queue()
     node.end(1, "MP", CHATTER)
-    until(lambda: side.ends("/chatter").publishers)
+    wait_until(lambda: side.ends("/chatter").publishers)
     subscription = side.subscribe(
         "/chatter", "std_msgs/String", came.put, depth=7, is_reliable=False, is_latched=False
     )
-    until(lambda: any("/MS/" in each and "/2::,7:" in each for each in node.tokens()))
+    wait_until(lambda: any("/MS/" in each and "/2::,7:" in each for each in node.tokens()))
     own = side.publisher("/chatter", "std_msgs/String", depth=7, is_latched=False)
     own.publish(b"own")
     publisher = node.session.declare_publisher(CHATTER)
-    until(lambda: publisher.matching_status.matching)
+    wait_until(lambda: publisher.matching_status.matching)
     publisher.put(HELLO)
     assert came.get(timeout=LIMIT) == HELLO
     subscription.close()
     subscription.close()
-    until(lambda: not publisher.matching_status.matching)
+    wait_until(lambda: not publisher.matching_status.matching)
 
 
 def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: ZenohSide) -> None:
@@ -226,7 +222,7 @@ def test_what_ros2_has_kept_comes_to_a_latched_subscription(node: RmwNode, side:
 def test_another_definition_is_refused_with_both_hashes(node: RmwNode, side: ZenohSide) -> None:
     other = "RIHS01_" + "0" * 64
     node.end(1, "MS", CHATTER.replace(STRING_HASH, other))
-    until(lambda: side.ends("/chatter").subscribers)
+    wait_until(lambda: side.ends("/chatter").subscribers)
     for refused in (
         lambda: side.fields("std_msgs/String"),
         lambda: side.publisher("/chatter", "std_msgs/String", depth=1, is_latched=False),
@@ -236,7 +232,7 @@ def test_another_definition_is_refused_with_both_hashes(node: RmwNode, side: Zen
         ):
             refused()
     node.end(2, "MP", CHATTER)
-    until(lambda: side.ends("/chatter").publishers)
+    wait_until(lambda: side.ends("/chatter").publishers)
     assert side.fields("std_msgs/String") == {"data": "string"}
 
 
@@ -244,15 +240,15 @@ def test_keys_of_humble_have_no_hash(node: RmwNode, side: ZenohSide) -> None:
     key = "0/echo/sensor_msgs::msg::dds_::Range_/TypeHashNotSupported"
     came = node.subscribe(key)
     node.end(1, "MS", key)
-    until(lambda: side.ends("/echo").subscribers)
+    wait_until(lambda: side.ends("/echo").subscribers)
     assert "variance" not in side.fields("sensor_msgs/Range")
     publisher = side.publisher("/echo", "sensor_msgs/Range", depth=1, is_latched=False)
-    until(lambda: publisher.subscribers)
+    wait_until(lambda: publisher.subscribers)
     publisher.publish(HELLO)
     assert str(came.get(timeout=LIMIT).key_expr) == key
     # A type that no end has yet.
     side.serve("/switch", "std_srvs/SetBool", lambda _: Future())
-    until(lambda: any("dds_::SetBool_/TypeHashNotSupported" in each for each in node.tokens()))
+    wait_until(lambda: any("dds_::SetBool_/TypeHashNotSupported" in each for each in node.tokens()))
 
 
 # --- services
@@ -273,7 +269,7 @@ def test_calls_reach_a_server_of_ros2(node: RmwNode, side: ZenohSide) -> None:
     assert not client.is_ready
     node.kept.append(node.session.declare_queryable(SWITCH, answer, complete=True))
     node.end(1, "SS", SWITCH)
-    until(lambda: client.is_ready)
+    wait_until(lambda: client.is_ready)
     assert client.call(b"one").result(LIMIT) == b"answer one"
     assert client.call(b"two").result(LIMIT) == b"answer two"
     (token,) = [each for each in node.tokens() if "/SC/" in each]
@@ -283,7 +279,7 @@ def test_calls_reach_a_server_of_ros2(node: RmwNode, side: ZenohSide) -> None:
     with pytest.raises(BridgeError, match="has ended without a response"):
         client.call(b"drop").result(LIMIT)
     client.close()
-    until(lambda: not any("/SC/" in each for each in node.tokens()))
+    wait_until(lambda: not any("/SC/" in each for each in node.tokens()))
 
 
 def called(node: RmwNode, key: str, request: bytes, attachment: bytes | None) -> Any:
@@ -309,7 +305,7 @@ def test_calls_of_ros2_are_answered_with_their_attachment(node: RmwNode, side: Z
         return answered
 
     server = side.serve("/switch", "std_srvs/SetBool", answer)
-    until(lambda: any("/SS/" in each for each in node.tokens()))
+    wait_until(lambda: any("/SS/" in each for each in node.tokens()))
     sent = attachment(5, 77, GID)
     sample = called(node, SWITCH, b"one", sent).ok
     assert sample.payload.to_bytes() == b"answer one"
@@ -322,7 +318,7 @@ def test_calls_of_ros2_are_answered_with_their_attachment(node: RmwNode, side: Z
     refused = called(node, SWITCH, b"one", None).err.payload.to_bytes()
     assert refused == b"this is not a request of rmw_zenoh, or too large"
     server.close()
-    until(lambda: not any("/SS/" in each for each in node.tokens()))
+    wait_until(lambda: not any("/SS/" in each for each in node.tokens()))
 
 
 def test_a_call_that_fails_without_place_for_the_reason_is_an_error(node: RmwNode, side: ZenohSide) -> None:
@@ -330,8 +326,102 @@ def test_a_call_that_fails_without_place_for_the_reason_is_an_error(node: RmwNod
     failed: Future[bytes] = Future()
     failed.set_exception(BridgeError("it has ended"))
     side.serve("/clear", "std_srvs/Empty", lambda _: failed)
-    until(lambda: any("/SS/" in each for each in node.tokens()))
+    wait_until(lambda: any("/SS/" in each for each in node.tokens()))
     assert called(node, key, b"", attachment(1, 1, GID)).err.payload.to_bytes() == b"it has ended"
+
+
+# --- a network that is slow: here a session whose methods wait
+
+
+class SlowNode:
+    """A node whose session sends nothing before ``released``; ``threads`` are those that wait."""
+
+    def __init__(self) -> None:
+        self.released = threading.Event()
+        self.threads: queue.Queue[threading.Thread] = queue.Queue()
+        self.deliver: Any = None
+        self.zenoh = zenoh
+        token = SimpleNamespace(undeclare=lambda: None)
+        self.session = SimpleNamespace(
+            liveliness=lambda: SimpleNamespace(declare_token=lambda _: token),
+            declare_queryable=self.declare_queryable,
+            get=self.wait,
+        )
+
+    def declare_queryable(self, _: str, handler: Any, **__: object) -> Any:
+        self.deliver = handler
+        return SimpleNamespace(undeclare=lambda: None)
+
+    def handler(self, function: Any, _: object = None) -> Any:
+        return function
+
+    def wait(self, *_: object, **__: object) -> None:
+        self.threads.put(threading.current_thread())
+        assert self.released.wait(LIMIT)
+
+
+def end_of(kind: Kind) -> Entity:
+    return Entity("0", "f00", 1, kind, "bridge", "/", "/clear", "std_srvs/srv/Empty", "RIHS01_00")
+
+
+def test_the_caller_does_not_wait_for_a_slow_network() -> None:
+    node: Any = SlowNode()
+    node.released.set()
+    client = ZenohClient(node, end_of(Kind.CLIENT))
+    client.call(b"one")
+    assert node.threads.get(timeout=LIMIT) is not threading.current_thread()
+    client.close()
+    with pytest.raises(BridgeError, match=r"no longer calls service \[/clear\]"):
+        client.call(b"two").result(LIMIT)
+
+
+def test_responses_that_wait_for_a_slow_network_count_as_under_way() -> None:
+    node: Any = SlowNode()
+    refused: queue.Queue[bytes] = queue.Queue()
+    answered: Future[bytes] = Future()
+    answered.set_result(b"")
+
+    def query() -> Any:
+        sent = SimpleNamespace(to_bytes=lambda: attachment(1, 1, GID))
+        return SimpleNamespace(payload=Payload(), attachment=sent, reply=node.wait, reply_err=refused.put,
+                               drop=lambda: None)  # fmt: skip
+
+    server = ZenohServer(node, end_of(Kind.SERVICE), {}, lambda _: answered)
+    for _ in range(MOST_UNDER_WAY):
+        node.deliver(query())
+    assert refused.empty()
+    node.deliver(query())
+    assert refused.get(timeout=LIMIT) == b"the bridge is answering 200 other requests"
+
+    node.released.set()
+    for _ in range(MOST_UNDER_WAY):
+        node.threads.get(timeout=LIMIT)
+    server.close()
+
+
+def test_a_request_is_refused_once_the_loop_has_ended() -> None:
+    node: Any = SlowNode()
+    refused: queue.Queue[bytes] = queue.Queue()
+
+    def answer(_: bytes) -> Future[bytes]:
+        raise RuntimeError("Event loop is closed")
+
+    server = ZenohServer(node, end_of(Kind.SERVICE), {}, answer)
+    sent = SimpleNamespace(to_bytes=lambda: attachment(1, 1, GID))
+    for _ in range(MOST_UNDER_WAY + 1):
+        node.deliver(
+            SimpleNamespace(payload=Payload(), attachment=sent, reply_err=refused.put, drop=lambda: None)
+        )
+        assert refused.get(timeout=LIMIT) == b"the bridge has ended"
+    server.close()
+
+
+class Payload:
+    def __len__(self) -> int:
+        return 0
+
+    def to_bytes(self) -> bytes:
+        return b""
 
 
 # --- what goes wrong

@@ -26,12 +26,13 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.zenoh_keys import Entity
     from minirospy.bridge.zenoh_library import Query, Reply
 
-__all__ = ["ZenohClient", "ZenohServer"]
+__all__ = ["MOST_UNDER_WAY", "ZenohClient", "ZenohServer"]
 
 _log = logging.getLogger(__name__)
 
 MOST_BYTES = 64 << 20
-_MOST_UNDER_WAY = 200
+MOST_UNDER_WAY = 200
+"""Requests of a service whose responses are not written yet."""
 _LONGEST_SECONDS = 10_000_000
 """The bridge has time limits of its own; those of Zenoh would end a goal that takes long."""
 
@@ -42,6 +43,8 @@ class ZenohClient:
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
+        # A request blocks where the network is slow, for seconds: the caller is the loop.
+        self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
     @property
@@ -69,23 +72,34 @@ class ZenohClient:
             _fail(answered, f"service [{name}] of ROS 2 has ended without a response")
 
         library = self._node.zenoh
+        attachment = self._handle.attachment()
+
+        def send() -> None:
+            if answered.cancelled():
+                return
+            try:
+                self._node.session.get(
+                    self._end.key,
+                    self._node.handler(arrived, ended),
+                    payload=request,
+                    attachment=attachment,
+                    target=library.QueryTarget.ALL_COMPLETE,
+                    consolidation=library.ConsolidationMode.NONE,
+                    timeout=_LONGEST_SECONDS,
+                )
+            except library.ZError as error:
+                _fail(answered, f"service [{name}] of ROS 2: {escaped(str(error))}")
+
         try:
-            self._node.session.get(
-                self._end.key,
-                self._node.handler(arrived, ended),
-                payload=request,
-                attachment=self._handle.attachment(),
-                target=library.QueryTarget.ALL_COMPLETE,
-                consolidation=library.ConsolidationMode.NONE,
-                timeout=_LONGEST_SECONDS,
-            )
-        except library.ZError as error:
-            _fail(answered, f"service [{name}] of ROS 2: {escaped(str(error))}")
+            self._requests.submit(send)
+        except RuntimeError:
+            _fail(answered, f"the bridge no longer calls service [{name}] of ROS 2")
         return answered
 
     def close(self) -> None:
         """End the client. Idempotent."""
         self._handle.close()
+        self._requests.shutdown(wait=False)
 
 
 class ZenohServer:
@@ -116,29 +130,37 @@ class ZenohServer:
 
     def _arrived(self, query: Query) -> None:
         with self._lock:
-            has_room = self._under_way < _MOST_UNDER_WAY
+            has_room = self._under_way < MOST_UNDER_WAY
             self._under_way += has_room
         if not has_room:
-            self._refuse(query, f"the bridge is answering {_MOST_UNDER_WAY} other requests")
+            self._refuse(query, f"the bridge is answering {MOST_UNDER_WAY} other requests")
             return
         try:
             if query.payload is None or query.attachment is None or len(query.payload) > MOST_BYTES:
                 raise ValueError("this is not a request of rmw_zenoh, or too large")
             back = reply_attachment(query.attachment.to_bytes(), time.time_ns())
             answered = self._answer(query.payload.to_bytes())
-        except ValueError as error:
+        except (ValueError, RuntimeError) as error:
             self._done()
-            self._refuse(query, str(error))
+            # RuntimeError: the loop has ended.
+            self._refuse(query, str(error) if isinstance(error, ValueError) else "the bridge has ended")
             return
 
         def finished(_: object) -> None:
-            self._done()
             try:
-                self._replies.submit(self._reply, query, back, answered)
+                self._replies.submit(self._finish, query, back, answered)
             except RuntimeError:
+                self._done()
                 query.drop()  # the service is closed
 
         answered.add_done_callback(finished)
+
+    def _finish(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
+        # A response counts until it is written: those that wait for a slow network take memory.
+        try:
+            self._reply(query, back, answered)
+        finally:
+            self._done()
 
     def _reply(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
         try:
