@@ -427,6 +427,21 @@ class Payload:
 # --- what goes wrong
 
 
+@pytest.mark.parametrize("domain_id", ["*", "1/2", "one", "-1", "1" * 10])
+def test_a_domain_that_is_not_a_number_is_refused(domain_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain_id)
+    with pytest.raises(BridgeError) as caught:
+        ZenohNode("bridge", NetworkOptions((f"tcp/127.0.0.1:{free_port()}",)))
+    assert str(caught.value) == f"ROS_DOMAIN_ID is [{domain_id}]: it must be a number, such as 0"
+
+
+def test_a_domain_has_no_zeros_in_front(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "007")
+    node = ZenohNode("bridge", NetworkOptions((endpoint,)))
+    node.close()
+    assert node.domain == "7"
+
+
 def test_without_a_router_one_line_says_what_to_start() -> None:
     where = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(BridgeError) as caught:
