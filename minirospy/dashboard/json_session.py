@@ -12,6 +12,7 @@ import contextlib
 import json
 import logging
 import math
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -30,6 +31,9 @@ _log = logging.getLogger(__name__)
 _LONGEST_ERROR = 1000
 _INTERNAL_ERROR = 1011
 """Of a WebSocket that is closed, RFC 6455, section 7.4.1."""
+
+_CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
+"""Of the loop's clock: 16 ms in Windows before Python 3.13."""
 
 _T = TypeVar("_T")
 Fields = Mapping[str, object]
@@ -298,9 +302,11 @@ class JsonDoor(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event, until a time of the loop at most."""
+    """Wait for an event, until a time of the loop at most; by then the loop's clock has passed it."""
     # asyncio.wait_for before Python 3.12 may lose a cancelling that comes with the event.
-    timer = asyncio.get_running_loop().call_at(end, event.set) if end < math.inf else None
+    # A loop calls what is due within its clock's resolution: callers that look at the clock would spin until it goes on.
+    loop = asyncio.get_running_loop()
+    timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
         await event.wait()
     finally:

@@ -11,8 +11,21 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import pytest
 
-from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, text_of, texts_of
+from minirospy.dashboard import json_session
+from minirospy.dashboard.json_session import (
+    Fields,
+    Handler,
+    JsonDoor,
+    JsonSession,
+    number,
+    text_of,
+    texts_of,
+    wait_until,
+)
 from minirospy.errors import UsageError
+from tests import manual_loop
+from tests.manual_loop import ManualLoop, run_manually
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient
@@ -54,6 +67,7 @@ class Session(JsonSession):
 
     def __init__(self, client: WebClient) -> None:
         self.left_by: list[str] = []
+        self.leaving = asyncio.Event()
         self.gate = threading.Event()
         self.follows = 0
         self.fault: Exception | None = None
@@ -67,6 +81,7 @@ class Session(JsonSession):
         return None
 
     async def left(self) -> None:
+        self.leaving.set()
         await asyncio.sleep(0.01)
         self.left_by.append("left")
 
@@ -176,8 +191,7 @@ def test_operations_that_wait_are_limited() -> None:
         door, session = opened(client)
         session.received_text('{"op": "block"}')
         await client.until(1)
-        while session._operations:
-            await asyncio.sleep(0)
+        await until(lambda: not session._operations)
         for _ in range(5):
             session.received_text('{"op": "say", "text": "x"}')
         assert [*map(list, client.sent)] == [["writes"], ["error"], ["error"]]
@@ -188,23 +202,25 @@ def test_operations_that_wait_are_limited() -> None:
     run(work())
 
 
-def test_who_is_no_owner_is_told_so_and_follows_nothing() -> None:
-    async def work() -> None:
+def test_client_that_is_no_owner_gets_the_reason_and_nothing_else() -> None:
+    async def work(loop: ManualLoop) -> None:
         client = Client(is_owner=False)
         door, session = opened(client)
         await client.until(2)
         session.received_text('{"op": "say", "text": "x"}')
         session.changed()
-        await asyncio.sleep(0.1)
+        await loop.advance(2 * session.pace)
         assert client.sent == [
             {"writes": False},
             {"error": "you may not play"},
             {"error": "you may not play"},
         ]
         assert session.follows == 0
-        await door.close()
+        closing = asyncio.ensure_future(door.close())
+        await loop.advance(1.0)
+        await closing
 
-    run(work())
+    run_manually(work)
 
 
 def test_look_that_fails_is_reported_once_and_repeated(caplog: pytest.LogCaptureFixture) -> None:
@@ -217,11 +233,9 @@ def test_look_that_fails_is_reported_once_and_repeated(caplog: pytest.LogCapture
         assert (await client.until(2))[1] == {"error": "the dashboard failed to show toys: ZeroDivisionError"}
         failed = session.follows
         session.changed()
-        while session.follows == failed:
-            await asyncio.sleep(0.01)
+        await until(lambda: session.follows > failed)
         session.fault, failed = None, session.follows
-        while session.follows == failed:
-            await asyncio.sleep(0.01)
+        await until(lambda: session.follows > failed)
         assert len(client.sent) == 2
         await door.close()
 
@@ -237,7 +251,7 @@ def test_session_is_left_once_however_often_it_is_ended() -> None:
         session.received_text('{"op": "block"}')
         await client.until(1)
         session.ended()
-        await asyncio.sleep(0)
+        await session.leaving.wait()
         session.ended()
         await door.close()
         assert session.left_by == ["left"]
@@ -260,28 +274,44 @@ def test_session_that_opens_after_the_end_of_its_door_ends() -> None:
 
 
 def test_changes_of_any_thread_are_looked_at_no_faster_than_the_pace() -> None:
-    async def work() -> None:
+    async def work(loop: ManualLoop) -> None:
         client = Client()
         door, session = opened(client)
-        await client.until(1)
-        await asyncio.sleep(0.1)
+        await loop.advance(10.0)
         assert session.follows == 1
 
         def change() -> None:
-            for _ in range(10_000):
+            for _ in range(1000):
                 session.post_change()
                 door.post_change()
 
-        started = asyncio.get_running_loop().time()
-        await asyncio.to_thread(change)
-        while session.follows < 2:
-            await asyncio.sleep(0.01)
-        seconds = asyncio.get_running_loop().time() - started
-        await asyncio.sleep(0.1)
-        assert session.follows <= 3 + seconds / session.pace
-        await door.close()
+        # The first look is long ago; that at the next changes waits for the pace.
+        for pause, looks in ((0.0, 2), (0.9, 2), (0.2, 3)):
+            changing = asyncio.ensure_future(asyncio.to_thread(change))
+            await manual_loop.until(changing.done)
+            await loop.advance(pause * session.pace)
+            assert session.follows == looks
+        closing = asyncio.ensure_future(door.close())
+        await loop.advance(1.0)
+        await closing
 
-    run(work())
+    run_manually(work)
+
+
+def test_wait_ends_when_the_clock_has_passed_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    tick = 1 / 64
+
+    async def work(loop: ManualLoop) -> None:
+        # As in Windows before Python 3.13: timers fire up to a tick early.
+        monkeypatch.setattr(loop, "_clock_resolution", tick)
+        waiting = asyncio.ensure_future(wait_until(asyncio.Event(), loop.time() + 0.05))
+        await loop.advance(3 * tick)
+        assert not waiting.done()
+        await loop.advance(tick)
+        assert waiting.done()
+
+    monkeypatch.setattr(json_session, "_CLOCK_SECONDS", tick)
+    run_manually(work)
 
 
 def test_work_that_goes_on_is_waited_for_and_its_fault_logged(caplog: pytest.LogCaptureFixture) -> None:
