@@ -30,6 +30,7 @@ from minirospy.bridge.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.bridge.fleet.rules import GatewayRules, Lane
 from minirospy.bridge.fleet.sender import _MOST_OUTLETS, Intake, Sender
 from minirospy.errors import BridgeError
+from tests.waiting import until
 
 MD5 = "0123456789abcdef" * 2
 CLAIM = Claim("robot1", "0" * 16, 1, "1" * 16)
@@ -313,8 +314,7 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
         network.answer("call", hangs)
         network.answer("ping", pong, is_control=True)
         network.answer("status", hangs, is_control=True)
-        while len(arrived) < 3:
-            await asyncio.sleep(0.001)
+        await until(lambda: len(arrived) == 3)
 
         queries = [Query() for _ in range(_QUERIES + 1)]
         for query in queries:

@@ -26,6 +26,7 @@ from minirospy.graph.goals import GoalState
 from tests.bridge.test_fleet_hostile import CLAIM, stub
 from tests.bridge.test_ros2_actions import SEND_GOAL, end_of
 from tests.bridge.test_ros2_bridge import STRING, FakeActionClient, FakePublisher, FakeSide, bridged, raw
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running
@@ -175,8 +176,7 @@ def test_robot_that_cannot_be_shown_keeps_no_other_away(
         assert shown == ["b"]
         # It is tried again without a new token.
         fails = False
-        while "a" not in shown:
-            await asyncio.sleep(0.01)
+        await until(lambda: "a" in shown)
         await made.close()
 
     asyncio.run(asyncio.wait_for(run(), LIMIT))

@@ -304,12 +304,9 @@ class Gate:
         assert self.opened.wait(60)
 
 
-def test_recording_is_kept_where_its_page_closes_while_it_starts(
-    serve: Callable[..., Served],
-    client: Callable[..., Client],
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.fixture
+def starting(monkeypatch: pytest.MonkeyPatch) -> Gate:
+    """Return the gate at which recordings wait as they start."""
     gate = Gate()
 
     class Slow(Recording):
@@ -318,15 +315,24 @@ def test_recording_is_kept_where_its_page_closes_while_it_starts(
             super().__init__(*words)
 
     monkeypatch.setattr(bag_door, "Recording", Slow)
+    return gate
+
+
+def test_recording_is_kept_where_its_page_closes_while_it_starts(
+    serve: Callable[..., Served],
+    client: Callable[..., Client],
+    folder: Path,
+    starting: Gate,
+) -> None:
     served = serve()
     assert served.dashboard
     door = served.dashboard._bags
     page = client(served)
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
-    assert gate.reached.wait(60)
+    assert starting.reached.wait(60)
     page.socket.close()
     wait_until(lambda: not door.sessions)
-    gate.opened.set()
+    starting.opened.set()
     wait_until(lambda: door.recording is not None)
 
 
@@ -428,23 +434,15 @@ def test_stop_waits_for_a_recording_that_is_being_started(
     serve: Callable[..., Served],
     client: Callable[..., Client],
     folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    starting: Gate,
 ) -> None:
-    gate = Gate()
-
-    class Slow(Recording):
-        def __init__(self, *words: Any) -> None:
-            gate.pass_through()
-            super().__init__(*words)
-
-    monkeypatch.setattr(bag_door, "Recording", Slow)
     served = serve()
     page, other = client(served), client(served)
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
-    assert gate.reached.wait(60)
+    assert starting.reached.wait(60)
     other.send("stop")
     other.send("list")
-    gate.opened.set()
+    starting.opened.set()
     done = other.next("recording", lambda found: found and found["is_ended"])
     assert done["name"] == "run.bag"
     assert done["error"] in ("", "it was stopped before it had started: nothing was recorded")

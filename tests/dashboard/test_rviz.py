@@ -24,7 +24,9 @@ from minirospy.dashboard import rviz_door
 from minirospy.dashboard.rviz_door import SUBPROTOCOL, RvizDoor
 from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
 from minirospy.errors import RvizFileError
+from tests import manual_loop
 from tests.dashboard.conftest import TOKEN
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient
@@ -159,11 +161,9 @@ def test_operations_that_wait_are_limited() -> None:
         session = door.open(client)
         for _ in range(100):
             session.received_text('{"parse": "a: 1"}')
-        while len(sent) < 100:
-            await asyncio.sleep(0.01)
+        await until(lambda: len(sent) >= 100)
         session.received_text('{"parse": "a: 1"}')
-        while len(sent) < 101:
-            await asyncio.sleep(0.01)
+        await until(lambda: len(sent) >= 101)
         await door.close()
 
     asyncio.run(work())
@@ -206,8 +206,7 @@ def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> N
         door = RvizDoor(file)
         for config in configs:
             door.open(client).received_text(json.dumps({"save": config}))
-        while len(sent) < len(configs):
-            await asyncio.sleep(0.01)
+        await until(lambda: len(sent) >= len(configs))
         await door.close()
 
     asyncio.run(work())
@@ -222,8 +221,8 @@ def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
     async def work() -> None:
         door = RvizDoor(file)
         door.open(client).received_text(json.dumps({"save": parse_rviz(FILE)}))
-        while not door._tasks:
-            await asyncio.sleep(0)
+        # At each turn of the loop: with a pause between two looks it may be saved already.
+        await manual_loop.until(lambda: door._tasks)
         await door.close()
 
     asyncio.run(work())
