@@ -40,7 +40,7 @@ class Served:
         return self._nodes[0]
 
     def run(self, work: Coroutine[object, object, _T]) -> _T:
-        return self._loop.run(work, 60.0)
+        return self._loop.run(work, 200.0)
 
     def node(self, name: str) -> Node:
         async def start() -> Node:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
 
@@ -25,6 +26,8 @@ REAL_BIN = Path("/usr/bin")
 OUR_BIN = Path(sys.executable).parent
 
 STACKS = ("ours", "rospy", "roscpp")
+PATIENCE = 200.0
+"""Seconds after which a program is taken to hang: on a busy machine the start of one alone may take a minute."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -36,8 +39,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not (REAL_BIN / "rosmaster").exists():
             item.add_marker(pytest.mark.skip(reason="real ROS 1 is not installed: make interop"))
         elif not item.get_closest_marker("timeout"):
-            # A compiler may run in it first, beside other tests.
-            item.add_marker(pytest.mark.timeout(240))
+            # More than PATIENCE, whose error says what was waited for. A compiler may run in it first, beside other tests.
+            item.add_marker(pytest.mark.timeout(3 * PATIENCE))
 
 
 def environment(uri: str, stack: str) -> dict[str, str]:
@@ -71,14 +74,14 @@ def stop(program: subprocess.Popen[str]) -> None:
             stream.close()
 
 
-def answers(uri: str) -> bool:
-    """Return whether a master answers at ``uri``."""
-    host, port = uri.removeprefix("http://").rstrip("/").rsplit(":", 1)
+def answers(uri: str, stack: str) -> bool:
+    """Return whether a master of ``stack`` answers at ``uri``, and the node of a roscore is registered."""
     try:
-        socket.create_connection((host, int(port)), 5).close()
+        with ServerProxy(uri) as master:
+            state: Any = master.getSystemState("/test")
     except OSError:
         return False
-    return True
+    return stack != "ours" or "/rosout" in dict(state[2][1])
 
 
 @contextmanager
@@ -93,8 +96,8 @@ def running_master(stack: str) -> Iterator[str]:
     program = start(commands[stack], uri, stack)
 
     try:
-        end = time.monotonic() + 40
-        while not answers(uri):
+        end = time.monotonic() + PATIENCE
+        while not answers(uri, stack):
             assert program.poll() is None, f"the master ended: {program.communicate()}"
             assert time.monotonic() < end, "the master does not answer"
             time.sleep(0.05)
@@ -119,21 +122,34 @@ def real_master() -> Iterator[str]:
         yield uri
 
 
-def compiled(source: str, folder: Path, *libraries: str) -> Path:
-    """Compile a C++ file of this folder with ``libraries`` (names of pkg-config); return the program."""
-    compiler = shutil.which("g++")
-    assert compiler
+def compiled(source: str, factory: pytest.TempPathFactory, *libraries: str) -> Path:
+    """Compile a C++ file of this folder with ``libraries`` (names of pkg-config); return the program.
+
+    A compiler may take minutes on a busy machine: the first of pytest's workers compiles for all.
+    """
+    import fcntl
+
+    folder = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
     program = folder / Path(source).stem
-    command = ["pkg-config", "--cflags", "--libs", *libraries]
-    flags = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
-    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / source), *flags], check=True)
+    with program.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not program.exists():
+            compiler = shutil.which("g++")
+            assert compiler
+            command = ["pkg-config", "--cflags", "--libs", *libraries]
+            flags = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
+            made = program.with_suffix(".made")
+            subprocess.run([compiler, "-o", str(made), str(HERE / source), *flags], check=True)
+            made.rename(program)
     return program
 
 
 @pytest.fixture(scope="session")
 def cpp_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """peer.cpp, compiled."""
-    return compiled("peer.cpp", tmp_path_factory.mktemp("cpp"), "roscpp")
+    return compiled("peer.cpp", tmp_path_factory, "roscpp")
 
 
 @pytest.fixture

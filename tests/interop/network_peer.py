@@ -17,6 +17,8 @@ from actionlib.msg import TestAction, TestGoal, TestResult
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool, SetBoolResponse
 
+SECONDS = 150
+
 if os.environ.get("TEST_KEEPALIVE"):
     # A cable that was pulled is noticed after seconds, not after a minute.
     from minirospy.runtime.transport import sockets
@@ -58,19 +60,19 @@ def tick(beat):
 
 
 def laptop():
-    say("beat", rospy.wait_for_message("/beat", Int32, timeout=40).data >= 0)
+    say("beat", rospy.wait_for_message("/beat", Int32, timeout=SECONDS).data >= 0)
     order = rospy.Publisher("/order", String, queue_size=1, latch=True)
     order.publish("forward")
-    say(rospy.wait_for_message("/heard", String, timeout=40).data)
-    rospy.wait_for_service("/flag", timeout=40)
+    say(rospy.wait_for_message("/heard", String, timeout=SECONDS).data)
+    rospy.wait_for_service("/flag", timeout=SECONDS)
     response = rospy.ServiceProxy("/flag", SetBool)(True)
     say("flag", response.success, response.message)
     rospy.set_param("/robot/wheels", 4)
     say("param", sorted(rospy.get_param("/robot").items()))
     client = actionlib.SimpleActionClient("/count", TestAction)
-    if not client.wait_for_server(rospy.Duration(40)):
+    if not client.wait_for_server(rospy.Duration(SECONDS)):
         sys.exit("no action server")
-    client.send_goal_and_wait(TestGoal(41), rospy.Duration(40))
+    client.send_goal_and_wait(TestGoal(41), rospy.Duration(SECONDS))
     say("count", client.get_result().result)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from minirospy.dashboard.files import FOLDER
+from tests.interop.conftest import PATIENCE
 
 __all__ = ["needs_node", "run_script"]
 
@@ -31,7 +32,7 @@ def run_script(names: str, module: str, body: str) -> Any:
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

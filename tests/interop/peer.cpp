@@ -138,7 +138,7 @@ void serve(ros::NodeHandle& node)
 
 int call(ros::NodeHandle& node)
 {
-  if (!ros::service::waitForService("/set_flag", 20000))
+  if (!ros::service::waitForService("/set_flag", 150000))
   {
     return 1;
   }

@@ -68,7 +68,7 @@ def listen():
 
     for kind, data_class in KINDS.items():
         rospy.Subscriber("/interop/" + kind, data_class, on_message, callback_args=kind)
-    if not done.wait(40):
+    if not done.wait(150):
         sys.exit("nothing came of: " + ", ".join(sorted(left)))
 
 
@@ -81,7 +81,7 @@ def serve():
 
 
 def call():
-    rospy.wait_for_service("/set_flag", timeout=40)
+    rospy.wait_for_service("/set_flag", timeout=150)
     for persistent in (False, True):
         proxy = rospy.ServiceProxy("/set_flag", SetBool, persistent=persistent)
         for flag in (True, False):

@@ -62,9 +62,9 @@ def serve():
 
 
 def change():
-    client = Client("/lamp", timeout=30)
-    say("configuration", shown(client.get_configuration(timeout=30)))
-    for each in client.get_parameter_descriptions(timeout=30):
+    client = Client("/lamp", timeout=150)
+    say("configuration", shown(client.get_configuration(timeout=150)))
+    for each in client.get_parameter_descriptions(timeout=150):
         say([each[key] for key in ("name", "min", "max", "default", "type", "level", "description")])
     news = threading.Event()
     client.set_config_callback(lambda config: news.set())
@@ -86,7 +86,7 @@ def change():
             say(changes, "->", shown(client.update_configuration(dict(changes))))
         except dynamic_reconfigure.DynamicReconfigureException as error:
             say(changes, "raises", type(error).__name__, error)
-    say("heard", news.wait(30))
+    say("heard", news.wait(150))
     say("parameters", sorted(rospy.get_param("/lamp").items()))
     say(
         dynamic_reconfigure.find_reconfigure_services(),

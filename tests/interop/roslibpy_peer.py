@@ -16,7 +16,7 @@ import roslibpy
 import roslibpy.ros1.actionlib
 import roslibpy.tf
 
-SECONDS = 60
+SECONDS = 150
 
 
 class Box:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import compiled
+from .conftest import PATIENCE, compiled
 
 HERE = Path(__file__).parent
 STACKS = ("ours", "asyncio", "rospy", "roscpp")
@@ -49,7 +49,7 @@ in time ABORTED
 @pytest.fixture(scope="session")
 def cpp_action_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """action_peer.cpp, compiled."""
-    return compiled("action_peer.cpp", tmp_path_factory.mktemp("cpp"), "actionlib", "roscpp")
+    return compiled("action_peer.cpp", tmp_path_factory, "actionlib", "roscpp")
 
 
 @pytest.fixture
@@ -80,13 +80,12 @@ def run(request: pytest.FixtureRequest) -> Iterator[Run]:
         # A server ends with its input.
         if program.poll() is None:
             try:
-                program.communicate(timeout=40)
+                program.communicate(timeout=PATIENCE)
             except subprocess.TimeoutExpired:
                 program.kill()
         program.communicate()
 
 
-@pytest.mark.timeout(180)
 @pytest.mark.parametrize(("server", "client"), PAIRS)
 def test_goals_end_the_same_between_all_clients_and_servers(
     real_master: str, run: Run, server: str, client: str
@@ -94,11 +93,10 @@ def test_goals_end_the_same_between_all_clients_and_servers(
     serving = run(server, "serve", real_master)
     assert serving.stdout
     assert any(line.strip() == "ready" for line in serving.stdout)
-    output, errors = run(client, "ask", real_master).communicate(timeout=100)
+    output, errors = run(client, "ask", real_master).communicate(timeout=PATIENCE)
     assert output == SAID, errors
 
 
-@pytest.mark.timeout(180)
 @pytest.mark.parametrize(
     ("server", "client"),
     [*(("ours", stack) for stack in STACKS), ("asyncio", "ours"), ("asyncio", "asyncio")],
@@ -107,5 +105,5 @@ def test_goals_over_our_master(run: Run, server: str, client: str, master: str) 
     serving = run(server, "serve", master)
     assert serving.stdout
     assert any(line.strip() == "ready" for line in serving.stdout)
-    output, errors = run(client, "ask", master).communicate(timeout=100)
+    output, errors = run(client, "ask", master).communicate(timeout=PATIENCE)
     assert output == SAID, errors

@@ -13,6 +13,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, Trigger
 
 from minirospy import Node
 from minirospy.errors import ServiceException
+from tests.interop.conftest import PATIENCE
 
 PEER = """
 import sys
@@ -34,7 +35,7 @@ services = [
 ]
 print("ready", flush=True)
 for line in sys.stdin:
-    rospy.wait_for_service("/aio_flag", timeout=40)
+    rospy.wait_for_service("/aio_flag", timeout=150)
     for persistent in (False, True):
         proxy = rospy.ServiceProxy("/aio_flag", SetBool, persistent=persistent)
         print(proxy(True).message, proxy(False).message, rospy.get_param("/aio/speed"), flush=True)
@@ -56,7 +57,7 @@ def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
     assert program.stdout.readline() == "ready\n"
     yield program
     # Its input ends, and with it the program.
-    program.communicate(timeout=40)
+    program.communicate(timeout=PATIENCE)
 
 
 async def set_flag(request: SetBoolRequest) -> tuple[bool, str]:
@@ -82,7 +83,7 @@ def test_aio_node_exchanges_topics_services_and_parameters(
                 await publisher.publish(word)
                 assert (await answers.next()).data == "heard " + word
 
-            await node.wait_for_service("/peer_flag", 10)
+            await node.wait_for_service("/peer_flag", PATIENCE)
             assert (await node.call("/peer_flag", SetBool, True)).message == "peer"
             proxy = node.service_proxy("/peer_flag", SetBool, persistent=True)
             assert [(await proxy(flag)).success for flag in (True, False, True)] == [True, False, True]
@@ -99,4 +100,4 @@ def test_aio_node_exchanges_topics_services_and_parameters(
                 line = await asyncio.to_thread(peer.stdout.readline)
                 assert line == "flag=True flag=False 2.5\n"
 
-    asyncio.run(asyncio.wait_for(main(), 50))
+    asyncio.run(asyncio.wait_for(main(), 2 * PATIENCE))

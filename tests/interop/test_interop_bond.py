@@ -21,7 +21,7 @@ Start = Callable[..., subprocess.Popen[str]]
 @pytest.fixture(scope="session")
 def cpp_bond(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """bond_peer.cpp, compiled."""
-    return compiled("bond_peer.cpp", tmp_path_factory.mktemp("cpp"), "bondcpp")
+    return compiled("bond_peer.cpp", tmp_path_factory, "bondcpp")
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image
@@ -19,12 +18,11 @@ from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
+from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import Peer, modules
 
 __all__ = ["modules"]
-
-pytestmark = pytest.mark.timeout(600)
 
 DATA = bytes(range(256)) * 3600
 DIGEST = hashlib.sha1(DATA).hexdigest()
@@ -83,7 +81,7 @@ async def robot() -> AsyncIterator[Node]:
 
 async def call(node: Node, name: str) -> str:
     """Return what a service answers, when it is there: a client that offers one gets no notice of it."""
-    await node.wait_for_service(name, 60)
+    await node.wait_for_service(name, PATIENCE)
     return str((await node.call(name, SetBool, True)).message)
 
 
@@ -134,7 +132,7 @@ def test_session_of_roslib_js_survives_a_restart_of_the_bridge(master: str, modu
                 try:
                     assert await peer.says("image") == [640, DIGEST]
                     assert await peer.says("cbor") == DIGEST
-                    assert bytes((await copies.next(60)).data) == DATA
+                    assert bytes((await copies.next(PATIENCE)).data) == DATA
                     assert await peer.says("service") == {"success": True, "message": "from minirospy"}
                     assert "not today" in await peer.says("refusal")
                     assert await peer.says("parameter") == {"speed": 2.5, "list": [1, "two"]}
@@ -145,7 +143,7 @@ def test_session_of_roslib_js_survives_a_restart_of_the_bridge(master: str, modu
                     assert await call(node, "/ours_later") == "later"
                     client: Any = ActionClient(node, "/js_fibonacci", FibonacciAction)
                     async with client:
-                        await client.wait_for_server(60)
+                        await client.wait_for_server(PATIENCE)
                         assert list((await client.send(FibonacciGoal(order=3))).sequence) == [0, 1, 2]
                     assert await peer.says("latched") == "hello"
                 except BaseException:

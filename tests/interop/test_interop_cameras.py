@@ -13,7 +13,7 @@ import pytest
 from camera_calibration_parsers import readCalibration, writeCalibration
 from sensor_msgs.msg import CameraInfo
 
-from tests.interop.conftest import REAL_PYTHON, environment
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
 CONVERT = "/usr/lib/camera_calibration_parsers/convert"
 OUR_CONVERT = (
@@ -52,7 +52,9 @@ def test_written_calibration_is_the_real_one(kind: str, name: str, tmp_path: Pat
     source = tmp_path / "source.yaml"
     assert writeCalibration(str(ours), name, info)
     assert writeCalibration(str(source), name, info)
-    done = subprocess.run([CONVERT, source, theirs], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        [CONVERT, source, theirs], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert ours.read_text() == theirs.read_text()
     assert readCalibration(str(theirs)) == readCalibration(str(ours))
@@ -72,7 +74,7 @@ def test_convert_exits_as_the_real_one(words: list[str], text: str, tmp_path: Pa
     assert writeCalibration(str(tmp_path / "good.ini"), "camera", info)
     found = [
         subprocess.run(
-            [*program, *words], capture_output=True, text=True, timeout=60, cwd=tmp_path, check=False
+            [*program, *words], capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path, check=False
         )
         for program in ([CONVERT], [sys.executable, str(OUR_CONVERT)])
     ]
@@ -108,7 +110,7 @@ def test_random_cameras_give_the_real_numbers(tmp_path: Path) -> None:
             env=environment("http://localhost:1", stack),
             capture_output=True,
             text=True,
-            timeout=100,
+            timeout=PATIENCE,
             check=True,
         )
         found.append(np.array(json.loads(done.stdout)))

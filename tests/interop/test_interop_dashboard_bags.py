@@ -15,7 +15,7 @@ from minirospy.dashboard.files import FOLDER
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag
 from tests.dashboard.conftest import Served, serve
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import (
     address,
     browse,
@@ -73,7 +73,7 @@ assert.equal(new Axis(0, 10).x(0), 0);
         [shutil.which("node") or "", "--input-type=module", "-e", script],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

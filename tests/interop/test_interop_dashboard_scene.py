@@ -14,6 +14,7 @@ import pytest
 from minirospy.dashboard.files import FOLDER
 from minirospy.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
+from tests.interop.conftest import PATIENCE
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import needs_node
 from tests.interop.test_interop_foreign import FOREIGN
@@ -31,7 +32,7 @@ def run(*calls: dict[str, Any]) -> list[Any]:
         input="".join(json.dumps(call) + "\n" for call in calls),
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -23,7 +23,7 @@ from minirospy.dashboard.files import FOLDER
 from tests.dashboard.conftest import Served, serve
 from tests.dashboard.lamp import make_lamp
 from tests.dashboard.robot import ROBOT
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import (
     address,
@@ -100,7 +100,7 @@ def test_sliders_publish_joint_states(serve: Callable[..., Served], browse: Call
 
     def until(is_right: Callable[[dict[str, float]], bool]) -> dict[str, float]:
         while True:
-            state = served.run(subscription.next(50))
+            state = served.run(subscription.next(PATIENCE))
             positions = dict(zip(state.name, state.position, strict=True))
             if is_right(positions):
                 return positions
@@ -201,7 +201,7 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
     page.click("[data-state='/ROOT/DOCK/PUSH'] rect")
     page.wait_text(".side h2", "/ROOT/DOCK/PUSH")
     page.click(".side button", "start here next time")
-    command = served.run(subscription.next(50))
+    command = served.run(subscription.next(PATIENCE))
     assert (command.path, command.initial_states) == ("/ROOT/DOCK", ["PUSH"])
     assert pickle.loads(base64.b64decode(command.local_data)) == {}
     assert page.evaluate("document.title") == "State machines · minirospy"
@@ -239,7 +239,7 @@ for (const line of {json.dumps(lines)}) {{
         [shutil.which("node") or "", "--input-type=module", "-e", program],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

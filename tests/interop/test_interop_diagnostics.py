@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import REAL_PYTHON, environment
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
 HERE = Path(__file__).parents[1] / "compat" / "aggregator"
 OURS = HERE.parents[2] / "minirospy" / "ros_packages" / "diagnostic_aggregator" / "nodes"
@@ -29,7 +29,7 @@ def test_programs_publish_what_is_recorded(python: str, programs: list[str], mas
         env=environment(master, "rospy"),
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.stdout == (HERE / "drive.txt").read_text(encoding="utf-8"), done.stderr

@@ -15,11 +15,10 @@ from typing import Any
 import pytest
 
 from tests.conftest import free_port
-from tests.interop.conftest import OUR_BIN, REAL_BIN, REAL_PYTHON, running_master, start, stop
+from tests.interop.conftest import OUR_BIN, PATIENCE, REAL_BIN, REAL_PYTHON, running_master, start, stop
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
-SECONDS = 60.0
 PORT = 7447
 
 
@@ -54,15 +53,15 @@ def test_real_nodes_and_commands_on_both_sides(running: ExitStack) -> None:
     run(talker, robot, "rospy", **quiet)
 
     echo = run([rostopic, "echo", "-n", "1", "/robot1/chatter/data"], control, "rospy")
-    assert echo.communicate(timeout=SECONDS)[0].startswith('"hello"')
-    listed = run([rostopic, "list", "-v"], control, "rospy").communicate(timeout=SECONDS)[0]
+    assert echo.communicate(timeout=PATIENCE)[0].startswith('"hello"')
+    listed = run([rostopic, "list", "-v"], control, "rospy").communicate(timeout=PATIENCE)[0]
     assert " * /robot1/chatter [std_msgs/String] 1 publisher" in listed
 
     def call() -> str:
         words = [rosservice, "call", "/robot1/talker/get_loggers"]
-        return run(words, control, "rospy").communicate(timeout=SECONDS)[0]
+        return run(words, control, "rospy").communicate(timeout=PATIENCE)[0]
 
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + PATIENCE
     while "rosout" not in (answer := call()):
         assert time.monotonic() < end, answer
 
@@ -74,7 +73,7 @@ def test_real_nodes_and_commands_on_both_sides(running: ExitStack) -> None:
     heard = run([REAL_PYTHON, "-c", listener], robot, "rospy")
     order = [rostopic, "pub", "-r", "5", "/robot1/order", "std_msgs/Int32", "7"]
     run(order, control, "rospy", **quiet)
-    assert heard.communicate(timeout=SECONDS)[0].startswith("data: 7")
+    assert heard.communicate(timeout=PATIENCE)[0].startswith("data: 7")
 
 
 # --- a link between namespaces
@@ -122,7 +121,7 @@ class Peer:
     def until(self, condition: Callable[[Any], Any]) -> Any:
         """Return what it sees when a condition holds."""
         assert self._process.stdout
-        end = time.monotonic() + SECONDS
+        end = time.monotonic() + PATIENCE
         while True:
             line = self._process.stdout.readline()
             assert line, "the program has ended"
@@ -131,7 +130,7 @@ class Peer:
             assert time.monotonic() < end, line
 
     def end(self) -> None:
-        self._process.communicate(timeout=SECONDS)
+        self._process.communicate(timeout=PATIENCE)
 
 
 @pytest.fixture

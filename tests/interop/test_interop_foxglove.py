@@ -16,6 +16,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from tests.bridge.conftest import Client, Running, bridge, run_bridge
 from tests.conftest import free_port
+from tests.interop.conftest import PATIENCE
 from tests.interop.test_interop_foreign import FOREIGN, modules
 
 __all__ = ["bridge", "modules", "run_bridge"]
@@ -35,7 +36,7 @@ def test_client_of_the_apps_talks_to_the_bridge(bridge: Running, modules: Path, 
         env={**os.environ, "NODE_PATH": str(modules)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import REAL_PYTHON, environment, start, stop
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment, start, stop
 
 OURS = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "image_transport" / "nodes" / "republish"
 REAL = "/usr/lib/image_transport/republish"
@@ -47,7 +47,7 @@ def test_images_pass_through_both(real_master: str, user: str) -> None:
             env=environment(real_master, user),
             capture_output=True,
             text=True,
-            timeout=100,
+            timeout=PATIENCE,
             check=False,
         )
     finally:
@@ -58,7 +58,7 @@ def test_images_pass_through_both(real_master: str, user: str) -> None:
 
 def test_usage_is_the_real_one() -> None:
     real, ours = (
-        subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
         for command in ([REAL], [sys.executable, str(OURS)])
     )
     assert ours.stdout == real.stdout.replace(REAL, "republish")

@@ -17,7 +17,7 @@ import pytest
 
 from minirospy.bridge.access import Access
 from tests.dashboard.conftest import Served, serve
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import REAL_PYTHON, start, stop
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_dashboard_3d import Serve, drag, drawn, levels, look_down, mouse, status
@@ -53,7 +53,7 @@ class Server:
         """Return the events up to this one; those that keep a marker alive are left out."""
         found: list[dict[str, Any]] = []
         while not found or found[-1]["event"] != event:
-            said = self.said.get(timeout=100)
+            said = self.said.get(timeout=PATIENCE)
             if said["event"] != "alive":
                 found.append(said)
         return found
@@ -80,7 +80,6 @@ def opened(served: Served, browse: Browse, token: str = "write-token-0") -> tupl
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_arrow_is_dragged_and_the_marker_follows(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse)
     drag(page, (0.78 * metre, 0.02 * metre), (1.78 * metre, 0.5 * metre))
@@ -101,7 +100,6 @@ def test_arrow_is_dragged_and_the_marker_follows(served: tuple[Served, Server], 
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_ring_turns_and_plane_slides(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse)
     radius = 0.57 * metre
@@ -126,7 +124,6 @@ def test_ring_turns_and_plane_slides(served: tuple[Served, Server], browse: Brow
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_button_is_clicked_and_menu_entry_chosen(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse)
     drag(page, (-2 * metre, 2 * metre), (-2 * metre, 2 * metre))
@@ -155,7 +152,6 @@ def test_button_is_clicked_and_menu_entry_chosen(served: tuple[Served, Server], 
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_markers_follow_their_server(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse)
     served[1].tell("erase listed")
@@ -178,7 +174,6 @@ def test_markers_follow_their_server(served: tuple[Served, Server], browse: Brow
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_texts_of_markers_never_become_html(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse)
     hostile = "<img src=x"
@@ -194,7 +189,6 @@ def test_texts_of_markers_never_become_html(served: tuple[Served, Server], brows
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_markers_of_a_read_only_page_cannot_be_dragged(served: tuple[Served, Server], browse: Browse) -> None:
     page, metre = opened(served[0], browse, "read-token-00")
     drag(page, (0.78 * metre, 0.02 * metre), (1.78 * metre, 0))
@@ -207,7 +201,6 @@ def test_markers_of_a_read_only_page_cannot_be_dragged(served: tuple[Served, Ser
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_finger_drags_and_its_long_press_opens_the_menu(
     served: tuple[Served, Server], browse: Browse
 ) -> None:

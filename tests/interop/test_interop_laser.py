@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import subprocess
-from pathlib import Path
 
 import numpy as np
+import pytest
 import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
@@ -14,7 +14,7 @@ from laser_geometry import LaserProjection
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import LaserScan
 
-from tests.interop.conftest import compiled
+from tests.interop.conftest import PATIENCE, compiled
 
 
 def moving_laser() -> tf2_ros.Buffer:
@@ -44,9 +44,11 @@ def scan() -> LaserScan:
     return made
 
 
-def test_clouds_of_a_moving_laser_are_those_of_the_cpp_class(tmp_path: Path) -> None:
-    peer = compiled("laser_peer.cpp", tmp_path, "laser_geometry", "tf2", "roscpp", "sensor_msgs")
-    printed = subprocess.run([peer], capture_output=True, text=True, timeout=60, check=True).stdout
+def test_clouds_of_a_moving_laser_are_those_of_the_cpp_class(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    peer = compiled("laser_peer.cpp", tmp_path_factory, "laser_geometry", "tf2", "roscpp", "sensor_msgs")
+    printed = subprocess.run([peer], capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
     clouds = printed.split("cloud ")[1:]
     assert len(clouds) == 4
     for text in clouds:

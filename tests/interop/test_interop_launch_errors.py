@@ -7,7 +7,7 @@ import json
 import subprocess
 from pathlib import Path
 
-from tests.interop.conftest import environment
+from tests.interop.conftest import PATIENCE, environment
 from tests.interop.test_interop_roslaunch import OUR_BIN
 
 NODE = '<node name="x" pkg="p" type="t"'
@@ -73,7 +73,7 @@ def said(python: str, stack: str, folder: Path) -> dict[str, str]:
         env=environment("http://localhost:1", stack),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=folder,
         check=True,
     )

@@ -82,7 +82,7 @@ class Peer:
         assert self._program.stdin
         assert self._program.stdout
         self._program.stdin.close()
-        self._program.wait(40)
+        self._program.wait()
         self._program.stdout.close()
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
+from tests.interop.conftest import PATIENCE
+
 Peer = Callable[[str, str, str], "subprocess.Popen[str]"]
 
 PAIRS = [("ours", "rospy"), ("rospy", "ours"), ("ours", "roscpp"), ("roscpp", "ours"), ("ours", "ours")]
@@ -28,7 +30,7 @@ def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
 def test_messages_arrive_byte_for_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
     """Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
     said = lines_until_ready(peer(talker, "talk", any_master))
-    output, errors = peer(listener, "listen", any_master).communicate(timeout=40)
+    output, errors = peer(listener, "listen", any_master).communicate(timeout=PATIENCE)
     heard = [
         line for line in output.splitlines() if line.split(" ")[0] in {"bool", "string", "scan", "image"}
     ]
@@ -42,7 +44,7 @@ def test_messages_arrive_if_the_subscriber_started_first(
 ) -> None:
     hearing = peer(listener, "listen", any_master)
     said = lines_until_ready(peer(talker, "talk", any_master))
-    output, errors = hearing.communicate(timeout=40)
+    output, errors = hearing.communicate(timeout=PATIENCE)
     heard = [
         line for line in output.splitlines() if line.split(" ")[0] in {"bool", "string", "scan", "image"}
     ]
@@ -53,6 +55,6 @@ def test_messages_arrive_if_the_subscriber_started_first(
 def test_services_answer_between_all_clients(any_master: str, peer: Peer, server: str, client: str) -> None:
     """Each client calls with a connection a call, and with a persistent one."""
     lines_until_ready(peer(server, "serve", any_master))
-    output, errors = peer(client, "call", any_master).communicate(timeout=40)
+    output, errors = peer(client, "call", any_master).communicate(timeout=PATIENCE)
     answers = [line for line in output.splitlines() if "flag:" in line]
     assert answers == ["True flag: True", "False flag: False"] * 2, errors

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Vector3
 
 from minirospy.dashboard.files import FOLDER
 from tests.dashboard.conftest import Served
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import (
     address,
     browse,
@@ -36,7 +36,11 @@ def evaluated(expression: str) -> Any:
         f"console.log(JSON.stringify({expression}));"
     )
     done = subprocess.run(
-        ["node", "--input-type=module", "-e", script], capture_output=True, text=True, timeout=60, check=False
+        ["node", "--input-type=module", "-e", script],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tests.interop.conftest import REAL_PYTHON, start, stop
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, start, stop
 
 PROGRAMS = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "map_server" / "nodes"
-SECONDS = 100
 READER = """
 import sys
 import rospy
@@ -46,7 +45,7 @@ def test_real_nodes_get_the_map_of_our_server(real_master: str, tmp_path: Path) 
     server = start([sys.executable, str(PROGRAMS / "map_server"), str(path)], real_master, "ours")
     reader = start([REAL_PYTHON, "-c", READER, str(path)], real_master, "rospy")
     try:
-        output, errors = reader.communicate(timeout=SECONDS)
+        output, errors = reader.communicate(timeout=PATIENCE)
     finally:
         stop(reader)
         stop(server)
@@ -64,7 +63,7 @@ def test_our_saver_gets_the_map_of_a_real_node(real_master: str, tmp_path: Path)
         [sys.executable, str(PROGRAMS / "map_saver"), "-f", str(tmp_path / "out")], real_master, "ours"
     )
     try:
-        _, errors = saver.communicate(timeout=SECONDS)
+        _, errors = saver.communicate(timeout=PATIENCE)
     finally:
         stop(saver)
         stop(writer)

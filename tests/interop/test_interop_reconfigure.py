@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import REAL_PYTHON, environment, start, stop
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment, start, stop
 
 HERE = Path(__file__).parent
 CFG = HERE / "Lamp.cfg"
@@ -116,7 +116,7 @@ def played(
         env=environment(uri, client),
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -169,7 +169,7 @@ def cpp_peers(modules: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
 def test_header_has_and_does_what_the_real_one_does(cpp_peers: dict[str, Path]) -> None:
     real, ours = (
         subprocess.run(
-            [cpp_peers[stack], "show"], capture_output=True, text=True, timeout=60, check=True
+            [cpp_peers[stack], "show"], capture_output=True, text=True, timeout=PATIENCE, check=True
         ).stdout
         for stack in ("rospy", "ours")
     )
@@ -196,7 +196,7 @@ def test_client_and_dynparam_of_ours_drive_a_server_in_cpp(
         env=environment(real_master, "ours"),
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -221,7 +221,7 @@ def dynparam(stack: str, uri: str, *words: str, share: Path = OUR_SHARE) -> tupl
         env={**environment(uri, stack), "ROS_PACKAGE_PATH": str(REAL_SHARE)},
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     return done.stdout, done.returncode

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from tests.dashboard.conftest import Served
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import start, stop
 from tests.interop.test_interop_dashboard import (
     address,
@@ -35,7 +35,7 @@ def page_functions(*calls: tuple[str, str, list[object]]) -> list[Any]:
         input="".join(json.dumps(call) + "\n" for call in calls),
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -18,7 +18,6 @@ from run_case import CASES, differences, recorded, run_case
 sys.path.pop(0)
 
 
-@pytest.mark.timeout(250)
 @pytest.mark.parametrize("name", CASES)
 def test_record_is_the_output_of_real_rospy(name: str, real_master: str, tmp_path: Path) -> None:
     def said() -> str:

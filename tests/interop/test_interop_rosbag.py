@@ -14,7 +14,7 @@ import pytest
 from minirospy.bag.compression import compress, decompress
 from tests.bag.bags import Given, connection, make_bag
 
-from .conftest import HERE, OUR_BIN, REAL_BIN, REAL_PYTHON
+from .conftest import HERE, OUR_BIN, PATIENCE, REAL_BIN, REAL_PYTHON
 
 PEER = HERE / "bag_peer.py"
 PYTHONS = {"ours": sys.executable, "real": REAL_PYTHON}
@@ -29,7 +29,7 @@ def peer(stack: str, verb: str, folder: Path) -> str:
     """Run bag_peer.py with the Python of a stack; return what it prints."""
     done = subprocess.run(
         [PYTHONS[stack], "-W", "ignore", str(PEER), verb, folder.name],
-        cwd=folder.parent, capture_output=True, text=True, timeout=120, check=False,
+        cwd=folder.parent, capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -42,7 +42,7 @@ def rosbag(stack: str, folder: Path, *words: str) -> tuple[int, str, str]:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     err = "".join(
@@ -186,7 +186,7 @@ def test_bags_in_other_commands_print_the_same(bags: Path, words: str) -> None:
             cwd=bags,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=PATIENCE,
             check=False,
         )
         for stack, folder in BINS.items()
@@ -248,7 +248,7 @@ def test_roslz4_reads_our_frames_and_we_its(size: int) -> None:
 
     def roslz4(verb: str, given: bytes) -> bytes:
         return subprocess.run(
-            [REAL_PYTHON, "-c", ROSLZ4, verb], input=given, capture_output=True, timeout=60, check=True
+            [REAL_PYTHON, "-c", ROSLZ4, verb], input=given, capture_output=True, timeout=PATIENCE, check=True
         ).stdout
 
     assert roslz4("decompress", compress("lz4", data)) == data

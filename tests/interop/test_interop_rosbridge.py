@@ -28,6 +28,7 @@ from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.bridge.bridge import Bridge, BridgeOptions
 from minirospy.errors import ServiceException
+from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import modules
 
@@ -85,7 +86,6 @@ async def serve(node: Node) -> list[Any]:
     return [latched, images, static, service, action]
 
 
-@pytest.mark.timeout(600)
 def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: str) -> None:
     async def run() -> tuple[dict[str, Any], list[Any]]:
         options = {"rosapi": True, "transforms": True}
@@ -106,11 +106,11 @@ def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: 
                     )
                     stack.push_async_callback(end, peer)
                     found = await line_of(peer)
-                    text, copy = await published.next(60), await copies.next(60)
-                    await node.wait_for_service("/ours", 60)
+                    text, copy = await published.next(PATIENCE), await copies.next(PATIENCE)
+                    await node.wait_for_service("/ours", PATIENCE)
                     response = await node.call("/ours", SetBool, True)
                     async with client:
-                        await client.wait_for_server(60)
+                        await client.wait_for_server(PATIENCE)
                         result = await client.send(FibonacciGoal(order=3))
 
                 async with serving(gate, "rosbridge", **options):
@@ -149,7 +149,7 @@ async def line_of(peer: asyncio.subprocess.Process) -> Any:
     """Return the next JSON that a program prints."""
     assert peer.stdout
     assert peer.stderr
-    line = await asyncio.wait_for(peer.stdout.readline(), 120)
+    line = await asyncio.wait_for(peer.stdout.readline(), PATIENCE)
     if not line:
         raise AssertionError((await peer.stderr.read()).decode())
     return json.loads(line)
@@ -176,7 +176,7 @@ def test_roslib_js_reads_every_compression(master: str, modules: Path) -> None:
                 env={**os.environ, "NODE_PATH": str(modules)},
             )
             try:
-                output, errors = await asyncio.wait_for(peer.communicate(), 90)
+                output, errors = await asyncio.wait_for(peer.communicate(), PATIENCE)
             finally:
                 if peer.returncode is None:
                     peer.kill()

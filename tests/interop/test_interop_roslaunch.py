@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import free_port
-from tests.interop.conftest import OUR_BIN, REAL_BIN, environment
+from tests.interop.conftest import OUR_BIN, PATIENCE, REAL_BIN, environment
 
 INNER = '<launch><arg name="k" default="d" doc="a key"/><param name="p" value="$(arg k)"/><node name="in" pkg="pkg" type="wait.py"/></launch>'
 OUTER = """<launch>
@@ -53,7 +53,7 @@ def say(stack: str, *words: str) -> tuple[int, str]:
         env=environment("http://localhost:1", stack),
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=PATIENCE,
         check=False,
     )
     return done.returncode, done.stdout
@@ -95,7 +95,7 @@ def read_until(process: subprocess.Popen[str], *words: str) -> str:
 
 def end(process: subprocess.Popen[str]) -> str:
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=40)
+    said, _ = process.communicate(timeout=PATIENCE)
     return said
 
 
@@ -159,7 +159,7 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
 
     try:
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
-        refused, _ = process.communicate(timeout=40)
+        refused, _ = process.communicate(timeout=PATIENCE)
         assert "Host key verification failed" in refused
         assert "unable to start remote roslaunch child" in refused
 

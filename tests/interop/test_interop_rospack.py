@@ -146,7 +146,6 @@ def ours(line: str, cwd: Path | None = None, function: str = "main") -> tuple[in
     )
 
 
-@pytest.mark.timeout(180)
 def test_rospack_prints_equal_bytes_and_statuses(tree: Path) -> None:
     different = {line: (real(line), ours(line)) for line in SAME if real(line) != ours(line)}
     assert not different

@@ -11,7 +11,7 @@ import pytest
 
 from tests.conftest import write_files
 
-from .conftest import OUR_BIN, REAL_BIN, REAL_PYTHON
+from .conftest import OUR_BIN, PATIENCE, REAL_BIN, REAL_PYTHON
 
 _NODE = """
 import rospy
@@ -49,7 +49,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tuple[int, str]:
     """Return the exit status of a command, and what it prints on standard output."""
     done = subprocess.run(
-        [str(path / program), *words], input=stdin, capture_output=True, text=True, timeout=30, check=False,
+        [str(path / program), *words], input=stdin, capture_output=True, text=True, timeout=PATIENCE, check=False,
         env={**os.environ, "PYTHONWARNINGS": "ignore"},
     )  # fmt: skip
     return done.returncode, done.stdout

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.interop.conftest import PATIENCE
+
 SCRIPT = Path(__file__).parents[1] / "referee" / "compare_surface.py"
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / f"{name}_compatibility.md" for name in ("rospy", "modules", "tf")]
@@ -13,7 +15,11 @@ PAGES = [DOCS / f"{name}_compatibility.md" for name in ("rospy", "modules", "tf"
 
 def test_the_pages_are_up_to_date() -> None:
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), "--check"], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, str(SCRIPT), "--check"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -28,7 +34,7 @@ def test_a_star_of_actionlib_brings_the_same_names() -> None:
     names = [
         set(
             subprocess.run(
-                [python, "-c", script], capture_output=True, text=True, timeout=60, check=True
+                [python, "-c", script], capture_output=True, text=True, timeout=PATIENCE, check=True
             ).stdout.split()
         )
         for python in (sys.executable, "/usr/bin/python3")

@@ -100,7 +100,7 @@ def test_transformations_return_what_the_real_module_returns() -> None:
 @pytest.fixture(scope="module")
 def tf_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """tf_peer.cpp, compiled."""
-    return compiled("tf_peer.cpp", tmp_path_factory.mktemp("cpp"), "tf2_ros")
+    return compiled("tf_peer.cpp", tmp_path_factory, "tf2_ros")
 
 
 class Peer:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import REAL_PYTHON, environment
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
 DRIVE = Path(__file__).parents[1] / "topic_tools" / "drive.py"
 
@@ -19,7 +19,7 @@ def test_real_programs_pass_on_what_is_recorded(real_master: str) -> None:
         env=environment(real_master, "rospy"),
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -44,7 +44,7 @@ def test_lazy_program_prints_the_same_under_ros(
         env=environment(real_master, "rospy"),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.stdout.split() == printed, done.stderr
