@@ -14,32 +14,41 @@ namespace
 using Client = actionlib::SimpleActionClient<actionlib::TestAction>;
 using Server = actionlib::SimpleActionServer<actionlib::TestAction>;
 
-const ros::Duration kSeconds(20.0);
+const ros::Duration kSeconds(200.0);
 
 void say(const std::string& line) { std::cout << line << std::endl; }
 
 std::string yes(bool value) { return value ? "True" : "False"; }
+
+void waitFor(const std::string& report, int goal)
+{
+  for (int found = 0; ros::ok() && !(ros::param::get(report, found) && found >= goal);)
+  {
+    ros::Duration(0.01).sleep();
+  }
+}
 
 void serve()
 {
   std::unique_ptr<Server> server;
   server.reset(new Server("interop_action", [&server](const actionlib::TestGoalConstPtr& goal) {
     actionlib::TestResult result;
-    result.result = goal->goal;
-    if (goal->goal == 1)
+    result.result = goal->goal % 10;
+    if (result.result == 1)
     {
+      waitFor("/sent", goal->goal);
       for (int number : {10, 11, 12})
       {
         actionlib::TestFeedback feedback;
         feedback.feedback = number;
         server->publishFeedback(feedback);
       }
-      ros::Duration(0.2).sleep();
+      waitFor("/heard", goal->goal);
       server->setSucceeded(result, "reached");
     }
-    else if (goal->goal == 2)
+    else if (result.result == 2)
     {
-      ros::Duration(0.1).sleep();
+      waitFor("/sent", goal->goal);
       server->setAborted(result, "failed");
     }
     else
@@ -69,13 +78,27 @@ void ask()
 {
   Client client("interop_action", true);
   say("server " + yes(client.waitForServer(kSeconds)));
-  auto send = [&client](int number) {
-    auto goal = std::make_shared<Goal>();
+  int tens = 0;
+  auto numbered = [&tens](int kind) {
     actionlib::TestGoal message;
-    message.goal = number;
+    message.goal = (tens += 10) + kind;
+    // Nothing is lost of what comes while it is sent.
+    ros::param::set("/sent", message.goal);
+    return message;
+  };
+  auto send = [&client, &numbered](int kind) {
+    auto goal = std::make_shared<Goal>();
+    const actionlib::TestGoal message = numbered(kind);
+    const int number = message.goal;
     client.sendGoal(
         message, Client::SimpleDoneCallback(), Client::SimpleActiveCallback(),
-        [goal](const actionlib::TestFeedbackConstPtr& feedback) { goal->feedback.push_back(feedback->feedback); });
+        [goal, number](const actionlib::TestFeedbackConstPtr& feedback) {
+          goal->feedback.push_back(feedback->feedback);
+          if (feedback->feedback == 12)
+          {
+            ros::param::set("/heard", number);
+          }
+        });
     return goal;
   };
   auto tell = [&client](const std::string& what, const std::shared_ptr<Goal>& goal) {
@@ -91,7 +114,7 @@ void ask()
     say(line);
   };
   auto untilActive = [&client]() {
-    for (int i = 0; i < 2000 && client.getState() != actionlib::SimpleClientGoalState::ACTIVE; ++i)
+    for (int i = 0; i < 20000 && client.getState() != actionlib::SimpleClientGoalState::ACTIVE; ++i)
     {
       ros::Duration(0.01).sleep();
     }
@@ -118,11 +141,10 @@ void ask()
   untilActive();
   client.cancelGoalsAtAndBeforeTime(ros::Time::now());
   tell("cancelled by time", goal);
-  actionlib::TestGoal message;
-  message.goal = 3;
-  say("out of time " + client.sendGoalAndWait(message, ros::Duration(0.3), kSeconds).toString());
-  message.goal = 2;
-  say("in time " + client.sendGoalAndWait(message, kSeconds, ros::Duration(0)).toString());
+  const std::string state = client.sendGoalAndWait(numbered(3), ros::Duration(0.3), kSeconds).toString();
+  // Recalled where the cancel has overtaken the goal, which has another connection.
+  say("out of time " + yes(state == "PREEMPTED" || state == "RECALLED"));
+  say("in time " + client.sendGoalAndWait(numbered(2), kSeconds, ros::Duration(0)).toString());
 }
 }  // namespace
 

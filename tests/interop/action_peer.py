@@ -1,10 +1,13 @@
 """One end of an action, for the interop tests: runs on actionlib and on ours alike. action_peer.cpp is its twin.
 
 `serve` prints "ready" and serves /interop_action until its input ends; `ask` sends goals and prints how they ended.
-Goal 1 succeeds with feedback, 2 aborts, 3 runs until it is preempted. None ends immediately: a client of actionlib in
-Python does not take an answer that comes before its send_goal() has returned.
+Of a goal's number, the last digit says what it does: 1 succeeds with feedback, 2 aborts, 3 runs until it is preempted; the
+tens count the goals. The client reports by parameters how far it is, and the server waits for that: /sent is the last goal
+that was sent, for a client of actionlib in Python ignores what comes before its send_goal() has returned; /heard is the last
+one whose feedback has arrived, for that and the result have separate connections.
 """
 
+import itertools
 import sys
 import threading
 
@@ -14,23 +17,29 @@ from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
 from actionlib_msgs.msg import GoalStatus
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and value}
-SECONDS = 40.0
+SECONDS = 200.0
 
 
 def say(*words):
     print(*words, flush=True)
 
 
+def wait_for(report, goal):
+    while rospy.get_param(report, 0) < goal.goal and not rospy.is_shutdown():
+        rospy.sleep(0.01)
+
+
 def serve():
     def execute(goal):
-        if goal.goal == 1:
+        kind = goal.goal % 10
+        if kind == 1:
+            wait_for("/sent", goal)
             for number in (10, 11, 12):
                 server.publish_feedback(TestFeedback(number))
-            # Feedback and result have separate connections: after its result a goal gets no feedback.
-            rospy.sleep(0.2)
+            wait_for("/heard", goal)
             server.set_succeeded(TestResult(1), "reached")
-        elif goal.goal == 2:
-            rospy.sleep(0.1)
+        elif kind == 2:
+            wait_for("/sent", goal)
             server.set_aborted(TestResult(2), "failed")
         else:
             while not server.is_preempt_requested() and not rospy.is_shutdown():
@@ -44,17 +53,33 @@ def serve():
     rospy.signal_shutdown("")
 
 
-def ask():
-    client = actionlib.SimpleActionClient("interop_action", TestAction)
-    say("server", client.wait_for_server(rospy.Duration.from_sec(SECONDS)))
+class Client(actionlib.SimpleActionClient):
+    def send_goal(self, goal, *callbacks):
+        super().send_goal(goal, *callbacks)
+        rospy.set_param("/sent", goal.goal)
 
-    def send(goal):
-        heard, done = [], threading.Event()
+
+def ask():
+    client = Client("interop_action", TestAction)
+    say("server", client.wait_for_server(rospy.Duration.from_sec(SECONDS)))
+    tens = itertools.count(10, 10)
+
+    def numbered(kind):
+        return TestGoal(next(tens) + kind)
+
+    def send(kind):
+        heard, done, goal = [], threading.Event(), numbered(kind)
+
+        def on_feedback(feedback):
+            heard.append(feedback.feedback)
+            if feedback.feedback == 12:
+                rospy.set_param("/heard", goal.goal)
+
         client.send_goal(
-            TestGoal(goal),
+            goal,
             lambda state, result: (heard.append((NAMES[state], result.result)), done.set()),
             None,
-            lambda feedback: heard.append(feedback.feedback),
+            on_feedback,
         )
         return heard, done
 
@@ -99,10 +124,11 @@ def ask():
     client.cancel_goals_at_and_before_time(rospy.Time.now())
     tell("cancelled by time", heard, done)
     state = client.send_goal_and_wait(
-        TestGoal(3), rospy.Duration.from_sec(0.3), rospy.Duration.from_sec(SECONDS)
+        numbered(3), rospy.Duration.from_sec(0.3), rospy.Duration.from_sec(SECONDS)
     )
-    say("out of time", NAMES[state])
-    state = client.send_goal_and_wait(TestGoal(2), rospy.Duration.from_sec(SECONDS))
+    # Recalled where the cancel has overtaken the goal, which has another connection.
+    say("out of time", NAMES[state] in ("PREEMPTED", "RECALLED"))
+    state = client.send_goal_and_wait(numbered(2), rospy.Duration.from_sec(SECONDS))
     say("in time", NAMES[state])
 
 

@@ -41,7 +41,7 @@ all cancelled feedback
 state ACTIVE
 cancelled by time True PREEMPTED made way 3
 cancelled by time feedback
-out of time PREEMPTED
+out of time True
 in time ABORTED
 """
 
