@@ -23,12 +23,12 @@ int main(int argc, char** argv)
   spinner.start();
   bond::Bond bond(argv[1], argv[2], [] { say("broken"); }, [] { say("formed"); });
   bond.setConnectTimeout(std::stod(argv[3]));
-  bond.setHeartbeatTimeout(1.5);
+  bond.setHeartbeatTimeout(std::stod(argv[4]));
   bond.setHeartbeatPeriod(0.2);
   bond.setDisconnectTimeout(1.0);
   bond.start();
   std::thread([&] {
-    bool broken = bond.waitUntilBroken(ros::WallDuration(100));
+    bool broken = bond.waitUntilBroken(ros::WallDuration(300));
     say(std::string("waited ") + (broken ? "True" : "False") + (bond.isBroken() ? " True True" : " False False"));
   }).detach();
   std::string line;
@@ -38,7 +38,7 @@ int main(int argc, char** argv)
       bond.breakBond();
     else if (line == "wait")
     {
-      bool known = bond.waitUntilFormed(ros::WallDuration(50));
+      bool known = bond.waitUntilFormed(ros::WallDuration(200));
       // It notices silence only after the second heartbeat.
       for (int beats = 0; beats < 3;)
         beats += ros::topic::waitForMessage<bond::Status>(argv[1])->instance_id != bond.getInstanceId();

@@ -20,14 +20,14 @@ def say(*words):
 
 bond = bondpy.Bond(sys.argv[1], sys.argv[2], lambda: say("broken"), lambda: say("formed"))
 bond.connect_timeout = float(sys.argv[3])
-bond.set_heartbeat_timeout(1.5)
+bond.set_heartbeat_timeout(float(sys.argv[4]))
 bond.heartbeat_period = 0.2
 bond.disconnect_timeout = 1.0
 bond.start()
 
 
 def wait():
-    say("waited", bond.wait_until_broken(rospy.Duration(100)), bond.is_broken(), "Dead" in repr(bond))
+    say("waited", bond.wait_until_broken(rospy.Duration(300)), bond.is_broken(), "Dead" in repr(bond))
 
 
 threading.Thread(target=wait, daemon=True).start()
@@ -35,10 +35,10 @@ for line in sys.stdin:
     if line.strip() == "break":
         bond.break_bond()
     elif line.strip() == "wait":
-        known = bond.wait_until_formed(rospy.Duration(50))
+        known = bond.wait_until_formed(rospy.Duration(200))
         beats = 0
         while beats < 3:
             # Debian's notices silence only after the second heartbeat.
-            beats += rospy.wait_for_message(sys.argv[1], Status, 50).instance_id != bond.instance_id
+            beats += rospy.wait_for_message(sys.argv[1], Status, 200).instance_id != bond.instance_id
         say("known", known)
 bond.shutdown()

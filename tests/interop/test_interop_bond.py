@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import REAL_PYTHON, compiled, start, stop
+from tests.interop.conftest import PATIENCE, REAL_PYTHON, compiled, start, stop
 
 HERE = Path(__file__).parent
 PAIRS = [("ours", "ours"), ("ours", "rospy"), ("rospy", "ours"), ("ours", "roscpp"), ("roscpp", "ours")]
@@ -29,13 +29,17 @@ def end(master: str, request: pytest.FixtureRequest) -> Iterator[Start]:
     """Start an end of a bond of a stack; it is ended after the test."""
     with ExitStack() as stack:
 
-        def make(which: str, connect_timeout: float = 50.0) -> subprocess.Popen[str]:
+        def make(
+            which: str, *, connect_timeout: float = PATIENCE, heartbeat_timeout: float = PATIENCE
+        ) -> subprocess.Popen[str]:
             programs = {
                 "ours": [sys.executable, str(HERE / "bond_peer.py")],
                 "rospy": [REAL_PYTHON, str(HERE / "bond_peer.py")],
             }
             command = programs.get(which) or [str(request.getfixturevalue("cpp_bond"))]
-            program = start([*command, "/bonds", "pair", str(connect_timeout)], master, which)
+            program = start(
+                [*command, "/bonds", "pair", str(connect_timeout), str(heartbeat_timeout)], master, which
+            )
             stack.callback(stop, program)
             return program
 
@@ -67,7 +71,8 @@ def test_bond_that_one_end_breaks_breaks_at_the_other(one: str, other: str, end:
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_bond_with_a_killed_end_breaks(one: str, other: str, end: Start) -> None:
-    ends = end(one), end(other)
+    # So long may an end stall that lives.
+    ends = end(one, heartbeat_timeout=10.0), end(other)
     assert [lines(each, 1) for each in ends] == [["formed"], ["formed"]]
     send(ends[0], "wait")
     assert lines(ends[0], 1) == ["known True"]
@@ -76,5 +81,5 @@ def test_bond_with_a_killed_end_breaks(one: str, other: str, end: Start) -> None
 
 
 def test_end_that_is_alone_breaks_after_its_time(end: Start) -> None:
-    found = [lines(end(stack, 0.5), 2) for stack in ("ours", "rospy", "roscpp")]
+    found = [lines(end(stack, connect_timeout=0.5), 2) for stack in ("ours", "rospy", "roscpp")]
     assert found == [ENDED, ENDED, ENDED]
