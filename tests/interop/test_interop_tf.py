@@ -15,7 +15,7 @@ import pytest
 
 from minirospy.compat.tf import transformations
 from tests.frames import transformations_calls
-from tests.interop.conftest import HERE, REAL_PYTHON, compiled, start, stop
+from tests.interop.conftest import HERE, PATIENCE, REAL_PYTHON, compiled, start, stop
 from tests.tf2.conversation import difference, edge_cases, query_real, questions, shortened
 from tests.tf2.ours import our_answers
 
@@ -191,9 +191,21 @@ pose = TransformStamped(child_frame_id="base")
 pose.header.frame_id = "map"
 pose.transform.translation.x, pose.transform.rotation.w = 2.5, 1.0
 static.sendTransform(pose)
-client = tf2_ros.BufferClient("tf2_buffer_server")
+# So long may the server stall.
+client = tf2_ros.BufferClient("tf2_buffer_server", timeout_padding=rospy.Duration(20))
 print(client.wait_for_server(rospy.Duration(60)))
-found = client.lookup_transform("map", "base", rospy.Time(0), rospy.Duration(60))
+
+
+def patiently(call, *arguments):
+    # actionlib's client in Python misses an answer that comes before its send_goal() has returned.
+    while True:
+        try:
+            return call(*arguments)
+        except tf2_ros.TimeoutException:
+            continue
+
+
+found = patiently(client.lookup_transform, "map", "base", rospy.Time(0), rospy.Duration(60))
 print(found.transform.translation.x, found.header.frame_id, found.child_frame_id)
 print(client.can_transform("map", "nowhere", rospy.Time(0)))
 for call in (
@@ -202,10 +214,11 @@ for call in (
     lambda: client.lookup_transform_full("base", rospy.Time(1), "base", rospy.Time(2), "nowhere"),
 ):
     try:
-        call()
+        patiently(call)
     except tf2_ros.TransformException as error:
         print(type(error).__name__, error)
-print(client.lookup_transform_full("base", rospy.Time(1), "base", rospy.Time(2), "map").transform.translation.x)
+full = patiently(client.lookup_transform_full, "base", rospy.Time(1), "base", rospy.Time(2), "map")
+print(full.transform.translation.x)
 """
 ANSWERED = """\
 True
@@ -227,7 +240,7 @@ def test_buffer_servers_and_clients(server: str, client: str, real_master: str) 
     try:
         python = sys.executable if client == "ours" else REAL_PYTHON
         looking = start([python, "-c", CLIENT], real_master, client)
-        printed, errors = looking.communicate(timeout=100)
+        printed, errors = looking.communicate(timeout=PATIENCE)
         assert [line.rstrip() for line in printed.splitlines()] == ANSWERED.splitlines(), errors
     finally:
         stop(serving)
