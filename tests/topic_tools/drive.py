@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 
 import rosgraph
 import roslib.message
@@ -24,6 +25,8 @@ from topic_tools.srv import (
 )
 
 FOLDER, *STARTER = sys.argv[1:]
+SECONDS = 100
+"""After which something is taken to hang."""
 rospy.init_node("drive", argv=[])
 
 
@@ -33,7 +36,8 @@ def say(*words):
 
 def wait_for(condition):
     waiting = threading.Event()
-    for _ in range(1000):
+    end = time.monotonic() + SECONDS
+    while time.monotonic() < end:
         if condition():
             return True
         waiting.wait(0.02)
@@ -61,22 +65,33 @@ class Heard:
 
     def __init__(self, topic):
         self.messages = queue.Queue()
+        self.last = None
         self.subscriber = rospy.Subscriber(topic, String, self.messages.put)
         wait_for(self.subscriber.get_num_connections)
 
     def next(self, after=""):
         """Return the next message; roscpp may send a latched one twice to a subscriber that has just come."""
-        message = self.messages.get(timeout=20)
+        message = self.messages.get(timeout=SECONDS)
         while message.data == after:
-            message = self.messages.get(timeout=20)
+            message = self.messages.get(timeout=SECONDS)
         return (
             message.data,
             message._connection_header["type"],
             message._connection_header.get("latching", "0"),
         )
 
+    def changes(self, count):
+        """Return the texts of a latched topic, without one that comes twice."""
+        found = []
+        while len(found) < count:
+            text = self.messages.get(timeout=SECONDS).data
+            if text != self.last:
+                found.append(text)
+            self.last = text
+        return found
+
     def texts(self, count):
-        return [self.messages.get(timeout=20).data for _ in range(count)]
+        return [self.messages.get(timeout=SECONDS).data for _ in range(count)]
 
 
 def text(number):
@@ -120,9 +135,11 @@ for kind, parameters in (
         say(kind, "leaves", wait_for(lambda source=source: not readers(source)))
         heard = Heard(target) if kind != "stealth" else rospy.Subscriber("/watched", String, print)
         say(kind, "comes back", wait_for(lambda source=source: readers(source)))
-        wait_for(publisher.get_num_connections)
-        publisher.publish("second")
         if kind != "stealth":
+            # The connection that was left may still be counted, and the new one not be there yet.
+            wait_for(
+                lambda publisher=publisher, heard=heard: publisher.publish("second") or heard.messages.qsize()
+            )
             say(kind, heard.next()[0])
             heard.subscriber.unregister()
         else:
@@ -142,7 +159,7 @@ with Program("relay", "points", "/points_out"):
     message = PointStamped()
     message.header.stamp, message.header.frame_id, message.point.z = rospy.Time(5, 6), "a", 7.5
     publisher.publish(message)
-    found = rospy.wait_for_message("/points_out", PointStamped, 20)
+    found = rospy.wait_for_message("/points_out", PointStamped, SECONDS)
     say("relay", found.header.stamp.to_nsec(), found.header.frame_id, found.point.z)
 
 with Program("drop", "/d", "1", "3"):
@@ -203,7 +220,7 @@ for words in (
     ),
 ):
     with Program(*words):
-        found = rospy.wait_for_message(words[2], roslib.message.get_message_class(words[3]), 20)
+        found = rospy.wait_for_message(words[2], roslib.message.get_message_class(words[3]), SECONDS)
         say(words[0], re.sub(r"seq: \d+ ", "", " ".join(str(found).split())))
 
 timer.shutdown()
@@ -213,7 +230,7 @@ with Program("mux", "/chosen", "/left", "/right"):
         rospy.ServiceProxy(f"/mux/{name}", cls)
         for name, cls in (("select", MuxSelect), ("add", MuxAdd), ("delete", MuxDelete), ("list", MuxList))
     )
-    names.wait_for_service(20)
+    names.wait_for_service(SECONDS)
 
     def attempt(call, *arguments):
         try:
@@ -222,13 +239,13 @@ with Program("mux", "/chosen", "/left", "/right"):
             return "refused"
 
     selected = Heard("/mux/selected")
-    say("mux", selected.texts(1), names().topics)
+    say("mux", selected.changes(1), names().topics)
     left, right = connected("/left", False), connected("/right", False)
     right.publish("advertise")
     heard = Heard("/chosen")
     for choice in ("/right", "right", "__none", "/left", "/nothing"):
         say("mux select", choice, attempt(select, choice))
-    say("mux", selected.texts(4))
+    say("mux", selected.changes(4))
     right.publish("not this")
     left.publish("from the left")
     say("mux", heard.texts(1))
@@ -257,22 +274,27 @@ with Program("demux", "/apart", "/one", "/two"):
             ("list", DemuxList),
         )
     )
-    names.wait_for_service(20)
+    names.wait_for_service(SECONDS)
     source = connected("/apart", False)
     heard = {}
     for topic in ("/one", "/two"):
         heard[topic] = queue.Queue()
         rospy.Subscriber(topic, String, heard[topic].put)
     selected = Heard("/demux/selected")
-    say("demux", selected.texts(1), sorted(names().topics))
-    source.publish("a")
-    message = heard["/one"].get(timeout=20)
+    say("demux", selected.changes(1), sorted(names().topics))
+    # It advertises an output with the first message, and does not wait for subscribers as long as they may take.
+    wait_for(lambda: source.publish("a") or heard["/one"].qsize())
+    message = heard["/one"].get(timeout=SECONDS)
     say("demux", message.data, message._connection_header.get("latching", "0"))
     for choice in ("two", "/nothing", "__none", "/two"):
         say("demux select", choice, attempt(select, choice))
-    say("demux", selected.texts(3))
-    source.publish("b")
-    say("demux", heard["/two"].get(timeout=20).data, heard["/one"].qsize())
+    say("demux", selected.changes(3))
+    wait_for(lambda: source.publish("b") or heard["/two"].qsize())
+    message = heard["/two"].get(timeout=SECONDS)
+    while message.data == "a":
+        # The choice of the other output has overtaken it.
+        message = heard["/two"].get(timeout=SECONDS)
+    say("demux", message.data, sum(each.data == "b" for each in heard["/one"].queue))
     for call in (
         (add, "third"),
         (add, "/third"),
@@ -298,7 +320,7 @@ with Program("mux", "/out", "/a", "/b"):
             [*STARTER, f"{FOLDER}/{words[0]}", *words[1:]],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=SECONDS,
             check=False,
         )
         say(words, done.returncode, sorted(done.stdout.split("\n")))
