@@ -21,6 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.interop.conftest import PATIENCE
+
 PAGE = Path(__file__).parents[2] / "docs" / "command_compatibility.md"
 REAL = Path("/usr/bin")
 OURS = Path(sys.executable).parent
@@ -561,6 +563,17 @@ rosparam load values.yaml
 OTHER_WORDS = {"rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3"}
 """Lines where ROS prints an error that ours does not print first: what is an error in ROS is none here."""
 
+_ENDLESS = {
+    """rostopic echo -n1 --filter "topic=='/poly'" /poly""",
+    "rostopic echo -n1 /button_state/nope",
+    "rostopic echo -n1 /poly/polygon/points/x",
+    "rostopic echo -n1 --filter 'm.(' /button_state",
+}
+"""Lines that never end in real ROS: they are interrupted."""
+_ENDLESS_SECONDS = 25.0
+_TRIES = 5
+"""How often a line is typed whose output is that of the moment: where a node or the machine stalls, the two sides differ."""
+
 _STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
 _CHANGING = [
     # Numbers of messages, times, processes and ports: they differ from run to run.
@@ -644,10 +657,20 @@ def compare(
                 for line in lines
             ]
             real, ours = ([job[side].result() for job in jobs] for side in (0, 1))
-    return [
+    rows = [
         Row(_typed(line, streaming), *both, line.partition(" ## ")[2])
         for line, both in zip(lines, zip(real, ours, strict=True), strict=True)
     ]
+
+    for index, line in enumerate(lines):
+        of_the_moment = not prepare and (streaming or line.startswith("rosnode ping"))
+        for _ in range(_TRIES - 1 if of_the_moment else 0):
+            row = rows[index]
+            if row.equal != bool(row.why):
+                break
+            both = [_run(line, tools, uri, folder, streaming) for tools in (REAL, OURS)]
+            rows[index] = row._replace(real=both[0], ours=both[1])
+    return rows
 
 
 def unexpected(rows: Iterable[Row]) -> str:
@@ -748,12 +771,14 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
     if streaming:
         return _interrupted(program, count)
 
+    is_endless = tools == REAL and typed in _ENDLESS
     try:
-        out, err = program.communicate(text.replace("\\n", "\n"), timeout=25)
+        given = text.replace("\\n", "\n")
+        out, err = program.communicate(given, timeout=_ENDLESS_SECONDS if is_endless else PATIENCE)
         status: int | str = program.returncode
     except subprocess.TimeoutExpired:
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=40)
+        out, err = program.communicate(timeout=PATIENCE)
         status = "never"
 
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
@@ -769,9 +794,10 @@ def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
     assert program.stdout
     lines = "".join(_until_filled(program.stdout, count))
     program.send_signal(signal.SIGINT)
-    _, err = program.communicate(timeout=40)
-    # The numbers, and the width of columns that hold them, are those of the moment.
-    text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", _STREAM_NUMBERS.sub("0", lines)))
+    _, err = program.communicate(timeout=PATIENCE)
+    # The numbers, their units, and the width of columns that hold them, are those of the moment.
+    text = re.sub(r"(?<=0)[KM]B", "B", _STREAM_NUMBERS.sub("0", lines))
+    text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", text))
     return Ended(program.returncode, text, err)
 
 

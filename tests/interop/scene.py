@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from typing import Any
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import Point32, PolygonStamped
 from sensor_msgs.msg import Image, JointState, LaserScan
@@ -30,6 +32,12 @@ def latch(topic: str, message: Any) -> None:
     publisher = rospy.Publisher(topic, type(message), queue_size=1, latch=True)
     publisher.publish(message)
     kept.append(publisher)
+
+
+def connected_topics() -> set[str]:
+    with ServerProxy(rospy.get_node_uri() or "") as own:
+        answer: Any = own.getBusInfo("/scene")
+    return {row[4] for row in answer[2] if row[5]}
 
 
 def fail(request: object) -> Any:
@@ -72,6 +80,9 @@ rospy.set_param(
         "l": [1, "a: b", [2, 3]], "d": {"q": {"r": 1e-7}, "t": "yes"}, "big": 1e20,
     },
 )  # fmt: skip
-rospy.sleep(0.5)
+# What the tools show of its connections: its own, and that of roscore's node where there is one.
+wanted = {"/button_state", "/rosout"} & {topic for topic, _ in rosgraph.Master("/scene").getSystemState()[1]}
+while not wanted <= connected_topics():
+    rospy.sleep(0.02)
 print("ready", flush=True)
 rospy.spin()
