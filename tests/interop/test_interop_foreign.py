@@ -26,6 +26,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.times import Time
+from tests.interop.conftest import PATIENCE
 
 FOREIGN = Path(__file__).parent / "foreign"
 MSGS = Path(__file__).parents[2] / "msgs"
@@ -84,7 +85,7 @@ class Peer:
     async def line(self) -> str:
         """Return the next line."""
         assert self._process.stdout
-        return (await asyncio.wait_for(self._process.stdout.readline(), 120)).decode().rstrip()
+        return (await asyncio.wait_for(self._process.stdout.readline(), PATIENCE)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
         """Return what it prints, now or before, about ``what``."""
@@ -102,14 +103,14 @@ class Peer:
         assert self._process.stdin
         self._process.stdin.close()
         try:
-            await asyncio.wait_for(self._process.wait(), 5)
+            await asyncio.wait_for(self._process.wait(), 20)
         except asyncio.TimeoutError:
             self._process.kill()
             await self._process.wait()
 
 
 def run(scene: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(asyncio.wait_for(scene, 55))
+    asyncio.run(asyncio.wait_for(scene, 2 * PATIENCE))
 
 
 def scan() -> LaserScan:
@@ -127,7 +128,7 @@ async def offer(node: Node) -> None:
 
 async def check_scan(node: Node) -> None:
     """Check that the foreign node's scan has arrived as it was sent."""
-    got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=40)
+    got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=PATIENCE)
     assert (got.header.frame_id, list(got.ranges), got.range_max) == tuple(SCAN.values())
     assert got.header.stamp == Time(1234567890, 987654321)
 
@@ -135,7 +136,7 @@ async def check_scan(node: Node) -> None:
 async def check_beats(node: Node, peer: Peer) -> None:
     """Check that a stream of ours arrives whole and in order."""
     beats = await node.advertise("/ours/beat", Int32, queue_size=0)
-    await beats.wait_for_subscribers(timeout=40)
+    await beats.wait_for_subscribers(timeout=PATIENCE)
     for number in range(100):
         await beats.publish(number)
     assert [await peer.says("beat") for _ in range(100)] == list(range(100))
@@ -180,7 +181,11 @@ def test_rosnodejs_exchanges_messages_and_calls(master: str, modules: Path) -> N
                     proxy.close()
                     async with ActionClient(node, "/foreign/fibonacci", FibonacciAction) as action:
                         goal = action.send(FibonacciGoal(4))
-                        assert [list(each.sequence) async for each in goal] == [[0]]
+                        feedback = []
+                        async for each in goal:
+                            feedback.append(list(each.sequence))
+                            await node.set_param("/foreign/heard", True)
+                        assert feedback == [[0]]
                         assert list((await goal).sequence) == [7] * 4
                     assert await peer.says("fibonacci") == [1, 1, 1]
                     await peer.says("done")
@@ -223,7 +228,7 @@ def test_our_nodes_use_the_master_of_foxglove(modules: Path) -> None:
 
             async with Node("ours", master_uri=uri) as node, Node("others", master_uri=uri) as others:
                 await offer(node)
-                got = await others.wait_for_message("/ours/scan", LaserScan, timeout=40)
+                got = await others.wait_for_message("/ours/scan", LaserScan, timeout=PATIENCE)
                 assert list(got.ranges) == SCAN["ranges"]
                 await node.serve("/ours/flag", SetBool, set_flag)
                 assert (await others.call("/ours/flag", SetBool, data=True)).success

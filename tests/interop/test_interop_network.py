@@ -23,6 +23,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.interop.conftest import PATIENCE
+
 HERE = Path(__file__).parent
 REAL_PYTHON = "/usr/bin/python3"
 OUR_BIN = Path(sys.executable).parent
@@ -120,7 +122,7 @@ class Network:
     def doctor(self, machine: str, *others: str, **variables: str) -> list[str]:
         """Return what `minirospy doctor` prints there."""
         words = [str(OUR_BIN / "minirospy"), "doctor", *others]
-        return self.start(machine, words, **variables).lines_until_end(20)
+        return self.start(machine, words, **variables).lines_until_end()
 
     def publish(self, machine: str, **variables: str) -> None:
         """One publisher more of /beat there."""
@@ -154,22 +156,22 @@ class Program:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def wait_for(self, text: str, timeout: float = 40.0) -> str:
+    def wait_for(self, text: str) -> str:
         """Return the next line with ``text`` in it."""
-        end = time.monotonic() + timeout
+        end = time.monotonic() + PATIENCE
         while True:
             try:
                 line = self._lines.get(timeout=max(0.0, end - time.monotonic()))
             except queue.Empty:
-                raise AssertionError(f"no line with {text!r} in {timeout} s: {self.seen}") from None
+                raise AssertionError(f"no line with {text!r} in {PATIENCE} s: {self.seen}") from None
             assert line is not None, f"ended without a line with {text!r}: {self.seen}"
             if text in line:
                 return line
 
-    def lines_until_end(self, timeout: float) -> list[str]:
+    def lines_until_end(self) -> list[str]:
         """All its lines."""
-        self._reader.join(timeout)
-        assert not self._reader.is_alive(), f"goes on after {timeout} s: {self.seen}"
+        self._reader.join(PATIENCE)
+        assert not self._reader.is_alive(), f"goes on after {PATIENCE} s: {self.seen}"
         return self.seen
 
     def end(self, *, kill: bool = False) -> None:
@@ -185,8 +187,8 @@ class Program:
                 kill = True
         if kill:
             process.kill()
-        process.wait(5)
-        self._reader.join(5)
+        process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
         assert process.stdout
         process.stdin.close()
         process.stdout.close()
@@ -234,7 +236,7 @@ def start_master(network: Network, machine: str = "alpha", stack: str = "ours", 
         return master
     master = network.start(machine, ["/usr/bin/rosmaster", "--core", "-p", str(PORT)], **variables)
     probe = f"import socket, time\nwhile socket.socket().connect_ex(('127.0.0.1', {PORT})): time.sleep(0.05)"
-    network.start(machine, [sys.executable, "-c", probe]).lines_until_end(15)
+    network.start(machine, [sys.executable, "-c", probe]).lines_until_end()
     return master
 
 
@@ -262,7 +264,7 @@ def test_two_machines_exchange_messages_calls_and_goals(
     """No variable but ROS_MASTER_URI: machines tell their names, which their hosts files hold."""
     start_master(network, stack=core)
     network.peer("alpha", "robot", robot).wait_for("ready")
-    lines = network.peer("beta", "laptop", laptop).lines_until_end(20)
+    lines = network.peer("beta", "laptop", laptop).lines_until_end()
     assert [line for line in lines if line in ALL] == ALL, lines
 
 
@@ -270,7 +272,7 @@ def test_two_machines_exchange_messages_by_ipv6(network: Network) -> None:
     start_master(network, ROS_IPV6="on", ROS_HOSTNAME="alpha6")
     on = {"ROS_IPV6": "on", "ROS_MASTER_URI": f"http://alpha6:{PORT}"}
     network.peer("alpha", "robot", "rospy", ROS_HOSTNAME="alpha6", **on).wait_for("ready")
-    lines = network.peer("beta", "laptop", ROS_IP=BETA6, **on).lines_until_end(20)
+    lines = network.peer("beta", "laptop", ROS_IP=BETA6, **on).lines_until_end()
     assert [line for line in lines if line in ALL] == ALL, lines
     lines = network.doctor("beta", ROS_HOSTNAME="beta6", **on)
     assert "ok      return path: the master's machine (alpha6) reaches nodes of this one" in lines
@@ -423,4 +425,7 @@ def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
     start_master(network)
     listener.wait_for("has restarted: registered again")
     network.peer("alpha", "listen").wait_for("beat")
+    # What it prints may come later than the message that it sent.
+    for _ in range(2):
+        robot.wait_for("subscribed")
     assert sum(line == "subscribed" for line in robot.seen) == 2

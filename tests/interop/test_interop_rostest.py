@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from tests.interop.conftest import PATIENCE
+
 ROOT = Path(__file__).parents[2]
 TESTED = ROOT / "tests" / "testing"
 OUR_BIN = Path(sys.executable).parent
@@ -52,7 +54,7 @@ class Ran:
     def end(self) -> tuple[int, str]:
         """Return the exit status, and what was printed, without what no two runs have in common."""
         if not self._popen.stdout.closed:  # type: ignore[union-attr]
-            self._out = self._popen.communicate(timeout=120)[0].replace(str(self.home), "HOME")
+            self._out = self._popen.communicate(timeout=PATIENCE)[0].replace(str(self.home), "HOME")
         return self._popen.returncode, self._out
 
     def cases(self) -> dict[str, list[Case]]:
@@ -98,7 +100,6 @@ def rostests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tup
             run.end()
 
 
-@pytest.mark.timeout(180)
 @pytest.mark.parametrize("file", FILES)
 def test_the_same_results(file: str, rostests: dict[str, tuple[Ran, Ran]]) -> None:
     runs = rostests[file]

@@ -34,6 +34,10 @@ async function main() {
     executeCallback: async (goal) => {
       const Sequence = rosnodejs.require("actionlib_tutorials").msg;
       server.publishFeedback(new Sequence.FibonacciFeedback({ sequence: [0] }));
+      // Feedback and result have separate connections: the client reports that the one has arrived.
+      while (!(await node.hasParam("/foreign/heard"))) {
+        await new Promise((resolve) => setTimeout(resolve, 20));
+      }
       server.setSucceeded(new Sequence.FibonacciResult({ sequence: Array(goal.order).fill(7) }));
     },
   });
@@ -49,7 +53,7 @@ async function main() {
   node.subscribe("/ours/beat", "std_msgs/Int32", (message) => say("beat", message.data), { throttleMs: -1 });
   say("ready", null);
 
-  await node.waitForService("/ours/flag", 10000);
+  await node.waitForService("/ours/flag", 150000);
   const client = node.serviceClient("/ours/flag", SetBool);
   say("flag", await client.call(new SetBool.Request({ data: true })));
   try {
@@ -65,8 +69,8 @@ async function main() {
     type: "actionlib_tutorials/Fibonacci",
     actionServer: "/ours/fibonacci",
   });
-  await actions.waitForServer({ secs: 10, nsecs: 0 });
-  await actions.sendGoalAndWait({ order: 3 }, { secs: 10, nsecs: 0 }, { secs: 1, nsecs: 0 });
+  await actions.waitForServer({ secs: 150, nsecs: 0 });
+  await actions.sendGoalAndWait({ order: 3 }, { secs: 150, nsecs: 0 }, { secs: 150, nsecs: 0 });
   say("fibonacci", Array.from(actions.getResult().sequence));
   await rosnodejs.nh.deleteParam("/ours/param");
   say("done", null);
