@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE = 90.0
+PATIENCE = 200.0
 """Seconds for a state to come; a loaded machine needs some of them."""
 
 _FLAGS = (
@@ -52,11 +52,12 @@ new Promise((resolve, reject) => {
 """
 
 _ARM = """
-window.clickedByTest = false;
+window.clickedByTest = window.pressedByTest = false;
 let pressed = null;
 addEventListener("pointerdown", ({ clientX: x, clientY: y }) => {
   const e = %s, r = e?.getBoundingClientRect();
   pressed = e && r.left <= x && x <= r.right && r.top <= y && y <= r.bottom ? e : null;
+  window.pressedByTest = Boolean(pressed);
 }, { capture: true, once: true });
 addEventListener("click", () => { window.clickedByTest = Boolean(pressed?.isConnected); }, { capture: true, once: true });
 """
@@ -157,16 +158,33 @@ class Page:
         """
         end = time.monotonic() + PATIENCE
         while True:
-            self.evaluate("{%s}" % (_ARM % _finding(find, text)))
+            self._arm(find, text)
             for kind in ("mousePressed", "mouseReleased"):
-                self.mouse(kind, find, text)
+                self._mouse(kind, find, text)
             # A page that was just loaded knows nothing of the click that loaded it.
             if self.evaluate("window.clickedByTest !== false"):
                 return
             assert time.monotonic() < end, f"the clicks do not reach {find} {text!r}"
 
-    def mouse(self, kind: str, find: str, text: str = "") -> None:
-        """Press (mousePressed) or release (mouseReleased) the mouse over an element."""
+    def press(self, find: str, text: str = "") -> None:
+        """Press the mouse over an element, and hold it; what has moved away is pressed again."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            self._arm(find, text)
+            self._mouse("mousePressed", find, text)
+            if self.evaluate("window.pressedByTest"):
+                return
+            assert time.monotonic() < end, f"the mouse does not reach {find} {text!r}"
+            self._mouse("mouseReleased", find, text)
+
+    def release(self, find: str, text: str = "") -> None:
+        """Release the mouse over an element."""
+        self._mouse("mouseReleased", find, text)
+
+    def _arm(self, find: str, text: str) -> None:
+        self.evaluate("{%s}" % (_ARM % _finding(find, text)))
+
+    def _mouse(self, kind: str, find: str, text: str) -> None:
         x, y = self.wait(
             f"const e = {_finding(find, text)}; if (!e || e.disabled) return null; e.scrollIntoView({{block: 'nearest'}});"
             "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]"

@@ -78,7 +78,7 @@ def run_codec(lines: list[dict[str, str]]) -> list[dict[str, str]]:
         input="".join(json.dumps(line) + "\n" for line in lines),
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -337,7 +337,7 @@ def test_console_sets_levels_of_loggers(serve: Callable[..., Served], browse: Ca
     )
     page.choose(".loggers select", "/other")
     page.choose(".loggers .grid select", "debug")
-    assert changed.wait(60)
+    assert changed.wait(PATIENCE)
     assert levels == {"rosout": "debug"}
 
 
@@ -435,11 +435,11 @@ def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Calla
         page.wait("return document.querySelector('[aria-label=\"LED GPIO 7 red off\"]')")
         board.set(7, 1)
         page.wait("return document.querySelector('.lit[aria-label=\"LED GPIO 7 red on\"]')")
-        edges = board.watch([11, 12], timeout=60)
-        page.mouse("mousePressed", ".push[data-pin='11']")
+        edges = board.watch([11, 12], timeout=PATIENCE)
+        page.press(".push[data-pin='11']")
         assert next(edges)[:2] == (11, 1)
         page.wait("return document.querySelector('.push.down[data-pin=\"11\"]')")
-        page.mouse("mouseReleased", ".push[data-pin='11']")
+        page.release(".push[data-pin='11']")
         assert next(edges)[:2] == (11, 0)
         for kind, level in (("keyDown", 1), ("keyUp", 0)):
             page.call("Input.dispatchKeyEvent", type=kind, key="2", code="Digit2", text="2" if level else "")
@@ -516,7 +516,7 @@ def test_message_is_published_by_its_form(serve: Callable[..., Served], browse: 
     page.wait_text(".form", "angular")
     page.type("input[name=x]", "0.5")
     page.click("button", "Repeat")
-    assert served.run(subscription.next(60)).linear.x == 0.5
+    assert served.run(subscription.next(PATIENCE)).linear.x == 0.5
     page.wait_text("p[role=status]", "published")
     page.click("button", "Stop")
     page.type("input[name=x]", "fast")
@@ -613,7 +613,7 @@ def listener(served: Served, topic: str, name: str = "robot") -> Callable[[Calla
     subscription = served.run(listen())
 
     def until(is_right: Callable[[Twist], bool]) -> None:
-        while not is_right(served.run(subscription.next(50))):
+        while not is_right(served.run(subscription.next(PATIENCE))):
             pass
 
     return until
@@ -839,10 +839,12 @@ def saved(page: Page, folder: Path, name: str, button: str) -> bytes:
     page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
     page.click("button", button)
     end = time.monotonic() + PATIENCE
-    while not (folder / name).exists():
+    file = folder / name
+    # The browser makes it under another name, and may reserve this one.
+    while not file.exists() or not file.stat().st_size or any(folder.glob("*.crdownload")):
         assert time.monotonic() < end, f"{name} is not saved"
         page.evaluate("new Promise(resolve => setTimeout(resolve, 30))")
-    return (folder / name).read_bytes()
+    return file.read_bytes()
 
 
 @needs_chromium

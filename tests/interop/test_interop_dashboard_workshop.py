@@ -126,15 +126,18 @@ def test_chapter_on_visualization_shows_the_pressed_button(student: Student) -> 
     nodes.wait("return document.querySelectorAll('.edge').length === 2")
     curve.wait_text(".series[data-label='/button_state/data'] .num", "0")
 
-    board.mouse("mousePressed", BUTTON)
+    board.press(BUTTON)
     curve.wait_text(".series[data-label='/button_state/data'] .num", "1")
     board.wait("return document.querySelector('.lit')")
-    board.mouse("mouseReleased", BUTTON)
+    board.release(BUTTON)
     curve.wait_text(".series[data-label='/button_state/data'] .num", "0")
     # The curve has both edges: something was drawn between 0 and 1.
     curve.wait("return document.querySelector('.chart canvas').width > 300")
 
-    student.type(
-        "rostopic pub -1 /rosout rosgraph_msgs/Log '{level: 4, name: /student, msg: The chapter ends}'"
-    )
+    is_shown = "document.querySelector('main').textContent.includes('The chapter ends')"
+    while not lines.evaluate(is_shown):
+        # It publishes for three seconds, in which roscore may not have been connected.
+        student.type(
+            "rostopic pub -1 /rosout rosgraph_msgs/Log '{level: 4, name: /student, msg: The chapter ends}'"
+        ).wait()
     lines.wait_text(".line .text", "The chapter ends")

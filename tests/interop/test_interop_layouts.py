@@ -14,7 +14,7 @@ from geometry_msgs.msg import Twist, Vector3
 from minirospy.dashboard.views import LAYOUTS, VIEWS
 from minirospy.gpio.board import Board
 from tests.dashboard.conftest import Served, serve
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import (
     address,
@@ -219,12 +219,12 @@ def test_workshop_shows_the_pressed_button_in_its_plot(
         page = browse(address(served, "layout?preset=workshop"), width=1400, height=900)
         page.wait_text(f"{pane('plot')} .series .num", "0")
         page.wait(f'return document.querySelector("{pane("graph")} svg.graph .node")')
-        edges = board.watch([11], timeout=60)
-        page.mouse("mousePressed", ".push[data-pin='11']")
+        edges = board.watch([11], timeout=PATIENCE)
+        page.press(".push[data-pin='11']")
         assert next(edges).level == 1
         served.run(button.publish(True))
         page.wait_text(f"{pane('plot')} .series .num", "1")
-        page.mouse("mouseReleased", ".push[data-pin='11']")
+        page.release(".push[data-pin='11']")
         assert next(edges).level == 0
     assert page.evaluate("document.querySelectorAll('.pane').length") == 4
     # The address names the preset until something is changed.

@@ -115,11 +115,11 @@ def test_button_that_is_pressed_stays_until_its_click(
     page = browse(address(served, "nodes?node=/mine"))
     page.wait_text(".side", "/rosout rosgraph_msgs/Log")
     page.wait("document.querySelector('.side button').dataset.test = 'mine'; return true")
-    page.mouse("mousePressed", ".side button", "Ping")
+    page.press(".side button", "Ping")
     served.run(advertise())
     page.wait_text(ROW.format("/mine"), "2 out")
     assert page.evaluate("document.querySelector('.side button').dataset.test") == "mine"
-    page.mouse("mouseReleased", ".side button", "Ping")
+    page.release(".side button", "Ping")
     page.wait_text(".side [role=status]", "answered in")
     page.wait_text(".side", "/news std_msgs/String")
 

@@ -174,9 +174,9 @@ def test_switch_slider_and_button_set_fields(
         page.wait(slide % value)
         page.wait(f"return document.querySelector('.sliding .num').textContent.startsWith('{value}')")
     speed(lambda twist: twist.angular.z == 1 and twist.linear.x == 0)
-    page.mouse("mousePressed", "button.push-button", "Horn")
+    page.press("button.push-button", "Horn")
     horn(lambda message: message.data == 440)
-    page.mouse("mouseReleased", "button.push-button", "Horn")
+    page.release("button.push-button", "Horn")
     horn(lambda message: message.data == 0)
 
 
