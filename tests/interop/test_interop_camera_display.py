@@ -117,7 +117,6 @@ def color(page: Page, x: float, y: float) -> list[int]:
 
 
 @needs_chromium
-@pytest.mark.timeout(400)
 def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Page]) -> None:
     served = serve()
     send = publish(served, scene())
@@ -136,8 +135,12 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     status(page, "Camera", "No CameraInfo received on [/lens/camera_info]. Topic may not exist.")
     send("/lens/camera_info", camera_info())
     status(page, "Camera", "Camera Info: OK")
-    seen = "const c = document.querySelector('canvas.inset'); return !c.hidden && c.width > 100"
-    page.wait(seen)
+    # Until all of it is drawn: the cube, and the picture beside it.
+    page.wait(
+        "const c = document.querySelector('canvas.inset'); if (c.hidden || c.width <= 100) return false;"
+        "const at = (x, y) => c.getContext('2d').getImageData(c.width * x, c.height * y, 1, 1).data;"
+        "return at(0.1, 0.5)[0] > 60 && Math.abs(at(0.9, 0.25)[2] - 100) <= 3 && at(0.52, 0.6)[0] < 5"
+    )
 
     # The cube's front is from 0 to the middle, a metre wide at two metres: 80 pixels of 160.
     side, outside = color(page, 0.1, 0.5), color(page, 0.9, 0.25)

@@ -23,7 +23,6 @@ pytestmark = [
         not rviz_pictures.has_rviz(),
         reason="RViz is not installed: apt-get install rviz xvfb libgl1-mesa-dri",
     ),
-    pytest.mark.timeout(400),
 ]
 
 BACKGROUND = (48, 48, 48)
@@ -46,7 +45,8 @@ def bodies(picture: Image.Image) -> list[tuple[int, int]]:
 def share_of_others(one: Image.Image, other: Image.Image) -> float:
     """Return how many of what is drawn in one picture has another color in the other one: 0 to 1."""
     places = bodies(one)
-    assert len(places) > 300, "too little is drawn"
+    if len(places) <= 300:
+        return 1.0  # too little is drawn: what is received comes when it comes
     pairs = [(one.getpixel(place), other.getpixel(place)) for place in places]
     return sum(any(abs(a - b) > ALIKE for a, b in zip(*pair, strict=True)) for pair in pairs) / len(pairs)  # type: ignore[arg-type]
 
@@ -76,9 +76,11 @@ def test_markers_have_the_places_sizes_and_colors_of_rviz(
     while True:
         theirs, ours = rviz.settled(), rviz_pictures.our_picture(page)
         shares = share_of_others(theirs, ours), share_of_others(ours, theirs)
-        if max(shares) < 0.03:
+        # Of all of the picture: lines, edges, text.
+        others = ImageChops.difference(theirs, ours).convert("L").histogram()
+        share = sum(others[40:]) / (WIDTH * HEIGHT)
+        if max(shares) < 0.03 and share < 0.01:
             break
-        assert time.monotonic() < end, f"{shares[0]:.1%} of RViz's, {shares[1]:.1%} of ours have other colors"
-    # Of all of the picture: lines, edges, text.
-    others = ImageChops.difference(theirs, ours).convert("L").histogram()
-    assert sum(others[40:]) < 0.01 * WIDTH * HEIGHT
+        assert time.monotonic() < end, (
+            f"{shares[0]:.1%} of RViz's, {shares[1]:.1%} of ours, {share:.1%} of all have other colors"
+        )
