@@ -18,6 +18,10 @@ def read():
 
 
 def execute(goal):
+    # Its client may not be connected to all of the topics yet.
+    ends = (server.action_server.feedback_pub, server.action_server.result_pub)
+    while not (all(end.get_num_connections() for end in ends) or rospy.is_shutdown()):
+        rospy.sleep(0.02)
     for count in range(goal.goal + 1):
         server.publish_feedback(TestFeedback(count))
         while count < goal.goal:

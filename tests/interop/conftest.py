@@ -108,6 +108,14 @@ def running_master(stack: str) -> Iterator[str]:
         stop(program)
 
 
+@pytest.fixture(autouse=True)
+def _patient_publishers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a bridge of this process wait until those are connected to whom a client publishes once; it waits a second."""
+    from minirospy.aio import topics
+
+    monkeypatch.setattr(topics, "_JOIN_SECONDS", 30.0)
+
+
 @pytest.fixture(params=["ours", "rospy"], ids=["our master", "real master"])
 def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
     """Return the URI of a fresh master, ours and the real one in turn."""

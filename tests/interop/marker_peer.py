@@ -74,11 +74,12 @@ def said(feedback):
 
 
 def chosen(feedback):
-    said(feedback)
     if feedback.menu_entry_id == checked:
         menu.setCheckState(checked, MenuHandler.CHECKED)
     menu.reApply(server)
     server.applyChanges()
+    # What follows the event is there when it is printed.
+    said(feedback)
 
 
 rospy.init_node("marker_server")
