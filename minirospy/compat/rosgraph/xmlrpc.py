@@ -62,14 +62,14 @@ class XmlRpcNode:
 
     def __init__(
         self,
-        port: int = 0,
+        port: int | str | None = 0,
         rpc_handler: XmlRpcHandler | None = None,
         on_run_error: Callable[[Exception], object] | None = None,
     ) -> None:
         self.handler = rpc_handler
         self.uri: str | None = None
         self.server: ThreadingXMLRPCServer | None = None
-        self.port = port or 0
+        self.port = int(port) if port and isinstance(port, str) else port
         self.is_shutdown = False
         self.on_run_error = on_run_error
 
@@ -95,7 +95,7 @@ class XmlRpcNode:
     def run(self) -> None:
         """Serve in this thread until :meth:`shutdown`."""
         try:
-            self.server = ThreadingXMLRPCServer((get_bind_address(), self.port), log_requests=False)
+            self.server = ThreadingXMLRPCServer((get_bind_address(), int(self.port or 0)), log_requests=False)
             self.port = self.server.server_address[1]
             self.set_uri(self.uri or create_local_xmlrpc_uri(self.port))
             self.server.register_multicall_functions()

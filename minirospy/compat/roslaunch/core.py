@@ -168,9 +168,9 @@ class Node:
         package: str,
         node_type: str,
         name: str | None = None,
-        namespace: str = "/",
+        namespace: str | None = "/",
         machine_name: str | None = None,
-        args: str = "",
+        args: str | None = "",
         respawn: bool = False,
         respawn_delay: float = 0.0,
         remap_args: Iterable[tuple[str, str]] | None = None,
@@ -181,14 +181,16 @@ class Node:
         required: bool = False,
         filename: str = "<unknown>",
     ) -> None:
-        if not package:
+        if not package.strip():
             raise ValueError("package must be non-empty")
-        if not node_type:
+        if not node_type.strip():
             raise ValueError("type must be non-empty")
         if name and "/" in name:
             raise ValueError("node name cannot contain a namespace")
         if output not in (None, "log", "screen"):
             raise ValueError("output must be one of 'log', 'screen'")
+        if cwd == "ros_home":
+            cwd = "ROS_HOME"
         if cwd not in (None, "ROS_HOME", "node"):
             raise ValueError("cwd must be one of 'ROS_HOME', 'node'")
         if required and respawn:
@@ -197,9 +199,9 @@ class Node:
         self.package = package
         self.type = node_type
         self.name = name or None
-        self.namespace = "/" + "".join(f"{part}/" for part in namespace.split("/") if part)
+        self.namespace = "/" + "".join(f"{part}/" for part in (namespace or "").split("/") if part)
         self.machine_name = machine_name or None
-        self.args = args
+        self.args = args or ""
         self.respawn = respawn
         self.respawn_delay = respawn_delay
 
@@ -262,9 +264,9 @@ class Test(Node):
         package: str,
         node_type: str,
         name: str | None = None,
-        namespace: str = "/",
+        namespace: str | None = "/",
         machine_name: str | None = None,
-        args: str = "",
+        args: str | None = "",
         remap_args: Iterable[tuple[str, str]] | None = None,
         env_args: Iterable[tuple[str, str]] | None = None,
         time_limit: float | None = None,
@@ -279,7 +281,12 @@ class Test(Node):
         )  # fmt: skip
 
         self.test_name = test_name
-        self.time_limit = float(TEST_TIME_LIMIT_DEFAULT if time_limit is None else time_limit)
+        limit = time_limit or TEST_TIME_LIMIT_DEFAULT
+        if not isinstance(limit, (int, float)):
+            raise ValueError("'time-limit' must be a number")
+        self.time_limit = float(limit)
+        if self.time_limit <= 0:
+            raise ValueError("'time-limit' must be a positive number")
         self.retry = retry or 0
 
     @classmethod

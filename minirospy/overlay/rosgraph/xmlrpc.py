@@ -3,6 +3,7 @@
 from xmlrpc.server import SimpleXMLRPCRequestHandler as SimpleXMLRPCRequestHandler
 from xmlrpc.server import SimpleXMLRPCServer as SimpleXMLRPCServer
 
+from minirospy.compat.ros_names import isstring
 from minirospy.compat.rosgraph.xmlrpc import (
     SilenceableXMLRPCRequestHandler,
     ThreadingXMLRPCServer,
@@ -10,4 +11,10 @@ from minirospy.compat.rosgraph.xmlrpc import (
     XmlRpcNode,
 )
 
-__all__ = ["SilenceableXMLRPCRequestHandler", "ThreadingXMLRPCServer", "XmlRpcHandler", "XmlRpcNode"]
+__all__ = [
+    "SilenceableXMLRPCRequestHandler",
+    "ThreadingXMLRPCServer",
+    "XmlRpcHandler",
+    "XmlRpcNode",
+    "isstring",
+]
