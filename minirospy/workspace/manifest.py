@@ -252,7 +252,8 @@ _REPLACED = {
 _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_gt"}
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
-_EMAIL = re.compile(r"^[^@\s]+@[^@\s]+\.[^@\s.]+$")
+_EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
+"""What catkin accepts, which stops at any other address."""
 
 
 class _Reader:
@@ -330,10 +331,14 @@ class _Reader:
             if tag not in self._by_tag:
                 self._problem(self._root, f"the package has no <{tag}>")
         for element in self._elements("maintainer"):
-            email = element.attributes.get("email", "")
-            if not _EMAIL.match(email):
-                said = f"email '{email}' of maintainer '{element.text}' is not an address"
-                self._problem(element, said if email else f"maintainer '{element.text}' has no email")
+            if not element.attributes.get("email"):
+                self._problem(element, f"maintainer '{element.text}' has no email")
+        for element in self._elements("maintainer") + self._elements("author"):
+            email = element.attributes.get("email")
+            if email and not _EMAIL.fullmatch(email):
+                self._problem(
+                    element, f'Invalid email "{email}" for person "{element.text}" (ROS refuses the package)'
+                )
 
     def _single(self, tag: str) -> str:
         found = self._elements(tag)

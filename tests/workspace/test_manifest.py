@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import pytest
 
@@ -166,12 +167,30 @@ def test_an_invalid_manifest_is_an_error(text: str, why: str) -> None:
         (' format="4"', "", "package.xml:1: package format '4' is unknown"),
         (' format="2"', "<name>b</name>", "package.xml:2: a second <name>: the first is in line 1"),
         (' format="2"', "<maintainer>Bob</maintainer>", "package.xml:2: maintainer 'Bob' has no email"),
+        (' format="2"', '<maintainer email="bob@localhost">Bob</maintainer>', 'Invalid email "bob@localhost" for person "Bob"'),
+        (' format="2"', '\n<author email="at home">Ann</author>', 'package.xml:3: Invalid email "at home" for person "Ann"'),
     ],
 )  # fmt: skip
 def test_problems_that_catkin_refuses_are_recorded(format: str, body: str, why: str) -> None:
     manifest = parse(body, format)
     assert manifest.name == "robot"
     assert why in f"package.xml:{manifest.problems[0].line}: {manifest.problems[0].text}"
+
+
+@pytest.mark.parametrize("email", ["a@b.de", "a.b-c_d%e+f@g-h.ij.kl", "1@2.de"])
+def test_addresses_that_catkin_accepts_are_no_problem(email: str) -> None:
+    manifest = parse(f'<author email="{email}">Ann</author><author>Bob</author>', ' format="2"')
+    assert manifest.problems == ()
+
+
+@pytest.mark.parametrize(
+    "email", ["a@b", "a@b.d", "a b@c.de", "ä@b.de", "a..b@c.de", "a@b_c.de", "a@b.de ", "<a@b.de>"]
+)
+def test_addresses_that_catkin_refuses_are_recorded(email: str) -> None:
+    manifest = parse(f'<author email="{escape(email)}">Ann</author>', ' format="2"')
+    assert [problem.text.partition(" (")[0] for problem in manifest.problems] == [
+        f'Invalid email "{email}" for person "Ann"'
+    ]
 
 
 def test_a_name_is_all_that_must_be_there() -> None:
