@@ -10,6 +10,7 @@ import hashlib
 import os
 import re
 import sys
+import tokenize
 import zipfile
 from base64 import urlsafe_b64encode
 from pathlib import Path
@@ -26,6 +27,7 @@ ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
 
 _PAGE = re.compile(r"minirospy/dashboard/page/(?!vendor/).*\.(js|css)")
+_MODULE = re.compile(r"minirospy/(?!overlay/|ros_packages/).*\.py")
 _COMMENT = re.compile(r"//.*|/\*((?!\*/).)*\*/")
 
 
@@ -79,8 +81,17 @@ def lean(text: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def without_comments(text: str) -> str:
+    """Return a module with empty lines for its lines of comment: the numbers of the others stay those of the sources."""
+    lines = text.splitlines(keepends=True)
+    for kind, _, (row, column), _, _ in tokenize.generate_tokens(iter(lines).__next__):
+        if kind == tokenize.COMMENT and row > 1 and not lines[row - 1][:column].strip():
+            lines[row - 1] = "\n"
+    return "".join(lines)
+
+
 def compress(wheel: Path) -> None:
-    """Write a wheel's files again, in their order and with their dates: the page lean, all as small as deflate makes them."""
+    """Write a wheel's files again, in their order and with their dates: the page and modules lean, all deflated best."""
     packed = wheel.with_suffix(".packed")
     changed: dict[str, bytes] = {}
     with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(packed, "w") as new:
@@ -88,6 +99,8 @@ def compress(wheel: Path) -> None:
             data = old.read(info)
             if _PAGE.fullmatch(info.filename):
                 data = changed[info.filename] = lean(data.decode()).encode()
+            elif _MODULE.fullmatch(info.filename):
+                data = changed[info.filename] = without_comments(data.decode()).encode()
             elif info.filename.endswith(".dist-info/RECORD"):
                 data = "".join(
                     _recorded(line, changed) for line in data.decode().splitlines(keepends=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
 import re
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls
+from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls, without_comments
 from tools.release import faults_of_metadata
 
 ROOT = Path(__file__).parents[1]
@@ -172,6 +173,27 @@ def test_record_fits_the_files_of_the_wheel(wheel: Path) -> None:
 )
 def test_files_of_the_page_are_lean(text: str, wanted: str) -> None:
     assert lean(text) == wanted
+
+
+def test_modules_of_the_wheel_are_those_of_the_sources_without_lines_of_comment(wheel: Path) -> None:
+    """The same programs, with the same line numbers in a traceback."""
+    blanked = 0
+    with zipfile.ZipFile(wheel) as archive:
+        for name in archive.namelist():
+            if not (source := ROOT / name).is_file() or not name.endswith(".py"):
+                continue
+            text, packed = source.read_text(encoding="utf-8"), archive.read(name).decode()
+            blanked += packed != text
+            ours, theirs = (ast.dump(ast.parse(each), include_attributes=True) for each in (text, packed))
+            assert ours == theirs, name
+    assert blanked > 100
+
+
+def test_comments_in_texts_and_behind_code_stay() -> None:
+    text = '#!/x\n# gone\na = 1  # stays\nif a:\n    # gone\n    b = """\n# stays\n"""\nc = [\n    # gone\n    "# stays"]\n# gone'
+    assert without_comments(text).splitlines() == [
+        "#!/x", "", "a = 1  # stays", "if a:", "", '    b = """', "# stays", '"""', "c = [", "", '    "# stays"]', "",
+    ]  # fmt: skip
 
 
 def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
