@@ -1,3 +1,10 @@
-"""rosmaster.registrations, which is not here: the import raises ImportError with what to use."""
+"""rosmaster.registrations, provided by minirospy: tables of what nodes have registered."""
 
-from minirospy.compat.elsewhere import rosmaster_registrations as registrations
+from minirospy.compat.rosmaster.registrations import (
+    NodeRef,
+    RegistrationManager,
+    Registrations,
+    shutdown_node_task,
+)
+
+__all__ = ["NodeRef", "RegistrationManager", "Registrations", "shutdown_node_task"]

@@ -1,3 +1,5 @@
-"""rosmaster.threadpool, which is not here: the import raises ImportError with what to use."""
+"""rosmaster.threadpool, provided by minirospy: threads for calls to nodes."""
 
-from minirospy.compat.elsewhere import rosmaster_threadpool as threadpool
+from minirospy.compat.rosmaster.threadpool import MarkedThreadPool
+
+__all__ = ["MarkedThreadPool"]

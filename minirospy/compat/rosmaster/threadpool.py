@@ -1,0 +1,110 @@
+"""rosmaster.threadpool: threads for calls to nodes, of which no two of one marker run at a time."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import NamedTuple
+
+__all__ = ["MarkedThreadPool"]
+
+
+class _Task(NamedTuple):
+    marker: object
+    function: Callable[..., object]
+    args: tuple[object, ...]
+    on_result: Callable[[object], object] | None
+
+
+class MarkedThreadPool:
+    """Runs tasks in daemon threads, in order; a slow node, which is a marker, keeps one thread and no more."""
+
+    def __init__(self, numThreads: int) -> None:
+        self._changed = threading.Condition()
+        self._tasks: list[_Task] = []
+        self._markers: list[object] = []
+        self._threads: list[threading.Thread] = []
+        self._is_joining = False
+        self.set_thread_count(numThreads)
+
+    def set_thread_count(self, newNumThreads: int) -> bool:
+        """Start or end threads; return whether that is possible."""
+        with self._changed:
+            if self._is_joining:
+                return False
+            self._resize(newNumThreads)
+            return True
+
+    def get_thread_count(self) -> int:
+        """Return the number of threads."""
+        with self._changed:
+            return len(self._threads)
+
+    def queue_task(
+        self,
+        marker: object,
+        task: Callable[..., object],
+        args: tuple[object, ...] | None = None,
+        taskCallback: Callable[[object], object] | None = None,
+    ) -> bool:
+        """Call ``task(*args)`` in a thread, then ``taskCallback`` with its result; return whether it was accepted."""
+        with self._changed:
+            if self._is_joining or not callable(task):
+                return False
+            self._tasks.append(_Task(marker, task, args or (), taskCallback))
+            self._changed.notify_all()
+            return True
+
+    def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
+        """End the threads, on request after the queued tasks; then the pool may be used again."""
+        with self._changed:
+            self._is_joining = True
+            while wait_for_tasks and self._tasks and self._threads:
+                self._changed.wait()
+            threads = list(self._threads)
+            self._resize(0)
+        for thread in threads if wait_for_threads else ():
+            if thread is not threading.current_thread():
+                thread.join()
+        with self._changed:
+            self._is_joining = False
+
+    def _resize(self, count: int) -> None:
+        while len(self._threads) < count:
+            thread = threading.Thread(target=self._work, name="rosmaster.threadpool", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        del self._threads[: len(self._threads) - count]
+        self._changed.notify_all()
+
+    def _work(self) -> None:
+        while task := self._next():
+            try:
+                try:
+                    result = task.function(*task.args)
+                finally:
+                    self._release(task.marker)
+                if task.on_result:
+                    task.on_result(result)
+            except Exception:
+                # The edge of the user's task.
+                logging.getLogger("rosmaster.threadpool").exception("a task failed")
+
+    def _next(self) -> _Task | None:
+        """Return the first task whose marker is not at work; None where this thread is to end."""
+        with self._changed:
+            while threading.current_thread() in self._threads:
+                for task in self._tasks:
+                    if task.marker is None or task.marker not in self._markers:
+                        self._tasks.remove(task)
+                        self._markers.append(task.marker)
+                        self._changed.notify_all()
+                        return task
+                self._changed.wait()
+        return None
+
+    def _release(self, marker: object) -> None:
+        with self._changed:
+            self._markers.remove(marker)
+            self._changed.notify_all()
