@@ -182,9 +182,9 @@ IMPORTED = frozenset(
 """The modules of them that Python programs import; `overlay/` has one for each, which raises ImportError."""
 
 SUBMODULES = {
+    "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",
+    "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
-    "rosmaster.registrations": "rosgraph.Master(name).getSystemState() returns what is registered; `rosmaster` runs a master",
-    "rosmaster.threadpool": "concurrent.futures.ThreadPoolExecutor runs tasks in threads",
     "rostest.runner": "`rostest FILE` or rostest.rostest_main.rostestmain() runs a file of tests",
     "rostest.rostest_parent": "`rostest FILE` runs the tests of a file, each with a separate master",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",

@@ -555,7 +555,6 @@ NOT_OFFERED = {
     "rospkg.rosversion": "the command `rosversion`",
     "rospkg.stack": "stacks are of rosbuild",
     "roslaunch": "the inside of roslaunch's processes on other machines",
-    "rosmaster": "rosmaster's tables and threads; ours are minirospy.graph",
     "roswtf": "roswtf's own checks; ours are `minirospy doctor`",
     "rostest": "the inside of the command `rostest`",
     "rosunit": "the inside of the command `rosunit`",
