@@ -28,7 +28,7 @@ from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailu
 from minirospy.testing.unit import XML_OUTPUT_FLAG, xml_results_file
 from minirospy.workspace.packages import NotExecutableError, Packages
 
-__all__ = ["RosTest"]
+__all__ = ["RosTest", "master_of_tests"]
 
 _SHOWN_LINES = 20
 _CLASS = "rostest.runner.RosTest"
@@ -121,7 +121,9 @@ class RosTest:
                 stack.enter_context(contextlib.redirect_stdout(said))
                 stack.enter_context(contextlib.redirect_stderr(said))
             try:
-                environment = stack.enter_context(self._master())
+                environment = stack.enter_context(
+                    master_of_tests(self.environment, self.run_id, reuse=self.reuse_master, clear=self.clear)
+                )
                 print(f"[ROSTEST]Running test [{test.test_name}]", flush=True)
                 status = self._launch(test, environment, case)
             except LaunchError as error:
@@ -175,36 +177,6 @@ class RosTest:
             case.add_error(TestError("KeyboardInterrupt", f"interrupted by {launcher.stopped_by}"))
         return status
 
-    @contextlib.contextmanager
-    def _master(self) -> Iterator[Environment]:
-        """Provide the environment with the master that the test uses."""
-        if self.reuse_master:
-            master = MasterProxy(self.environment.master_uri, "/rostest")
-            try:
-                for name in master.get_param_names() if self.clear else ():
-                    master.delete_param(name)
-                master.get_pid()
-            finally:
-                master.close()
-            yield self.environment
-            return
-        loop = LoopThread("rostest-master")
-        environment = self.environment
-
-        async def start() -> Master:
-            host, bind_host = environment.uri_host, environment.bind_host
-            serving = Master(host=host, bind_host=bind_host, access=Access.parse(environment.allow))
-            await serving.start()
-            return serving
-
-        serving = loop.run(start())
-        try:
-            serving.set_param("/roslaunch", "/run_id", self.run_id)
-            yield environment._replace(master_uri=serving.uri)
-        finally:
-            loop.run(serving.close(), 5.0)
-            loop.close()
-
     @property
     def run_id(self) -> str:
         """The folder of the nodes' log files."""
@@ -228,6 +200,39 @@ class RosTest:
         self.own.add_case(case)
         if not self.text or not case.passed:
             print(case.line, flush=True)
+
+
+@contextlib.contextmanager
+def master_of_tests(
+    environment: Environment, run_id: str, *, reuse: bool = False, clear: bool = False
+) -> Iterator[Environment]:
+    """Provide the environment with a new master on a free port, whose run_id this is; it ends with the block.
+
+    ``reuse``: with the master that the environment names; ``clear`` deletes its parameters first.
+    Raises MasterUnreachableError where that one does not answer.
+    """
+    if reuse:
+        with contextlib.closing(MasterProxy(environment.master_uri, "/rostest")) as master:
+            for name in master.get_param_names() if clear else ():
+                master.delete_param(name)
+            master.get_pid()
+        yield environment
+        return
+    loop = LoopThread("rostest-master")
+
+    async def start() -> Master:
+        host, bind_host = environment.uri_host, environment.bind_host
+        serving = Master(host=host, bind_host=bind_host, access=Access.parse(environment.allow))
+        await serving.start()
+        return serving
+
+    serving = loop.run(start())
+    try:
+        serving.set_param("/roslaunch", "/run_id", run_id)
+        yield environment._replace(master_uri=serving.uri)
+    finally:
+        loop.run(serving.close(), 5.0)
+        loop.close()
 
 
 def _failure(text: str) -> TestFailure:

@@ -185,8 +185,6 @@ SUBMODULES = {
     "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",
     "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
-    "rostest.runner": "`rostest FILE` or rostest.rostest_main.rostestmain() runs a file of tests",
-    "rostest.rostest_parent": "`rostest FILE` runs the tests of a file, each with a separate master",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
 """Submodules that programs import of real ROS's packages and ours lack -> what to use; `overlay/` has one for each."""

@@ -556,7 +556,6 @@ NOT_OFFERED = {
     "rospkg.stack": "stacks are of rosbuild",
     "roslaunch": "the inside of roslaunch's processes on other machines",
     "roswtf": "roswtf's own checks; ours are `minirospy doctor`",
-    "rostest": "the inside of the command `rostest`",
     "rosunit": "the inside of the command `rosunit`",
     "rospy.impl": "rospy's threads and sockets; ours are minirospy.runtime",
     "": "its command's inside",

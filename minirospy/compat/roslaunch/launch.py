@@ -5,11 +5,12 @@ from __future__ import annotations
 import atexit
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from minirospy.compat.roslaunch.config import ROSLaunchConfig
-from minirospy.compat.roslaunch.core import Node, RLException
+from minirospy.compat.roslaunch.core import Node, RLException, Test
 from minirospy.compat.roslaunch.pmon import (
     ApiLauncher,
     Process,
@@ -22,9 +23,21 @@ from minirospy.launch.output import Output
 from minirospy.launch.process import Timeouts
 from minirospy.launch.runner import RunOptions
 
-__all__ = ["ROSLaunchRunner", "master_options", "replacement_of", "unify_clear_params"]
+__all__ = [
+    "RLTestTimeoutException",
+    "ROSLaunchRunner",
+    "master_options",
+    "replacement_of",
+    "unify_clear_params",
+]
+
+_POLL_SECONDS = 0.05
 
 Function = TypeVar("Function", bound=Callable[..., object])
+
+
+class RLTestTimeoutException(RLException):
+    """A test has taken longer than its time limit."""
 
 
 class ROSLaunchRunner:
@@ -99,6 +112,24 @@ class ROSLaunchRunner:
         node.give_name()
         process = self._launcher.start_node(node.spec)
         return (self._launcher.known[process.name], True) if process else (node.name or "", False)
+
+    def run_test(self, test: Test) -> bool:
+        """Start a test and wait until it exits; return whether its status is 0.
+
+        Raises RLTestTimeoutException where it takes longer than its time limit, after which it is ended; RLException where
+        it cannot be started.
+        """
+        process, has_started = self.launch_node(test)
+        if not has_started or isinstance(process, str):
+            raise RLException(f"test [{test.test_name}] failed to launch")
+        end = time.monotonic() + test.time_limit
+        while process.is_alive():
+            if time.monotonic() > end:
+                process.stop()
+                what = f"test [{test.test_name}] of type [{test.package}/{test.type}]"
+                raise RLTestTimeoutException(f"max time [{test.time_limit}s] allotted for {what}")
+            time.sleep(_POLL_SECONDS)
+        return process.exit_code == 0
 
     def is_node_running(self, node: Node) -> bool:
         """Return whether a node was started here, and runs."""

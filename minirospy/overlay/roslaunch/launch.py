@@ -1,7 +1,7 @@
 """roslaunch.launch, provided by minirospy: run a configuration that the program has made."""
 
 from minirospy.compat.roslaunch.core import Machine, Master, Node, Param, RLException, Test
-from minirospy.compat.roslaunch.launch import ROSLaunchRunner
+from minirospy.compat.roslaunch.launch import RLTestTimeoutException, ROSLaunchRunner
 from minirospy.compat.roslaunch.launch import unify_clear_params as _unify_clear_params
 from minirospy.compat.roslaunch.pmon import ProcessListener, start_process_monitor
 from minirospy.compat.roslaunch.pmon import ProcessListener as ROSLaunchListener
@@ -13,6 +13,7 @@ __all__ = [
     "Param",
     "ProcessListener",
     "RLException",
+    "RLTestTimeoutException",
     "ROSLaunchListener",
     "ROSLaunchRunner",
     "Test",

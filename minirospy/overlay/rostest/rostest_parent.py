@@ -1,3 +1,5 @@
-"""rostest.rostest_parent, which is not here: the import raises ImportError with what to use."""
+"""rostest.rostest_parent, provided by minirospy: a launch file's nodes for its tests."""
 
-from minirospy.compat.elsewhere import rostest_rostest_parent as rostest_parent
+from minirospy.compat.rostest.rostest_parent import ROSTestLaunchParent
+
+__all__ = ["ROSTestLaunchParent"]
