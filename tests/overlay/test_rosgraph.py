@@ -134,3 +134,18 @@ def test_rosclean(tmp_path: Path) -> None:
     with pytest.raises(rosclean.CleanupException):
         rosclean.get_disk_usage(str(tmp_path / "none"))
     assert rosclean.rosclean_main(["rosclean", "check"]) == 0
+
+
+def test_edges_of_a_row_of_connections() -> None:
+    from rosgraph.impl.graph import EdgeList, edge_args
+
+    there, back = ("/a", "/b", "/t"), ("/b", "/a", "/t")
+    found = {direction: edge_args("/a", "/b", direction, "/t") for direction in "oib?"}
+    assert found == {"o": [there], "i": [back], "b": [there, back], "?": []}
+    edges = EdgeList()
+    assert [edges.add_edges("/a", "/b", direction, "/t") for direction in "obi?"] == [
+        True,
+        True,
+        False,
+        False,
+    ]

@@ -97,8 +97,7 @@ class EdgeList:
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
         """Add the edge of a row of getBusInfo, both for the direction ``b``; return whether one is new."""
-        directions = ("o", "i") if direction == "b" else (direction,)
-        added = [self.add(Edge(*edge_args(start, dest, each, label))) for each in directions]
+        added = [self.add(Edge(*each)) for each in edge_args(start, dest, direction, label)]
         return any(added)
 
     def delete(self, edge: Edge) -> None:
@@ -110,9 +109,10 @@ class EdgeList:
         self._edges = {each: None for each in self._edges if node not in (each.start, each.end)}
 
 
-def edge_args(start: str, dest: str, direction: str, label: str) -> tuple[str, str, str]:
-    """Return (start, end, label) of a connection, reversed for the direction ``i``."""
-    return (dest, start, label) if direction == "i" else (start, dest, label)
+def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
+    """Return [(start, end, label)] of a row of getBusInfo: reversed for the direction ``i``, both for ``b``, none for another."""
+    there, back = (start, dest, label), (dest, start, label)
+    return {"o": [there], "i": [back], "b": [there, back]}.get(direction, [])
 
 
 class Graph:
