@@ -8,6 +8,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import genmsg
+import genmsg.msg_loader
+import genmsg.msgs
 import genpy
 import genpy.base
 import genpy.dynamic
@@ -148,3 +151,35 @@ def test_filling_and_showing() -> None:
     genpy.message.check_type("data", "string", text.data)
     with pytest.raises(genpy.SerializationError):
         genpy.message.check_type("data", "int8", 300)
+
+
+@pytest.mark.parametrize(
+    ("text", "request_fields", "response_fields", "md5"),
+    [
+        ("int32 a", ["a"], [], "5c9fb1a886e81e3162a5c87bf55c072b"),
+        ("int32 a\n---", ["a"], [], "5c9fb1a886e81e3162a5c87bf55c072b"),
+        ("", [], [], "d41d8cd98f00b204e9800998ecf8427e"),
+        ("int32 a\n---\nint32 b\n---\nint32 c", ["a"], ["b", "c"], "812989c1ece7c05c389b0c6e56bd04ee"),
+    ],
+)
+def test_service_with_any_number_of_lines_between(
+    text: str, request_fields: list[str], response_fields: list[str], md5: str
+) -> None:
+    """The md5sums are those of Debian's genmsg."""
+    context = genmsg.MsgContext.create_default()
+    spec = genmsg.msg_loader.load_srv_from_string(context, text, "p/S")
+    assert (spec.request.names, spec.response.names) == (request_fields, response_fields)
+    assert genmsg.compute_md5(context, spec) == md5
+
+
+def test_genmsg_refuses_what_is_not_a_specification() -> None:
+    context = genmsg.MsgContext.create_default()
+    spec = genmsg.msg_loader.load_msg_from_string(context, "time t\nDog[] d\nDog e", "p/M")
+    genmsg.msg_loader.load_msg_from_string(context, "int8 legs", "p/Dog")
+    assert genmsg.msg_loader.load_depends(context, spec, {}) == ["p/Dog"]
+    with pytest.raises(ValueError, match="spec does not appear"):
+        genmsg.msg_loader.load_depends(context, None, {})
+    with pytest.raises(ValueError, match="search_path"):
+        genmsg.msg_loader.get_msg_file("p", "M", None)
+    with pytest.raises(ValueError, match="non-None"):
+        genmsg.msgs.Constant("int8", "A", None, "1")

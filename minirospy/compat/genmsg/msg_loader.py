@@ -5,6 +5,7 @@ Source: http://docs.ros.org/api/genmsg/html/.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -40,6 +41,8 @@ __all__ = [
     "lookup_in",
     "parsed_message",
 ]
+
+_BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)
 
 SearchPath = Mapping[str, Sequence[str]]
 """Package -> folders of its definitions."""
@@ -100,7 +103,7 @@ class MsgContext:
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
         """Set which messages one has in its fields."""
-        self._depends[full_msg_type] = list(dependencies)
+        self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
         """Return the messages that one has in its fields; None before :func:`load_depends`."""
@@ -115,7 +118,9 @@ class MsgContext:
 
 
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
-    """Return the file of a definition. Raises MsgNotFound."""
+    """Return the file of a definition. Raises MsgNotFound, ValueError where the search path is not a dictionary."""
+    if not isinstance(search_path, Mapping):
+        raise ValueError("search_path must be a dictionary of namespaces to lists of folders")
     if package not in search_path:
         raise MsgNotFound(
             f"Cannot locate message [{base_type}]: unknown package [{package}] on search path [{search_path}]",
@@ -185,15 +190,21 @@ def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: Search
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
 
-def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> None:
-    """Add all that a message or service needs to the context. Raises InvalidMsgSpec, MsgNotFound."""
+def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
+    """Add all that a message or service needs to the context; return the messages of its fields, each once.
+
+    Raises InvalidMsgSpec, MsgNotFound, ValueError where the spec is something else.
+    """
+    if not isinstance(spec, MsgSpec | SrvSpec):
+        raise ValueError(f"spec does not appear to be a message or service: {spec}")
     if isinstance(spec, SrvSpec):
         both: list[str] = []
         for part in (spec.request, spec.response):
             load_depends(msg_context, part, msg_search_path)
             both += msg_context.get_depends(part.full_name) or ()
-        msg_context.set_depends(spec.full_name, list(dict.fromkeys(both)))
-        return
+        both = list(dict.fromkeys(both))
+        msg_context.set_depends(spec.full_name, both)
+        return both
 
     bare = (resolve_type(bare_msg_type(type_), spec.package) for type_ in spec.types)
     needed = list(dict.fromkeys(name for name in bare if not is_builtin(name)))
@@ -207,6 +218,7 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
             else load_msg_by_type(msg_context, name, msg_search_path)
         )
         load_depends(msg_context, found, msg_search_path)
+    return needed
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
@@ -229,6 +241,10 @@ def _parsed(text: str, full_name: str) -> MessageSpec:
 
 def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, _, name = full_name.rpartition("/")
+    request, *responses = _BETWEEN.split(text)
+    if len(responses) != 1:
+        # genmsg reads a text without the line between, and one with several, too.
+        text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)
     except DefinitionError as error:

@@ -43,13 +43,22 @@ BUILTIN_TYPES = [*PRIMITIVE_TYPES, "time", "duration"]
 _HEADERS = ("Header", HEADER_FULL_NAME, "roslib/Header")
 
 
-class Constant(NamedTuple):
-    """A constant: ``val`` is its value, ``val_text`` what the definition says."""
-
+class _Constant(NamedTuple):
     type: str
     name: str
     val: object
     val_text: str
+
+
+class Constant(_Constant):
+    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raises ValueError where one is None."""
+
+    __slots__ = ()
+
+    def __new__(cls, type: str, name: str, val: object, val_text: str) -> Constant:
+        if any(each is None for each in (type, name, val, val_text)):
+            raise ValueError("Constant must have non-None parameters")
+        return super().__new__(cls, type, name, val, val_text)
 
     def __repr__(self) -> str:
         return f"{self.type} {self.name}={self.val}"
