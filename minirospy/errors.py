@@ -522,6 +522,9 @@ class DeserializationError(MessageException):
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Up to three of the ``known`` names that may have been meant."""
+    if not isinstance(name, str):
+        # A program's argument, which is not found either.
+        return []
     names = sorted(set(known))
     # A name without its package or namespace is what people forget most.
     tails = [each for each in names if each.rpartition("/")[2] == name]

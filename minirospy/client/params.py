@@ -54,7 +54,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
     Raises KeyError where it is neither set nor has a default, ROSException where the master fails.
     """
-    value = _get(current_session().resolve(param_name))
+    value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
         return _as_rospy(value)
     if default is UNSPECIFIED:
@@ -98,7 +98,7 @@ def set_param(param_name: str, param_value: object) -> None:
     try:
         _ask("set", name, lambda: current_session().master.set_param(name, param_value))
     except ROSException:
-        _check_sendable(param_value)
+        check_sendable(param_value)
         raise
     # The master does not notify the node that has set it.
     current_session().parameter_changed(name)
@@ -106,12 +106,16 @@ def set_param(param_name: str, param_value: object) -> None:
 
 def has_param(param_name: str) -> bool:
     """Return whether a parameter, or a namespace of that name, is set. Raises ROSException."""
+    if not _may_be_name(param_name):
+        return False
     name = current_session().resolve(param_name)
     return _ask("look for", name, lambda: current_session().master.has_param(name))
 
 
 def delete_param(param_name: str) -> None:
     """Delete a parameter. Raises KeyError where it is not set, ROSException where the master fails."""
+    if not _may_be_name(param_name):
+        raise KeyError(param_name)
     name = current_session().resolve(param_name)
     try:
         _ask("delete", name, lambda: current_session().master.delete_param(name))
@@ -128,6 +132,7 @@ def search_param(param_name: str) -> str | None:
     Raises ROSException where the master fails, or the name is a private one.
     """
     name = current_session().identity.arguments.remappings.get(param_name, param_name)
+    check_sendable(name)
     try:
         return str(_ask("search", name, lambda: current_session().master.call("searchParam", name)))
     except ROSException as error:
@@ -190,6 +195,11 @@ def _get(name: str) -> object:
         raise
 
 
+def _may_be_name(param_name: object) -> bool:
+    """Return whether it is text, or None, which is the node's namespace; anything else is the name of no parameter."""
+    return param_name is None or isinstance(param_name, str)
+
+
 def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
     try:
         return call()
@@ -213,7 +223,7 @@ def _as_rospy(value: object) -> object:
     return value
 
 
-def _check_sendable(value: object) -> None:
+def check_sendable(value: object) -> None:
     """Raise what rospy raises on a value for which XML-RPC has no type."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
@@ -229,11 +239,11 @@ def _check_sendable(value: object) -> None:
         for key, item in value.items():
             if not isinstance(key, str):
                 raise TypeError("dictionary key must be string")
-            _check_sendable(key)
-            _check_sendable(item)
+            check_sendable(key)
+            check_sendable(item)
     elif isinstance(value, list | tuple):
         for item in value:
-            _check_sendable(item)
+            check_sendable(item)
     elif not (isinstance(value, float | bytes | bytearray) or _is_date(value) or _is_wrapper(value)):
         raise TypeError(f"cannot marshal {type(value)} objects")
 

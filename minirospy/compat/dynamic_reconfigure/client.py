@@ -54,6 +54,9 @@ class Client:
 
         ``config_callback(config)`` is called with each change. Raises ROSException if the server is not there in time.
         """
+        if not isinstance(name, str):
+            # It would wait for a server that cannot be.
+            raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
         self.param_description: list[Entry] | None = None

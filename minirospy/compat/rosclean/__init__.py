@@ -17,7 +17,7 @@ class CleanupException(Exception):
 
 def get_disk_usage(d: str) -> int:
     """Return the bytes that a folder takes. Raises CleanupException."""
-    if not Path(d).is_dir():
+    if not isinstance(d, str | Path) or not Path(d).is_dir():
         raise CleanupException(f"[{d}] is not a folder")
     return disk_usage(Path(d))
 

@@ -6,6 +6,7 @@ import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from minirospy.client.params import check_sendable
 from minirospy.compat.rosgraph.names import make_caller_id
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rosgraph.rosenv import get_master_uri
@@ -63,6 +64,7 @@ class Master:
         weakref.finalize(self, self._proxy.close)
 
     def _call(self, method: str, *args: object) -> Any:
+        check_sendable(args)
         try:
             return self._proxy.call(method, *args)
         except RpcRefused as error:

@@ -52,5 +52,5 @@ def _folder_of_script(package: str) -> Path | None:
 def _is_importable(name: str) -> bool:
     try:
         return importlib.util.find_spec(name) is not None
-    except (ImportError, ValueError):
+    except (AttributeError, ImportError, TypeError, ValueError):
         return False

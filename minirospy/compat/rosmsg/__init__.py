@@ -68,11 +68,13 @@ def list_srvs(package: str, rospack: object = None) -> list[str]:
 
 def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
     """Return the types of a package. Raises rospkg.ResourceNotFound, ValueError on an unknown mode."""
+    from minirospy.compat.rospkg.common import ResourceNotFound
+
+    if not isinstance(package, str):
+        raise ResourceNotFound(str(package))
     try:
         return _interfaces(_kind(mode)).in_package(package)
     except NotFoundError as error:
-        from minirospy.compat.rospkg.common import ResourceNotFound
-
         raise ResourceNotFound(package) from error
 
 
@@ -200,6 +202,8 @@ def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
 
 
 def _text(type_: str, raw: bool, kind: Kind) -> str:
+    if not isinstance(type_, str):
+        raise ROSMsgException(f"Invalid type [{type_}]: it is not text")
     interfaces = _interfaces(kind)
     try:
         return interfaces.text(type_) if raw else interfaces.description(type_)

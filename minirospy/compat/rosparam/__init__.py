@@ -11,6 +11,7 @@ from xmlrpc.client import Binary
 
 import yaml
 
+from minirospy.client.params import check_sendable
 from minirospy.compat.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.compat.rosgraph.masterapi import Master, MasterError
 from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
@@ -82,7 +83,8 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
     """Set a parameter to a value; a dictionary leaves other parameters of its namespace."""
     with _graph() as graph:
-        for name, single in parameters.set_parameter(graph, graph.resolve(param), _with_bytes(value)):
+        target = graph.resolve(param) if isinstance(param, str) else _resolve(graph, param)
+        for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
             if verbose:
                 print(f"set parameter [{name}] to [{single}]")
 
@@ -107,6 +109,7 @@ def _with_bytes(value: object) -> object:
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
     """Set all values below a namespace. Raises RosParamException where they have no names at the root."""
+    check_sendable(ns)
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
     if verbose:
@@ -143,6 +146,7 @@ def get_param_server() -> Master:
 def list_params(ns: str) -> list[str]:
     """Return the names of the parameters below a namespace."""
     with _graph() as graph:
+        check_sendable(ns)
         return parameters.list_parameters(graph, graph.resolve(ns))
 
 
@@ -227,7 +231,13 @@ def _fullusage() -> NoReturn:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return the global name of a parameter. An empty one would be the namespace, and so all parameters in it."""
+    """Return the global name of a parameter. An empty one would be the namespace, and so all parameters in it.
+
+    What is not text raises what ROS raises, which sends it to the master: TypeError where XML-RPC has no type for it.
+    """
+    if not isinstance(param, str):
+        check_sendable(param)
+        raise MasterError(f"parameter [{param}] is not a string")
     if not param:
         raise MasterError("ERROR: parameter [key] must be specified and non-empty")
     return graph.resolve(param)

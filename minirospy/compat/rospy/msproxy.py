@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from minirospy.client.params import get_param_cached
+from minirospy.client.params import check_sendable, get_param_cached
 from minirospy.client.session import current_session
 from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
@@ -118,6 +118,7 @@ class MasterProxy:
 
     def search_param(self, key: str) -> str | None:
         """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none."""
+        check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
 
@@ -128,7 +129,7 @@ class MasterProxy:
 
 def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
     """Return the master of this node, or of the ROS_MASTER_URI in an ``env`` that is not os.environ."""
-    uri = None if env is os.environ else env.get("ROS_MASTER_URI")
+    uri = env.get("ROS_MASTER_URI") if isinstance(env, dict) else None
     return _master(uri or current_session().identity.environment.master_uri, os.getpid())
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from minirospy.client.params import check_sendable
 from minirospy.compat.rosgraph import masterapi
 from minirospy.errors import (
     MasterUnreachableError,
@@ -56,7 +57,7 @@ def get_service_list(
     """Return the names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
-        owner = graph.resolve(node) if node else None
+        owner = _resolved(graph, node) if node else None
     found = [each for each in found if owner is None or owner in each.nodes]
     return [[each.name, list(each.nodes)] if include_nodes else each.name for each in found]
 
@@ -65,7 +66,7 @@ def get_service_type(service_name: str) -> str | None:
     """Return the type of a service; None where it does not exist. Raises ROSServiceIOException where it does not answer."""
     with _graph() as graph:
         try:
-            return services.service_type(graph, graph.resolve(service_name))
+            return services.service_type(graph, _sent(graph, service_name))
         except NotFoundError:
             return None
 
@@ -74,7 +75,7 @@ def get_service_uri(service_name: str) -> str | None:
     """Return the URI of a service; None where it does not exist."""
     with _graph() as graph:
         try:
-            return services.service_uri(graph, graph.resolve(service_name))
+            return services.service_uri(graph, _sent(graph, service_name))
         except NotFoundError:
             return None
 
@@ -82,7 +83,7 @@ def get_service_uri(service_name: str) -> str | None:
 def get_service_node(service_name: str) -> str | None:
     """Return the node that offers a service; None where it does not exist."""
     with _graph() as graph:
-        nodes = graph.state().services.get(graph.resolve(service_name))
+        nodes = graph.state().services.get(_resolved(graph, service_name))
     return nodes[0] if nodes else None
 
 
@@ -97,13 +98,13 @@ def get_service_class_by_name(service_name: str) -> ServiceClass:
     from minirospy.idl.load import service_class
 
     with _graph() as graph:
-        return service_class(services.service_type(graph, graph.resolve(service_name)))
+        return service_class(services.service_type(graph, _sent(graph, service_name)))
 
 
 def rosservice_find(service_type: str) -> list[str]:
     """Return the services of a type."""
     with _graph() as graph:
-        return services.find_services_of_type(graph, service_type)
+        return services.find_services_of_type(graph, service_type) if service_type else []
 
 
 def call_service(
@@ -111,7 +112,7 @@ def call_service(
 ) -> tuple[Message, Any]:
     """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
     with _graph() as graph:
-        name = graph.resolve(service_name)
+        name = _sent(graph, service_name)
         type_ = service_class._type if service_class else services.service_type(graph, name)
         request = services.fill_request(type_, service_args)
         return request, services.call_service(graph, name, type_, request)
@@ -119,8 +120,12 @@ def call_service(
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
     """Return the connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    if not isinstance(service_uri, str):
+        raise ROSServiceException(
+            f"Unable to communicate with service [{service_name}], address [{service_uri}]"
+        )
     with _graph() as graph:
-        return services.service_header(graph, graph.resolve(service_name), service_uri)
+        return services.service_header(graph, _resolved(graph, service_name), service_uri)
 
 
 def has_service_args(service_name: str, service_class: ServiceClass | None = None) -> bool:
@@ -145,6 +150,17 @@ _rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice
 def _fullusage() -> None:
     """Print the commands, and exit with the status of a usage error."""
     rosservicemain([NAME])
+
+
+def _resolved(graph: Graph, name: str) -> str:
+    """Return the global name; what is not text as its text, which is the name of nothing, as in ROS."""
+    return graph.resolve(name) if isinstance(name, str) else str(name)
+
+
+def _sent(graph: Graph, name: str) -> str:
+    """Return the same of a name that is sent to the master. Raises TypeError where XML-RPC has no type for it."""
+    check_sendable(name)
+    return _resolved(graph, name)
 
 
 def _get_master() -> masterapi.Master:

@@ -160,6 +160,8 @@ def get_info_text(topic: str) -> str:
     """Return the type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
     from minirospy.introspect.texts import topic_text
 
+    if topic is not None and not isinstance(topic, str):
+        raise ROSTopicException(f"Unknown topic {topic}")
     with _graph() as graph:
         try:
             return topic_text(topics.topic_detail(graph, graph.resolve(topic)))
@@ -190,7 +192,7 @@ def create_publisher(
 
     try:
         cls = get_message_class(topic_type)
-    except ValueError as error:
+    except (AttributeError, TypeError, ValueError) as error:
         raise ROSTopicException(f"invalid topic type: {topic_type}") from error
     if cls is None:
         raise ROSTopicException(f"invalid message type: {topic_type}.\nIs its package built and sourced?")
