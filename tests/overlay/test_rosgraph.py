@@ -149,3 +149,13 @@ def test_edges_of_a_row_of_connections() -> None:
         False,
         False,
     ]
+
+
+def test_master_of_a_command_line_is_the_first_and_is_complete() -> None:
+    environment = {"ROS_MASTER_URI": "http://one:1/"}
+    get_master_uri = rosgraph.rosenv.get_master_uri
+    assert get_master_uri(environment, ["__master:=http://x:2/", "__master:=http://y:3/"]) == "http://x:2/"
+    assert get_master_uri(environment, ["a:=b"]) == "http://one:1/"
+    for argument in ("__master:=", "__master:=a:=b"):
+        with pytest.raises(ValueError, match="improperly specified"):
+            get_master_uri(environment, [argument])

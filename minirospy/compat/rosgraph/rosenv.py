@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from minirospy.environment import DEFAULT_MASTER_PORT
-from minirospy.names import parse_arguments
 
 __all__ = [
     "DEFAULT_MASTER_URI",
@@ -28,6 +27,14 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the URI of the master that the command line (``__master:=``) or else the environment names."""
-    named = parse_arguments(sys.argv if argv is None else argv).special.get("__master")
-    return named or (os.environ if env is None else env).get(ROS_MASTER_URI) or DEFAULT_MASTER_URI
+    """Return the URI of the master that the command line (the first ``__master:=``) or else the environment names.
+
+    Raises ValueError for one that is empty, or has another ``:=`` in it.
+    """
+    for argument in sys.argv if argv is None else argv:
+        if argument.startswith("__master:="):
+            uri = argument.removeprefix("__master:=")
+            if not uri or ":=" in uri:
+                raise ValueError(f"__master remapping argument '{argument}' improperly specified")
+            return uri
+    return (os.environ if env is None else env).get(ROS_MASTER_URI) or DEFAULT_MASTER_URI
