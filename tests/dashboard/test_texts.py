@@ -57,3 +57,14 @@ def test_no_view_sets_a_text_without_its_translation() -> None:
         if re.search(r"[A-Za-z]{2}", found)
     }
     assert bare == set()
+
+
+def test_no_display_of_the_scene_has_a_status_or_error_without_its_translation() -> None:
+    bare = {
+        (name, found)
+        for name, text in SOURCES.items()
+        if name.startswith("scene/")
+        for found in re.findall(r"(?:setStatus\([^;\n]*?, \d, |new Error\()(`[^`\n]*`|\"[^\"\n]*\")", text)
+        if re.search(r"[a-z]{2}", re.sub(r"\$\{[^}]*\}", "", found)) and found != '"OK"'
+    }
+    assert bare == set()

@@ -1,6 +1,7 @@
 // Interactive markers as they are shown and dragged: handles of controls that have no shapes, menus, where axes are, and what a drag does. Pure.
 // Points and directions are arrays in the frame of the marker's header. Source: visualization_msgs/InteractiveMarkerControl.
 
+import { t } from "../texts.js";
 import { fromMessage, IDENTITY, multiply, normalized, rotate } from "./transforms.js";
 
 export const [NONE, MENU, BUTTON, MOVE_AXIS, MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE, MOVE_3D, ROTATE_3D, MOVE_ROTATE_3D] = Array(10).keys();
@@ -19,11 +20,12 @@ const RADIANS_OF_PIXEL = 0.01;
 export function complete(message) {
   const { name, description, header, controls, menu_entries: entries } = message;
   const shapes = controls.reduce((sum, { markers }) => sum + markers.length, 0);
-  for (const [count, most, what] of [[controls.length, MOST_CONTROLS, "controls"], [shapes, MOST_SHAPES, "markers in its controls"], [entries.length, MOST_ENTRIES, "menu entries"]]) {
-    if (count > most) throw new Error(`${count} ${what}, more than ${most}`);
+  for (const [count, most, text] of [[controls.length, MOST_CONTROLS, "{count} controls, more than {most}"], [shapes, MOST_SHAPES, "{count} markers in its controls, more than {most}"],
+    [entries.length, MOST_ENTRIES, "{count} menu entries, more than {most}"]]) {
+    if (count > most) throw new Error(t(text, { count, most }));
   }
   const numbers = [message.scale, ...[message.pose.position, message.pose.orientation, ...controls.map(({ orientation }) => orientation)].flatMap((each) => Object.values(each))];
-  if (!numbers.every(Number.isFinite)) throw new Error("Marker contains invalid floats!");
+  if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contains invalid floats!"));
   const scale = message.scale || 1;
   return {
     name, description: description.slice(0, MOST_TEXT), header, scale, pose: fromMessage(message.pose), menu: menuOf(entries),

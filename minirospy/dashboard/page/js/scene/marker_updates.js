@@ -1,6 +1,8 @@
 // Which interactive markers a server has, by the numbers of its updates: a lost update is noticed, and all markers are fetched again. Pure.
 // Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Getting%20Started, visualization_msgs/InteractiveMarkerUpdate.
 
+import { t } from "../texts.js";
+
 const KEEP_ALIVE = 0;
 const MOST_SERVERS = 20; // of one namespace
 const MOST_WAITING = 100; // updates that came before all markers did
@@ -37,14 +39,14 @@ export class MarkerUpdates {
   /** Return [level, text] by server. */
   statuses(now) {
     return [...this.servers].map(([id, { sequence, lost, heard }]) => {
-      if (now - heard > QUIET_MS) return [id, [1, `No update received for ${Math.round((now - heard) / 1000)} seconds.`]];
-      return [id, sequence === null ? [1, lost || "Waiting for all markers."] : [0, "OK"]];
+      if (now - heard > QUIET_MS) return [id, [1, t("No update received for {count} seconds.", { count: Math.round((now - heard) / 1000) })]];
+      return [id, sequence === null ? [1, lost || t("Waiting for all markers.")] : [0, "OK"]];
     });
   }
 
   server(id) {
     if (!this.servers.has(id)) {
-      if (this.servers.size >= MOST_SERVERS) throw new Error(`more than ${MOST_SERVERS} servers: "${id.slice(0, 200)}" is left out`);
+      if (this.servers.size >= MOST_SERVERS) throw new Error(t('more than {count} servers: "{name}" is left out', { count: MOST_SERVERS, name: id.slice(0, 200) }));
       this.servers.set(id, { id, sequence: null, full: null, waiting: [], heard: Infinity, lost: "" });
     }
     return this.servers.get(id);
@@ -55,7 +57,8 @@ export class MarkerUpdates {
     const expected = known.sequence + (isAlive ? 0 : 1);
     if (message.seq_num !== expected) {
       Object.assign(known, { sequence: null, full: null, waiting: [message] });
-      known.lost = `Sequence number of ${isAlive ? "keep-alive" : "update"} is out of order. Expected: ${expected} Received: ${message.seq_num}`;
+      const text = isAlive ? "Sequence number of keep-alive is out of order. Expected: {expected} Received: {found}" : "Sequence number of update is out of order. Expected: {expected} Received: {found}";
+      known.lost = t(text, { expected, found: message.seq_num });
       return [];
     }
     known.sequence = expected;

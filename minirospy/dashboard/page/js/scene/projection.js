@@ -1,5 +1,7 @@
 // What a camera's sensor_msgs/CameraInfo says of its picture. Pure.
 
+import { t } from "../texts.js";
+
 const [NEAR, FAR] = [0.01, 100]; // metres, as in RViz
 
 /** Return the topic of the camera info that belongs to an image's topic. */
@@ -8,9 +10,9 @@ export const infoTopicOf = (topic) => `${topic.slice(0, topic.lastIndexOf("/"))}
 /** Return {matrix (of the projection, column by column), offset (of the camera in its frame, metres)}. Throws Error. */
 export function projectionOf({ width, height, P }, zoom = 1) {
   const [fx, , cx, tx, , fy, cy, ty] = P;
-  if (![...P].every(Number.isFinite)) throw new Error("Contains invalid floating point values (nans or infs)");
-  if (!width || !height) throw new Error("Could not determine width/height of image due to malformed CameraInfo (either width or height is 0)");
-  if (!fx || !fy) throw new Error("the camera is not calibrated: P of its CameraInfo has no focal length");
+  if (![...P].every(Number.isFinite)) throw new Error(t("Contains invalid floating point values (nans or infs)"));
+  if (!width || !height) throw new Error(t("Could not determine width/height of image due to malformed CameraInfo (either width or height is 0)"));
+  if (!fx || !fy) throw new Error(t("the camera is not calibrated: P of its CameraInfo has no focal length"));
   const matrix = [
     ((2 * fx) / width) * zoom, 0, 0, 0,
     0, ((2 * fy) / height) * zoom, 0, 0,

@@ -4,6 +4,7 @@
 import { DataTexture, Group, PerspectiveCamera, Quaternion, RGBAFormat, UnsignedByteType, Vector3 } from "../../../vendor/three/three.min.js";
 import { h } from "../../dom.js";
 import { pixelsOf } from "../../pixels.js";
+import { t } from "../../texts.js";
 import { infoTopicOf, projectionOf } from "../projection.js";
 import { TopicDisplay } from "./display.js";
 
@@ -22,7 +23,7 @@ export class Camera extends TopicDisplay {
     this.canvas.setAttribute("aria-label", this.topic);
     this.context.stage.addInset(this);
     const topic = infoTopicOf(this.topic);
-    this.setStatus("Camera Info", 1, `No CameraInfo received on [${topic}]. Topic may not exist.`);
+    this.setStatus("Camera Info", 1, t("No CameraInfo received on [{topic}]. Topic may not exist.", { topic }));
     this.ends.push(this.listen(topic, "latest", (info) => this.informed(info)), () => this.context.stage.removeInset(this), () => this.texture?.dispose());
   }
 
@@ -45,7 +46,7 @@ export class Camera extends TopicDisplay {
   received(message) {
     const { width, height, rgba } = pixelsOf(message);
     const most = this.context.stage.renderer.capabilities.maxTextureSize;
-    if (!width || !height || Math.max(width, height) > most) throw new Error(`an image of ${width} x ${height} cannot be shown here`);
+    if (!width || !height || Math.max(width, height) > most) throw new Error(t("an image of {width} x {height} cannot be shown here", { width, height }));
     if (this.picture.width !== width || this.picture.height !== height) {
       Object.assign(this.picture, { width, height });
       this.texture?.dispose();

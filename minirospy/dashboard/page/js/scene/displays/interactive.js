@@ -5,6 +5,7 @@ import { complete, MOST_TEXT, rotationsOf, toMessage, VIEW_FACING } from "../han
 import { MarkerUpdates } from "../marker_updates.js";
 import { schema } from "../schemas.js";
 import { axes, discard } from "../shapes.js";
+import { t } from "../../texts.js";
 import { apply, compose, fromMessage, invert, multiply, secondsOf } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 import { makeMarker } from "./markers.js";
@@ -62,7 +63,7 @@ export class Shown {
   inside({ header, pose }) {
     if (!header.frame_id) return pose;
     const [outer, own] = [this.header.frame_id, header.frame_id].map((frame) => this.display.context.transformNow(frame));
-    if (!outer || !own) throw new Error(`no transform from [${header.frame_id}] to [${this.header.frame_id}]`);
+    if (!outer || !own) throw new Error(t("no transform from [{frame}] to [{other}]", { frame: header.frame_id, other: this.header.frame_id }));
     return toMessage(compose(invert(compose(outer, this.pose)), compose(own, fromMessage(pose))));
   }
 
@@ -78,7 +79,7 @@ export class Shown {
   /** The server moves the marker; while a person drags it, when that ends. */
   move({ pose, header }) {
     const found = fromMessage(pose);
-    if (![...found.p, ...found.q].every(Number.isFinite)) throw new Error(`${this.name}: Pose contains invalid floats!`);
+    if (![...found.p, ...found.q].every(Number.isFinite)) throw new Error(t("{name}: Pose contains invalid floats!", { name: this.name }));
     if (this.held) this.held = { pose: found, header };
     else {
       this.pose = found;
@@ -165,7 +166,7 @@ export class InteractiveMarkers extends TopicDisplay {
     super.start();
     if (!this.topic) return;
     if (!this.topic.endsWith(SUFFIX)) {
-      this.setStatus("Topic", 2, `Invalid topic name: ${this.topic}: it does not end in ${SUFFIX}`);
+      this.setStatus("Topic", 2, t("Invalid topic name: {topic}: it does not end in {suffix}", { topic: this.topic, suffix: SUFFIX }));
       return;
     }
     this.space = this.topic.slice(0, -SUFFIX.length);
@@ -194,7 +195,7 @@ export class InteractiveMarkers extends TopicDisplay {
     if (!this.type && this.updates.servers.size) {
       for (const key of [...this.markers.keys()]) this.drop(key);
       this.updates = new MarkerUpdates();
-      this.setStatus("General", 1, "Server is offline. Resetting.");
+      this.setStatus("General", 1, t("Server is offline. Resetting."));
     }
   }
 
@@ -226,7 +227,7 @@ export class InteractiveMarkers extends TopicDisplay {
       for (const name of erases) this.drop(key(name));
     }
     if (!this.updates.isWaiting) this.endFetch?.();
-    this.setStatus("Markers", 0, `${this.markers.size} interactive markers`);
+    this.setStatus("Markers", 0, t("{count} interactive markers", { count: this.markers.size }));
     if (failed) throw failed;
     this.context.stage.invalidate();
   }
@@ -236,7 +237,7 @@ export class InteractiveMarkers extends TopicDisplay {
     const shown = this.markers.get(key) ?? new Shown(this);
     const status = `Marker ${message.name.slice(0, MOST_TEXT)}`;
     try {
-      if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(`more than ${MOST} interactive markers`);
+      if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} interactive markers", { count: MOST }));
       shown.fill(message);
       this.markers.set(key, shown);
       this.clearStatus(status);

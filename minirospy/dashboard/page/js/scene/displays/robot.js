@@ -119,7 +119,7 @@ export class RobotModel extends Display {
     }
     if (missing.length) {
       const [[frame, error]] = missing;
-      this.setStatus("Transform", 2, `${missingText(frame, fixedFrame, error)}${missing.length > 1 ? t("; and {count} more links", { count: missing.length - 1 }) : ""}`);
+      this.setStatus("Transform", 2, missingText(frame, fixedFrame, error) + (missing.length > 1 ? t("; and {count} more links", { count: missing.length - 1 }) : ""));
     } else this.setStatus("Transform", 0, t("Transform OK"));
   }
 
