@@ -1,6 +1,6 @@
 """`minirospy ros2-bridge`: topics, services, actions between ROS 1 and ROS 2 (docs/ros2.md).
 
-It runs beside an installed ROS 2, or without one by Zenoh.
+It runs next to an installed ROS 2, or without one by Zenoh.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> Parser:
     parser = Parser(
         "minirospy ros2-bridge",
-        "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports, or "
+        "Passes messages between ROS 1 and ROS 2. It runs next to an installed ROS 2, whose rclpy it imports, or "
         "with --zenoh without one. "
         "A topic is bridged while it has a publisher on one side and a subscriber on the other, a service or "
         "an action while one side offers it.",

@@ -5,7 +5,7 @@ play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {t
 thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
 ``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the message of the moment, 2 one for a
 thumbnail), the topic's number (u16), its time (f64), the serialized message.
-Times are seconds since the bag's start. Only who has the read-write token may do any of it: files are read and written
+Times are seconds since the bag's start. Only a client that has the read-write token may do any of it: files are read and written
 as the user of the dashboard.
 """
 

@@ -48,7 +48,7 @@ class JsonSession:
     """For texts of errors: an operation on this."""
 
     owners_only: ClassVar[str] = ""
-    """What only who has the token may do; empty: others may have a part."""
+    """What only a client that has the token may do; empty: others may have a part."""
 
     longest: ClassVar[int] = 256_000
     """Characters of an operation: parsing it holds up all clients."""
@@ -98,7 +98,7 @@ class JsonSession:
     async def left(self) -> None:
         """Release what the client had."""
 
-    def take(self, name: str, fields: Fields) -> None:
+    def dispatch(self, name: str, fields: Fields) -> None:
         """Have an operation carried out after those that wait."""
         if len(self._operations) >= self.most_waiting:
             self.send_error("too many operations wait: this one was dropped", fields)
@@ -142,7 +142,7 @@ class JsonSession:
         except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
             self.send_error(f"not an operation on {self.subject}: {_line(error)}")
         else:
-            self.take(name, fields)
+            self.dispatch(name, fields)
 
     def received_binary(self, data: bytes) -> None:
         """Refuse what no client sends."""

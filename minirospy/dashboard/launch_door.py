@@ -3,7 +3,7 @@
 A client sends ``{"op": NAME, ...}``: list; describe {package, file, args}; start {package, file, args}; stop, restart,
 remove {id}; end {id, node, restarts}; follow {id, node} (node "": roslaunch's own lines; id null: nothing). The server sends
 ``{"writes"}``, ``{"files"}``, ``{"describe"}``, ``{"launches"}``, ``{"log", "text", "isFirst"}``, ``{"error"}``.
-Only who has the read-write token may do any of it: it starts programs as the user of the dashboard.
+Only a client that has the read-write token may do any of it: it starts programs as the user of the dashboard.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Reading and saving .rviz files for the 3D view, by JSON over WebSocket: one operation, one answer.
 
 ``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the file of the command, null where it does not exist yet;
-``{"save": config}`` -> ``{"name"}``: saved there, for who has the read-write token; ``{"parse": text}`` -> ``{"config"}`` and
-``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``. No operation names a file.
+``{"save": config}`` -> ``{"name"}``: saved there, for clients that have the read-write token; ``{"parse": text}`` ->
+``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``. No
+operation names a file.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
     (re.compile(r"-?(?:0|[1-9][0-9]{0,14})"), int),
     (re.compile(r"-?(?:[0-9]+\.[0-9]*(?:[eE][-+]?[0-9]{1,3})?|[0-9]+[eE][-+][0-9]{1,3})"), float),
 )
-"""What is no text; what else YAML 1.1 guesses (dates, octal numbers) stays one, as in RViz."""
+"""Values that are not texts; what else YAML 1.1 takes for another type (dates, octal numbers) stays a text, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
 """Texts that need no quotes, unless another reader takes them for a number."""

@@ -141,8 +141,8 @@ class ToolsSession(JsonSession):
     async def started(self) -> None:
         """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
 
-    def take(self, name: str, fields: Fields) -> None:
-        """See :meth:`JsonSession.take`."""
+    def dispatch(self, name: str, fields: Fields) -> None:
+        """See :meth:`JsonSession.dispatch`."""
         if len(self._running) >= self.most_waiting:
             self.send_error("too many requests wait for their answers", fields)
             return

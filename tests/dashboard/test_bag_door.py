@@ -401,7 +401,7 @@ def test_who_has_no_token_neither_records_nor_opens(client: Callable[..., Client
     page = client(token="")
     assert page.next("writes") is False
     page.send("open", name="a.bag")
-    assert "only who has the token may record or open bags" in json_error(page)
+    assert "only a client that has the token may record or open bags" in json_error(page)
 
 
 def test_page_that_shows_a_paused_bag_looks_only_when_something_changes(

@@ -71,7 +71,8 @@ def test_another_board_is_named_in_the_address(serve: Callable[..., Served]) -> 
 def test_board_is_started_only_by_who_has_the_token(serve: Callable[..., Served]) -> None:
     with opened(serve(), "?board=nobodys") as socket:
         assert (
-            "only who has the token may start boards" in state(socket, lambda each: "error" in each)["error"]
+            "only a client that has the token may start boards"
+            in state(socket, lambda each: "error" in each)["error"]
         )
         socket.send('{"press": 11}')
         assert "not open" in state(socket, lambda each: "error" in each)["error"]

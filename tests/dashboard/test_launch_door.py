@@ -217,7 +217,7 @@ def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
     page = client(token="")
     assert page.next(lambda found: "writes" in found)["writes"] is False
     page.send("start", **FILE, args={"needed": "yes"})
-    assert "only who has the token may start programs" in page.error()
+    assert "only a client that has the token may start programs" in page.error()
 
 
 class Run:

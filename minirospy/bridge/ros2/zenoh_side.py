@@ -41,7 +41,7 @@ _log = logging.getLogger(__name__)
 _TOPIC = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
 _SERVICE = (Kind.SERVICE, Kind.CLIENT)
 _NO_ACTIONS = "actions are not passed on by --zenoh"
-_NO_PARAMETERS = "parameters are not passed on by --zenoh: run the bridge beside an installed ROS 2"
+_NO_PARAMETERS = "parameters are not passed on by --zenoh: run the bridge next to an installed ROS 2"
 
 
 class ZenohSide:

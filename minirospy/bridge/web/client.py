@@ -144,7 +144,7 @@ class WebClient:
     def why_not_owner(self, what: str) -> str:
         """Return the line for a client that is no owner and so may not ``what``."""
         if self.may_write:
-            return f"only who has the token may {what}: open the link that the command printed"
+            return f"only a client that has the token may {what}: open the link that the command printed"
         return f"this token is read-only: it does not let you {what}"
 
     @property

@@ -47,7 +47,7 @@ export function fill(element, ...children) {
 const waiting = new Map(); // element -> what draws it
 let pressed = null;
 
-/** Draw what is in an element anew, as new data come: after the release where something in it is pressed. */
+/** Draw the contents of an element again for new data; where something in it is pressed, after its release. */
 export function redraw(element, draw) {
   if (pressed && element.contains(pressed)) {
     waiting.set(element, draw);

@@ -1,4 +1,4 @@
-// A person's hands on interactive markers: what is under the mouse or finger, dragging, clicks, menus; each is reported to the server.
+// Interactive markers under the mouse or a finger: dragging, clicks, menus; each is reported to the server.
 
 import { t } from "../texts.js";
 import { BUTTON_CLICK, KEEP_ALIVE, MENU_SELECT, MOUSE_DOWN, MOUSE_UP, POSE_UPDATE } from "./displays/interactive.js";
@@ -96,7 +96,7 @@ export class Grips {
     shown.hold();
     held.rotation = control.rotation;
     held.drag = new Drag({ mode: control.mode, pose: shown.pose, axis: shown.axisOf(control), grabbed: apply(invert(shown.outer), held.point), ray });
-    held.timer = setInterval(() => this.tell(), REPORT_MS);
+    held.timer = setInterval(() => this.reportPose(), REPORT_MS);
     this.light(control, 0.5);
   }
 
@@ -172,7 +172,8 @@ export class Grips {
     if (!control.shown.isClosed) control.shown.display.report(control, event, more);
   }
 
-  tell() {
+  /** Report the pose while a control is held: where it has changed, and now and then where it has not. */
+  reportPose() {
     const { held } = this;
     const now = performance.now();
     if (!held.isChanged && now - held.reported < ALIVE_MS) return;

@@ -10,7 +10,7 @@ const QUIET_MS = 2000; // servers publish every half second
 
 export class MarkerUpdates {
   constructor() {
-    this.servers = new Map(); // server_id -> {sequence: null until all its markers are known, full, waiting, heard}
+    this.servers = new Map(); // server_id -> {sequence: null until all its markers are known, full, waiting, updated: the time of the last update}
   }
 
   /** Return whether a server's markers are not known. */
@@ -29,7 +29,7 @@ export class MarkerUpdates {
   /** Take over an InteractiveMarkerUpdate that came at a time in milliseconds; return the changes. */
   update(message, now) {
     const known = this.server(message.server_id);
-    known.heard = now;
+    known.updated = now;
     if (known.sequence !== null) return this.next(known, message);
     known.waiting.push(message);
     if (known.waiting.length > MOST_WAITING) known.waiting.shift();
@@ -38,8 +38,8 @@ export class MarkerUpdates {
 
   /** Return [level, text] by server. */
   statuses(now) {
-    return [...this.servers].map(([id, { sequence, lost, heard }]) => {
-      if (now - heard > QUIET_MS) return [id, [1, t("No update received for {count} seconds.", { count: Math.round((now - heard) / 1000) })]];
+    return [...this.servers].map(([id, { sequence, lost, updated }]) => {
+      if (now - updated > QUIET_MS) return [id, [1, t("No update received for {count} seconds.", { count: Math.round((now - updated) / 1000) })]];
       return [id, sequence === null ? [1, lost || t("Waiting for all markers.")] : [0, "OK"]];
     });
   }
@@ -47,7 +47,7 @@ export class MarkerUpdates {
   server(id) {
     if (!this.servers.has(id)) {
       if (this.servers.size >= MOST_SERVERS) throw new Error(t('more than {count} servers: "{name}" is left out', { count: MOST_SERVERS, name: id.slice(0, 200) }));
-      this.servers.set(id, { id, sequence: null, full: null, waiting: [], heard: Infinity, lost: "" });
+      this.servers.set(id, { id, sequence: null, full: null, waiting: [], updated: Infinity, lost: "" });
     }
     return this.servers.get(id);
   }
@@ -73,7 +73,7 @@ export class MarkerUpdates {
     if (later.length && (later[0].type === KEEP_ALIVE || later[0].seq_num !== full.seq_num + 1)) return [];
     Object.assign(known, { sequence: full.seq_num, full: null, waiting: [], lost: "" });
     const found = [{ server: known.id, isAll: true, markers: full.markers, poses: [], erases: [] }];
-    for (const message of later) found.push(...(known.sequence === null ? this.update(message, known.heard) : this.next(known, message)));
+    for (const message of later) found.push(...(known.sequence === null ? this.update(message, known.updated) : this.next(known, message)));
     return found;
   }
 }

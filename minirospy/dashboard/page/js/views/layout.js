@@ -48,7 +48,7 @@ export class Layouts {
 
   show(text, name, words = null) {
     if (this.isClosed) return; // what is shown now would never be closed
-    this.asked = null; // what was awaited is no longer wanted
+    this.requested = null; // the preset that was awaited is no longer wanted
     let layout;
     try {
       layout = Layout.parse(text);
@@ -76,9 +76,9 @@ export class Layouts {
       this.show(text, "", { preset: name });
       return;
     }
-    const asked = this.asked = {};
+    const requested = this.requested = {};
     const group = await this.group();
-    if (this.asked === asked) this.show(classroom(group), "", { preset: name });
+    if (this.requested === requested) this.show(classroom(group), "", { preset: name });
   }
 
   /** Return the boards of the server's machine and the topics, once they are known. */
