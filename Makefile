@@ -63,8 +63,8 @@ pythons: $(STAMP)
 	@$(BIN)/python tools/pythons.py $(PYTHONS) -- $(CHECKED)
 
 ros2: $(STAMP)
-	@$(BIN)/python tests/interop/install_ros2.py
-	@$(BIN)/python tests/interop/install_zenoh_peers.py
+	@$(BIN)/python -m tests.interop.install_ros2
+	@$(BIN)/python -m tests.interop.install_zenoh_peers
 	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py tests/interop/test_interop_ros2_zenoh.py
 
 guard: $(STAMP)

@@ -8,13 +8,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "build" / f"zenoh-peers-{sys.version_info[0]}.{sys.version_info[1]}"
-PYTHON = FOLDER / "bin" / "python"
-CACHE = FOLDER / "cydr"
-STAMP = FOLDER / "installed"
+from tests.interop.environments import PeerEnvironment
+
 PACKAGES = (
     "pyzeros==0.1.0",
     "zenoh-ros2-sdk==0.1.8",
@@ -22,16 +18,16 @@ PACKAGES = (
     "rosbags==0.11.9",
     "eclipse-zenoh==1.10.2",
 )
+PEER = PeerEnvironment("zenoh-peers", PACKAGES)
+PYTHON, STAMP = PEER.python, PEER.stamp
+CACHE = PEER.folder / "cydr"
 
 
 def main() -> int:
     """Install; return 0 in any case, since the tests are skipped without."""
-    if STAMP.exists() and STAMP.read_text() == "\n".join(PACKAGES):
+    if PEER.is_complete:
         return 0
-    print("Installing pyzeros and zenoh-ros2-sdk from PyPI into", FOLDER)
-    subprocess.run([sys.executable, "-m", "venv", "--clear", str(FOLDER)], check=True)
-    command = [str(PYTHON), "-m", "pip", "install", "-q", "--disable-pip-version-check", *PACKAGES]
-    if subprocess.run(command, capture_output=True, check=False).returncode:
+    if not PEER.create():
         print(
             "pyzeros and zenoh-ros2-sdk cannot be installed here: the bridge over Zenoh is not tested against them"
         )
@@ -44,7 +40,7 @@ def main() -> int:
     ).returncode:
         print("pyzeros does not work here: the bridge over Zenoh is not tested against it")
         return 0
-    STAMP.write_text("\n".join(PACKAGES))
+    PEER.complete()
     return 0
 
 

@@ -1,0 +1,52 @@
+"""Environments below build/ with other software from PyPI, for the tests against it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["PeerEnvironment"]
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class PeerEnvironment:
+    """A venv with packages. ``stamp`` exists once it is complete, and has their versions."""
+
+    name: str
+    packages: tuple[str, ...]
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the venv, for this version of Python."""
+        return ROOT / "build" / f"{self.name}-{sys.version_info[0]}.{sys.version_info[1]}"
+
+    @property
+    def python(self) -> Path:
+        """The interpreter of the venv."""
+        return self.folder / "bin" / "python"
+
+    @property
+    def stamp(self) -> Path:
+        """The file that exists once the environment is complete."""
+        return self.folder / "installed"
+
+    @property
+    def is_complete(self) -> bool:
+        """Return whether it has these packages."""
+        return self.stamp.exists() and self.stamp.read_text() == "\n".join(self.packages)
+
+    def create(self) -> bool:
+        """Create the venv and install the packages; return whether pip could."""
+        print("Installing", self.packages[0].partition("==")[0], "and more from PyPI into", self.folder)
+        subprocess.run([sys.executable, "-m", "venv", "--clear", str(self.folder)], check=True)
+        options = ["-q", "--disable-pip-version-check", "--prefer-binary"]
+        command = [str(self.python), "-m", "pip", "install", *options, *self.packages]
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    def complete(self) -> None:
+        """Write the stamp."""
+        self.stamp.write_text("\n".join(self.packages))
