@@ -110,26 +110,32 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 
 
 def format_rviz(config: Mapping[str, object]) -> str:
-    """Return the text of a .rviz file: sorted names, lists one step to the right of their name, as RViz writes them."""
-    return "".join(f"{line}\n" for line in _lines(config)) or "{}\n"
+    """Return the text of a .rviz file: sorted names, lists one step to the right of their name, as RViz writes them.
+
+    Raise RvizFileError where it is nested more deeply than what :func:`parse_rviz` reads.
+    """
+    return "".join(f"{line}\n" for line in _lines(config, 1)) or "{}\n"
 
 
-def _lines(value: Mapping[str, object] | list[object]) -> Iterator[str]:
-    """Yield the lines of a map or a list that is not empty."""
+def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
+    """Yield the lines of a map or a list that is not empty, with ``depth - 1`` others around it."""
+    # Each line passes through all of these, and is indented by them.
+    if depth >= _MOST_DEPTH:
+        raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):
         for each in value:
-            yield from _after("-", each, " ")
+            yield from _after("-", each, " ", depth)
         return
     for name in sorted(value):
-        yield from _after(f"{_text(name)}:", value[name], "\n")
+        yield from _after(f"{_text(name)}:", value[name], "\n", depth)
 
 
-def _after(start: str, value: object, separator: str) -> Iterator[str]:
+def _after(start: str, value: object, separator: str, depth: int) -> Iterator[str]:
     """Yield the lines of what follows a name or a dash."""
     if not isinstance(value, dict | list) or not value:
         yield f"{start} {_word(value)}"
         return
-    below = _lines(value)
+    below = _lines(value, depth + 1)
     if separator == "\n":
         yield start
     else:

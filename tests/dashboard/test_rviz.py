@@ -146,6 +146,21 @@ def test_text_of_the_browser_is_read_and_written(opened: Callable[..., Callable[
     assert "was not started with a .rviz file" in send({"save": config})["error"]
 
 
+def test_depth_of_a_file_is_limited_in_both_directions() -> None:
+    def nested(depth: int) -> dict[str, object]:
+        value: object = ["x"]
+        for _ in range(depth - 3):
+            value = [value]
+        return {"Visualization Manager": {"Displays": value}}
+
+    config = nested(49)
+    assert parse_rviz(format_rviz(config)) == config
+    with pytest.raises(RvizFileError, match="nested too deeply"):
+        format_rviz(nested(50))
+    with pytest.raises(RvizFileError, match="nested too deeply"):
+        parse_rviz(json.dumps(nested(50)))
+
+
 @pytest.mark.parametrize("number", ["1.0e999", "-1.0e999"])
 def test_number_that_json_has_not_is_text(number: str) -> None:
     found = parse_rviz(f"Visualization Manager: {{Size: {number}}}")
