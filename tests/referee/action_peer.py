@@ -95,9 +95,13 @@ class _LogLines(logging.Handler):
 
 
 class RawClient:
-    """A scripted client: sends on demand, keeps what it receives."""
+    """A scripted client: sends on demand, keeps what it receives.
 
-    def __init__(self, ns):
+    ``hides_pending``: for a server that accepts goals when they arrive. Whether a list has PENDING before depends on its timer.
+    """
+
+    def __init__(self, ns, hides_pending=False):
+        self._hides_pending = hides_pending
         self._changed = threading.Condition()
         self.statuses = {}
         self.seen = {}
@@ -154,7 +158,8 @@ class RawClient:
         """Show what was heard of each goal since the last time, in order."""
         with self._changed:
             for id, statuses in sorted(self.seen.items()):
-                show("   statuses of", id, *statuses)
+                is_hidden = self._hides_pending and len(statuses) > 1 and statuses[0] == "PENDING()"
+                show("   statuses of", id, *statuses[is_hidden:])
             for result in self.results:
                 show("   result", *result)
             for feedback in self.feedback:

@@ -46,7 +46,7 @@ def execute(goal):
 
 server = actionlib.SimpleActionServer("server", TestAction, execute, False)
 server.start()
-client = RawClient("server")
+client = RawClient("server", hides_pending=True)
 
 
 def send(id, goal, stamp=None):

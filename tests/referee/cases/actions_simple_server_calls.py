@@ -37,7 +37,7 @@ outcome("accept", lambda: server.accept_new_goal())
 outcome("register", lambda: server.register_goal_callback(on_goal))
 outcome("register", lambda: server.register_preempt_callback(on_preempt))
 server.start()
-client = RawClient("server")
+client = RawClient("server", hides_pending=True)
 story.tell()
 
 show("== one goal")

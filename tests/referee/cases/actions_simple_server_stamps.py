@@ -27,7 +27,7 @@ def execute(goal):
 
 server = actionlib.SimpleActionServer("server", TestAction, execute, False)
 server.start()
-client = RawClient("server")
+client = RawClient("server", hides_pending=True)
 
 
 def send(id, goal, stamp):
