@@ -81,18 +81,21 @@ def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None
 
 
 def _dashboard_parser() -> Parser:
+    from minirospy.dashboard.views import LAYOUTS, VIEWS
+
     parser = _parser("minirospy dashboard", "Shows the graph and the board in a browser.")
+    layouts = [name for name in LAYOUTS if name not in VIEWS]
     parser.add_argument(
         "view",
         nargs="?",
         default="",
-        help="the view to open (topics), or the layout: workshop, classroom",
+        help=f"the view to open (topics), or a layout: {', '.join(layouts)}",
         completer="dashboard_views",
     )
     parser.add_argument(
         "--layout",
         default="",
-        help="the layout to open, several views side by side: workshop, console, teleop or classroom",
+        help=f"the layout to open, several views side by side: {', '.join(LAYOUTS)}",
         completer="dashboard_layouts",
     )
     return parser

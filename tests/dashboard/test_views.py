@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from minirospy.cli.dashboard import _dashboard_parser
 from minirospy.dashboard.files import FOLDER
 from minirospy.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields, view_of_plugin
 from minirospy.errors import UsageError
@@ -22,6 +23,13 @@ def test_page_has_the_views_that_links_name() -> None:
 def test_page_has_the_layouts_that_links_name() -> None:
     text = (FOLDER / "js" / "presets.js").read_text(encoding="utf-8")
     assert tuple(re.findall(r"^  (\w+): \[", text, re.MULTILINE)) == LAYOUTS
+
+
+def test_help_names_all_layouts() -> None:
+    text = " ".join(_dashboard_parser().format_help().split())
+    assert f"several views side by side: {', '.join(LAYOUTS)}" in text
+    # "console" and "teleop" are those of one view.
+    assert "or a layout: workshop, rviz, classroom" in text
 
 
 def test_link_has_its_settings_and_token_in_the_fragment() -> None:
