@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import concurrent.futures
 import contextlib
 import functools
 import threading
@@ -15,6 +14,8 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
+_CLOSE_SECONDS = 2.0
+"""How long :meth:`LoopThread.close` waits for the last steps of what runs on the loop."""
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
@@ -52,7 +53,10 @@ class LoopThread:
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls; return the function that waits."""
+        """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls.
+
+        Return the function that waits for the result, to be called once.
+        """
         if threading.current_thread() is self._thread:
             coroutine.close()
             raise RuntimeError("a blocking call on the event loop's thread would wait for itself")
@@ -60,19 +64,34 @@ class LoopThread:
             if self._is_ending:
                 coroutine.close()
                 raise LoopClosedError("the event loop is closed")
-            future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
-        return functools.partial(self._wait, future)
+            tasks: list[asyncio.Task[_T]] = []
+            pending = threading.Lock()
+            pending.acquire()
 
-    def _wait(self, future: concurrent.futures.Future[_T], timeout: float | None) -> _T:
+            def has_ended(task: asyncio.Task[_T]) -> None:
+                if not task.cancelled():
+                    # A caller that is interrupted does not retrieve it.
+                    task.exception()
+                pending.release()
+
+            def begin() -> None:
+                tasks.append(self.loop.create_task(coroutine))
+                tasks[0].add_done_callback(has_ended)
+
+            self.loop.call_soon_threadsafe(begin)
+        return functools.partial(self._wait, tasks, pending)
+
+    def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
+        # Not concurrent.futures.Future, whose lock the caller would hold for some steps of its wait, and the loop needs: a
+        # signal's handler that waits for the loop in one of those steps would wait forever.
         try:
-            return future.result(timeout)
-        except concurrent.futures.CancelledError as error:
+            if not pending.acquire(timeout=-1 if timeout is None else timeout):
+                raise TimeoutError
+            return tasks[0].result()
+        except asyncio.CancelledError as error:
             raise LoopClosedError("the event loop was closed meanwhile") from error
-        except concurrent.futures.TimeoutError:
-            future.cancel()
-            raise TimeoutError from None
         except BaseException:
-            future.cancel()
+            self.post(lambda: tasks[0].cancel())  # noqa: PLW0108 - it may be there only then
             raise
 
     def post(self, function: Callable[..., object], *args: object) -> None:
@@ -87,7 +106,7 @@ class LoopThread:
         # Not loop.stop(): a second one would interrupt the last steps of the thread.
         self.post(self._end.set)
         if threading.current_thread() is not self._thread:
-            self._thread.join(2.0)
+            self._thread.join(_CLOSE_SECONDS)
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self.loop)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 import threading
+from types import FrameType
 
 import pytest
 
@@ -68,4 +70,39 @@ def test_calls_start_in_their_order() -> None:
     for wait in reversed(waits):
         wait(10)
     assert order == list(range(100))
+    thread.close()
+
+
+def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
+    """A signal's handler runs between any two steps of the main thread, and shuts the node down, which waits for the loop."""
+    thread = LoopThread("test-loop")
+    at = steps = 0
+    is_at_step = threading.Event()
+    inner: list[int] = []
+
+    async def outer() -> int:
+        # Its end, for which the loop needs the lock of the caller's future, comes while the caller is at the step; or
+        # while it waits, where that is before the step.
+        is_at_step.wait(0.05)
+        return 1
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal steps
+        steps += 1
+        if steps == at:
+            is_at_step.set()
+            inner.append(thread.run(asyncio.sleep(0, 2), 10.0))
+
+    profile = sys.getprofile()
+    while steps >= at:
+        at, steps = at + 1, 0
+        is_at_step.clear()
+        sys.setprofile(count)
+        try:
+            outcome = thread.run(outer())
+        finally:
+            sys.setprofile(profile)
+        assert outcome == 1
+    assert inner == [2] * (at - 1)
+    assert at > 20
     thread.close()
