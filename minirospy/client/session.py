@@ -108,7 +108,9 @@ class Session:
         from minirospy.runtime.node.node import Node
         from minirospy.runtime.transport.loop import LoopThread
 
-        self._loop = LoopThread()
+        with self.lifecycle.deferral:
+            # asyncio's loops do not come to their end where they are interrupted at their start.
+            self._loop = LoopThread()
         self._opened = Node(
             self.name,
             self.identity.environment,
@@ -148,7 +150,9 @@ class Session:
         """
         assert self._loop is not None
         loop = self._loop
-        wait = self._or_interrupted(lambda: loop.start(coroutine))
+        with self.lifecycle.deferral:
+            # A shutdown in the middle would wait for the end of the loop, which needs a lock that this thread holds.
+            wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
     def post(self, function: Callable[..., object], *args: object) -> None:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import signal
+from collections.abc import Callable, Coroutine
+from typing import cast
+
 import pytest
 
 from minirospy.client import session as sessions
 from minirospy.client.session import Session, current_session, replace_session, replace_session_in_fork
+from minirospy.client.shutdown import Action
 from minirospy.clock import SimulatedClock
+from minirospy.runtime.transport.loop import LoopThread
 
 
 @pytest.fixture(autouse=True)
@@ -70,3 +77,38 @@ def test_what_waits_for_a_node_runs_once_it_is_ready(session: Session) -> None:
     assert ran == []
     session.publish_node()
     assert ran == [1]
+
+
+def test_a_signal_while_a_call_of_the_loop_starts_waits_for_its_start(session: Session) -> None:
+    """The thread holds a lock then, for which the end of the loop would wait."""
+    was_requested: list[bool] = []
+
+    class Loop:
+        def start(self, coroutine: Coroutine[object, object, int]) -> Callable[[float | None], int]:
+            coroutine.close()
+            session.signals._is_nudge = True
+            session.signals._on_signal(signal.SIGINT, None)
+            was_requested.append(session.lifecycle.is_shutdown_requested)
+            return lambda _: 7
+
+    session._loop = cast("LoopThread", Loop())
+    assert session.run(asyncio.sleep(0, 7)) == 7
+    assert was_requested == [False]
+    assert session.is_shutdown()
+
+
+def test_a_second_signal_while_the_loop_is_made_waits_until_it_is(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[bool] = []
+
+    def make() -> None:
+        session.signals._interrupt = Action.KEYBOARD_INTERRUPT
+        session.signals._is_nudge = True
+        session.signals._on_signal(signal.SIGINT, None)
+        made.append(True)
+
+    monkeypatch.setattr("minirospy.runtime.transport.loop.LoopThread", make)
+    with pytest.raises(KeyboardInterrupt):
+        session.open_node(0, 0)
+    assert made == [True]
