@@ -86,7 +86,8 @@ class Lifecycle:
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        with self._lock:
+        # A signal that is dispatched in between would shut down without this hook.
+        with self.deferral, self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
                 return

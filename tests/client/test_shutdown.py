@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import signal
 import sys
 import threading
+from types import FrameType
 
 import pytest
 
@@ -241,6 +243,37 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     lifecycle.deferral.poll()
     assert ran == ["other"]
     assert lifecycle.left.is_set()
+
+
+def test_a_signal_at_any_step_of_adding_a_hook_runs_that_hook(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    steps, at = 0, 1
+    ran: list[int] = []
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal steps
+        steps += 1
+        if steps == at:
+            watchdog._is_nudge = True
+            watchdog._on_signal(signal.SIGINT, None)
+
+    profile = sys.getprofile()
+    while True:
+        sys.setprofile(count)
+        try:
+            lifecycle.add_hook(functools.partial(ran.append, at))
+        finally:
+            sys.setprofile(profile)
+        if steps < at:
+            break
+        assert lifecycle.is_shutdown()
+        assert ran == list(range(1, at + 1))
+
+        steps, at = 0, at + 1
+        lifecycle = Lifecycle(lambda: None)
+        watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: False)
+    assert at > 5
 
 
 def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycle) -> None:
