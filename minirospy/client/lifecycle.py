@@ -98,12 +98,13 @@ class Lifecycle:
 
         Return False, without waiting, where a shutdown is under way already.
         """
-        if not self._claim.acquire(blocking=False):
-            return False
-        _log.debug("signal_shutdown [%s]", reason)
-        self.reason = reason
-
         with self.deferral:
+            # Entered first: a second signal that interrupts what is claimed and not yet done would leave it so.
+            if not self._claim.acquire(blocking=False):
+                return False
+            _log.debug("signal_shutdown [%s]", reason)
+            self.reason = reason
+
             self.machine.runs_in_main = is_main_thread()
             self.machine.phase = Phase.HOOKS
             try:

@@ -226,6 +226,42 @@ def test_hooks_run_once_though_signals_come_while_they_run(
     assert lifecycle.is_shutdown()
 
 
+def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    """It may interrupt a hook, but leaves no shutdown behind that was claimed and is not carried out."""
+    steps, at = 0, 1
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal steps
+        steps += 1
+        if steps == at:
+            watchdog._interrupt = Action.KEYBOARD_INTERRUPT
+            watchdog._is_nudge = True
+            watchdog._on_signal(signal.SIGINT, None)
+
+    profile = sys.getprofile()
+    while True:
+        lifecycle.add_hook(int)
+        try:
+            sys.setprofile(count)
+            lifecycle.signal_shutdown("test")
+            sys.setprofile(profile)
+        except KeyboardInterrupt:
+            # Python removes a profile function that raises.
+            sys.setprofile(profile)
+        if steps < at:
+            break
+        # Interrupted before it started, it is started by the exit of the program.
+        assert lifecycle.left.is_set() or lifecycle.signal_shutdown("atexit")
+        assert not lifecycle.deferral.is_active
+
+        steps, at = 0, at + 1
+        lifecycle = Lifecycle(lambda: None)
+        watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: False)
+    assert at > 30
+
+
 def test_a_second_signal_ends_a_hook_and_the_others_run(
     lifecycle: Lifecycle, watchdog: SignalWatchdog
 ) -> None:
