@@ -183,7 +183,7 @@ class Lifecycle:
         """Return whether an error that ends the program, or a thread of it, is the one that was to interrupt it."""
         if isinstance(error, KeyboardInterrupt) and self.machine.signals:
             return True
-        return isinstance(error, errors.ROSInterruptException) and self.is_shutdown()
+        return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
     def _run(self, hooks: Iterable[Callable[[], object]]) -> None:
         # A hook may add another: it runs last.

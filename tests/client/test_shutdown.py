@@ -262,6 +262,15 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
     assert at > 30
 
 
+def test_an_interrupt_of_init_node_is_expected_while_hooks_run(lifecycle: Lifecycle) -> None:
+    """The wait for the master ends at the request: hooks may run in another thread."""
+    expected: list[bool] = []
+    lifecycle.add_hook(lambda: expected.append(lifecycle.is_interrupt(lifecycle.interrupted("text"))))
+    assert not lifecycle.is_interrupt(ROSInterruptException())
+    lifecycle.signal_shutdown("test")
+    assert expected == [True]
+
+
 def test_a_second_signal_ends_a_hook_and_the_others_run(
     lifecycle: Lifecycle, watchdog: SignalWatchdog
 ) -> None:
