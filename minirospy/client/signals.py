@@ -149,7 +149,8 @@ class SignalWatchdog:
         with receiving, contextlib.suppress(ConnectionError):
             while True:
                 started = time.monotonic()
-                receiving.settimeout(_TICK_SECONDS if machine.signals or deferral.pending else None)
+                was_pending = deferral.pending
+                receiving.settimeout(_TICK_SECONDS if machine.signals or was_pending else None)
                 with contextlib.suppress(TimeoutError):
                     if not (numbers := receiving.recv(64)):
                         return
@@ -161,7 +162,8 @@ class SignalWatchdog:
                     self._perform(machine.signal(now))
                 self._perform(machine.tick(now))
 
-                if not deferral.pending:
+                if not (was_pending and deferral.pending):
+                    # Whatever passed before the signal does not count.
                     deferred_at = now
                 elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import functools
 import logging
+import math
 import signal
+import socket
 import sys
 import threading
 from types import FrameType
+from typing import cast
 
 import pytest
 
+from minirospy.client import signals
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action, Awareness, Phase, ShutdownMachine
 from minirospy.client.signals import SignalWatchdog
@@ -340,3 +344,55 @@ def test_a_nudge_is_no_signal_of_the_users(lifecycle: Lifecycle) -> None:
     assert watchdog._new_signals() == 1
     lifecycle.machine.signal(0.0)
     assert watchdog._new_signals() == 0
+
+
+class System:
+    """The clock, and the socket by which the system reports signals, of a watchdog that runs in the test's own thread."""
+
+    def __init__(
+        self, watchdog: SignalWatchdog, signalled: float, turn: float, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """``signalled``: when the signal comes. ``turn``: how long a turn of the watchdog takes that nothing ends earlier."""
+        self.now = 0.0
+        self.nudged: list[float] = []
+        self._watchdog = watchdog
+        self._signalled, self._turn = signalled, turn
+        self._timeout: float | None = None
+        monkeypatch.setattr(signals, "time", self)
+        monkeypatch.setattr(watchdog, "_nudge", lambda: self.nudged.append(self.now))
+
+    def watch(self) -> None:
+        self._watchdog._watch(cast("socket.socket", self))
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def settimeout(self, timeout: float | None) -> None:
+        self._timeout = timeout
+
+    def recv(self, _: int) -> bytes:
+        if self.nudged:
+            return b""
+
+        is_signalled = self.now < self._signalled
+        self.now = self._signalled if self._timeout is None else self.now + self._turn
+        if not is_signalled:
+            raise TimeoutError
+        self._watchdog._on_signal(signal.SIGINT, None)
+        return bytes([signal.SIGINT])
+
+    def __enter__(self) -> System:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+@pytest.mark.parametrize("turn", [1 / 128, 1 / 32])
+def test_fifty_milliseconds_for_the_next_call_of_rospy_start_at_the_signal(
+    watchdog: SignalWatchdog, monkeypatch: pytest.MonkeyPatch, turn: float
+) -> None:
+    """However long nothing happened before."""
+    system = System(watchdog, 1000.0, turn, monkeypatch)
+    system.watch()
+    assert system.nudged == [1000.0 + turn * math.ceil(0.05 / turn)]
