@@ -422,43 +422,19 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
 
 
 @POSIX_ONLY
-def test_a_signal_at_any_moment_of_init_node(master: str) -> None:
-    """It may come between any two steps: nothing is printed, and nothing stays behind in the master."""
-    script = """
-import os, signal, sys
-import rospy
-at, steps = int(sys.argv[1]), 0
+@pytest.mark.parametrize("way", ["passes", "stands", "elsewhere", "twice"])
+def test_a_shutdown_at_any_step_of_init_node(master: str, way: str) -> None:
+    """Nothing is printed, no thread waits for another, and nothing stays behind in the master.
 
-def count(frame, event, argument):
-    global steps
-    if event == "call" and signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
-        steps += 1
-        if steps == at:
-            os.kill(os.getpid(), signal.SIGTERM)
-
-sys.setprofile(count)
-rospy.init_node("early", argv=[])
-sys.setprofile(None)
-print(steps)
-rospy.spin()
-"""
-    counting = subprocess.Popen(
-        [sys.executable, "-c", script, "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    Each hundredth step; ``python tests/client/signal_steps.py stands`` tries all of them.
+    """
+    done = subprocess.run(
+        [sys.executable, str(Path(__file__).with_name("signal_steps.py")), way, "100"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    assert counting.stdout
-    steps = int(counting.stdout.readline())
-    counting.terminate()
-    assert counting.communicate(timeout=GUARD) == ("", "")
-    for tenth in range(10):
-        done = subprocess.run(
-            [sys.executable, "-c", script, str(1 + steps * tenth // 10)],
-            capture_output=True,
-            text=True,
-            timeout=GUARD,
-            check=False,
-        )
-        assert (done.returncode, done.stderr) == (0, ""), f"after {tenth} tenths"
-        assert not is_known(master, "/early")
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @POSIX_ONLY
