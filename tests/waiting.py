@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 __all__ = ["until", "wait_until"]
 
-_PATIENCE = 60.0
+_PATIENCE = 100.0
 """Seconds: a machine that runs tests may stand still for some."""
 _PAUSE = 0.005
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
 import subprocess
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import pytest
 
 from tests.conftest import free_port
 from tests.interop.conftest import OUR_BIN, PATIENCE, REAL_BIN, environment
+from tests.waiting import wait_until
 
 INNER = '<launch><arg name="k" default="d" doc="a key"/><param name="p" value="$(arg k)"/><node name="in" pkg="pkg" type="wait.py"/></launch>'
 OUTER = """<launch>
@@ -36,7 +38,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = "<version>1.0.0</version><description>d</description><maintainer email='a@b.c'>m</maintainer><license>x</license>"
     (folder / "package.xml").write_text(f"<package format='2'><name>pkg</name>{text}</package>")
     program = folder / "wait.py"
-    program.write_text("#!/usr/bin/env python3\nimport time\ntime.sleep(60)\n")
+    program.write_text("#!/usr/bin/env python3\nimport time\ntime.sleep(1000)\n")
     program.chmod(0o755)
     (folder / "end.py").write_text("#!/usr/bin/env python3\nimport sys\nsys.exit(3)\n")
     (folder / "end.py").chmod(0o755)
@@ -93,6 +95,11 @@ def read_until(process: subprocess.Popen[str], *words: str) -> str:
     raise AssertionError(said)
 
 
+def listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 def end(process: subprocess.Popen[str]) -> str:
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=PATIENCE)
@@ -107,7 +114,7 @@ def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, 
     ssh.write_text('#!/bin/sh\nfor last; do :; done\nPATH=/usr/bin:/bin exec sh -c "$last"\n')
     ssh.chmod(0o755)
     process = launch(
-        '<machine name="m" address="127.0.0.1" user="somebody" env-loader="env" timeout="20"/>'
+        f'<machine name="m" address="127.0.0.1" user="somebody" env-loader="env" timeout="{PATIENCE}"/>'
         '<node machine="m" name="a" pkg="pkg" type="wait.py" ns="deep"/><node machine="m" name="b" pkg="pkg" type="end.py"/>',
         package,
         real_master,
@@ -149,7 +156,7 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
     loader.chmod(0o755)
     name = f"far-{port}"
     text = (
-        f'<machine name="m" address="{name}" ssh-port="{port}" env-loader="{loader}" timeout="20"/>'
+        f'<machine name="m" address="{name}" ssh-port="{port}" env-loader="{loader}" timeout="{PATIENCE}"/>'
         '<node machine="m" name="a" pkg="pkg" type="wait.py"/>'
     )
     # A name that only this ssh knows: so it is not this machine.
@@ -158,6 +165,8 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
     )
 
     try:
+        # A connection that is refused would be another error than that of an unknown key.
+        wait_until(lambda: listens(port))
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
         refused, _ = process.communicate(timeout=PATIENCE)
         assert "Host key verification failed" in refused
