@@ -12,9 +12,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import Error, ServerProxy
 
 import pytest
 
@@ -74,19 +75,19 @@ def stop(program: subprocess.Popen[str]) -> None:
             stream.close()
 
 
-def answers(uri: str, stack: str) -> bool:
-    """Return whether a master of ``stack`` answers at ``uri``, and the node of a roscore is registered."""
+def is_ready(master: subprocess.Popen[str], uri: str, stack: str) -> bool:
+    """Return whether this master answers, none of another test, and the node of a roscore is registered."""
     try:
-        with ServerProxy(uri) as master:
-            state: Any = master.getSystemState("/test")
-    except OSError:
+        with ServerProxy(uri) as proxy:
+            pid: Any = proxy.getPid("/test")
+            state: Any = proxy.getSystemState("/test")
+    except (OSError, HTTPException, Error):
         return False
-    return stack != "ours" or "/rosout" in dict(state[2][1])
+    return pid[2] == master.pid and (stack != "ours" or "/rosout" in dict(state[2][1]))
 
 
-@contextmanager
-def running_master(stack: str) -> Iterator[str]:
-    """Return the URI of a fresh master of ``stack``."""
+def started_master(stack: str) -> tuple[subprocess.Popen[str], str]:
+    """Return a master that runs, and its URI; or one that has ended, as where another process was first at its port."""
     port = free_port()
     uri = f"http://localhost:{port}"
     commands = {
@@ -94,18 +95,38 @@ def running_master(stack: str) -> Iterator[str]:
         "rospy": [str(REAL_BIN / "rosmaster"), "--core", "-p", str(port)],
     }
     program = start(commands[stack], uri, stack)
-
     try:
         end = time.monotonic() + PATIENCE
-        while not answers(uri, stack):
-            assert program.poll() is None, f"the master ended: {program.communicate()}"
+        while program.poll() is None and not is_ready(program, uri, stack):
             assert time.monotonic() < end, "the master does not answer"
             time.sleep(0.05)
+    except BaseException:
+        end_master(program)
+        raise
+    return program, uri
+
+
+def end_master(program: subprocess.Popen[str]) -> None:
+    # A master does not read its input.
+    program.terminate()
+    stop(program)
+
+
+@contextmanager
+def running_master(stack: str) -> Iterator[str]:
+    """Return the URI of a fresh master of ``stack``."""
+    program, uri = started_master(stack)
+    for _ in range(2):
+        if program.poll() is None:
+            break
+        stop(program)
+        program, uri = started_master(stack)
+
+    try:
+        assert program.poll() is None, f"the master has ended: {program.communicate()}"
         yield uri
     finally:
-        # A master does not read its input.
-        program.terminate()
-        stop(program)
+        end_master(program)
 
 
 @pytest.fixture(autouse=True)
