@@ -118,15 +118,25 @@ class Page:
         self.call("Page.navigate", url=url)
         self.wait("return document.readyState === 'complete'")
 
+    def reload(self) -> None:
+        """Load the page again; return when the new one is there."""
+        self.evaluate("window.isLeftByTest = true")
+        self.call("Page.reload")
+        self.wait("return !window.isLeftByTest && document.readyState === 'complete'")
+
     def call(self, method: str, **params: Any) -> Any:
         """Call a method of the protocol; return its result."""
+        answer = self._answer(method, params)
+        assert "error" not in answer, answer
+        return answer["result"]
+
+    def _answer(self, method: str, params: dict[str, Any]) -> dict[str, Any]:
         number = next(self._numbers)
         self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
         while True:
-            answer = json.loads(self._socket.recv(timeout=PATIENCE * 2))
+            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=PATIENCE * 2))
             if answer.get("id") == number:
-                assert "error" not in answer, answer
-                return answer["result"]
+                return answer
             self._event(answer)
 
     def _event(self, event: dict[str, Any]) -> None:
@@ -144,8 +154,19 @@ class Page:
         return result["result"].get("value")
 
     def wait(self, script: str) -> Any:
-        """Return what a function's body returns, once that is true."""
-        return self.evaluate(_WAIT % (PATIENCE * 1000, script))
+        """Return what a function's body returns, once that is true, in this page or in the one that is loaded meanwhile."""
+        params = {
+            "expression": _WAIT % (PATIENCE * 1000, script),
+            "awaitPromise": True,
+            "returnByValue": True,
+        }
+        end = time.monotonic() + PATIENCE
+        # A page that is left takes the promise with it.
+        while "error" in (answer := self._answer("Runtime.evaluate", params)):
+            assert time.monotonic() < end, answer
+            time.sleep(0.05)
+        assert "exceptionDetails" not in answer["result"], answer["result"]["exceptionDetails"]
+        return answer["result"]["result"].get("value")
 
     def wait_text(self, find: str, text: str) -> str:
         """Wait until a visible element has this text in it; return all of its text."""
@@ -258,12 +279,16 @@ class Page:
         with connect(
             f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
         ) as whole:
-            whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
-            while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
-                pass
-        target = next(each["targetId"] for each in answer["result"]["targetInfos"] if each["type"] == "page")
+            targets: list[str] = []
+            while not targets:
+                assert time.monotonic() < end, "chromium opens no tab"
+                whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
+                while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
+                    pass
+                found = answer["result"]["targetInfos"]
+                targets = [each["targetId"] for each in found if each["type"] == "page"]
         return connect(
-            f"ws://127.0.0.1:{port}/devtools/page/{target}",
+            f"ws://127.0.0.1:{port}/devtools/page/{targets[0]}",
             max_size=None,
             compression=None,
             open_timeout=PATIENCE,

@@ -208,7 +208,7 @@ def test_token_is_taken_out_of_the_address(serve: Callable[..., Served], browse:
     page = browse(address(served, "topics?token=read-token-00"))
     page.wait_text("#state", "connected, read-only")
     assert "token" not in page.evaluate("location.href")
-    page.call("Page.reload")
+    page.reload()
     page.wait_text("#state", "connected, read-only")
 
 

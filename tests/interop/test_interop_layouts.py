@@ -303,7 +303,7 @@ def test_panes_are_resized_by_mouse_and_keys_and_kept(
     press(page, "rawKeyDown", "ArrowRight")
     page.wait(f"return new URLSearchParams(location.hash.split('?')[1]).get('tree') !== {json.dumps(before)}")
     kept = tree_of(page)
-    page.call("Page.reload")
+    page.reload()
     page.wait_text("select.pane-view", "Console")
     assert tree_of(page) == kept
     page.wait(

@@ -143,5 +143,5 @@ def test_series_is_drawn_over_another(serve: Callable[..., Served], browse: Call
     page.wait(f"return {drawn}")
     page.choose("select[aria-label='The x axis']", "")
     page.wait(f"return !({drawn})")
-    page.call("Page.reload")
+    page.reload()
     page.wait("return document.querySelector('.series')")

@@ -71,7 +71,7 @@ def test_language_is_the_chosen_one_else_the_first_of_the_browser_that_is_there(
 
 def speak_german(page: Page) -> None:
     page.evaluate("localStorage.setItem('language', 'de')")
-    page.call("Page.reload")
+    page.reload()
     page.wait("return document.documentElement.lang === 'de'")
     page.wait_text("#state", "verbunden")
 
@@ -133,7 +133,7 @@ def test_language_is_switched_and_kept_and_data_stay_as_they_are(
     # A log line is data.
     assert page.wait_text(".line .text", "") == "Pause"
     assert page.evaluate("document.title") == "Konsole · minirospy"
-    page.call("Page.reload")
+    page.reload()
     page.wait_text("#state", "verbunden")
     page.click("#language")
     page.wait_text("#tabs", "Console")
