@@ -235,10 +235,16 @@ class Peer:
                 handle.get_result_async().add_done_callback(ended)
 
         goal = made(class_.Goal, command["fields"])
-        client.send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+
+        def send():
+            client.send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+
+        # rclpy 9.1.2 notes a goal twice, the second time after it has sent it: a response that the executor's thread has
+        # taken before is that of a future which nobody has, and the goal is never accepted.
+        self.in_executor(send)
 
     def cancel(self, topic, _):
-        self.goals[topic].cancel_goal_async()
+        self.in_executor(self.goals[topic].cancel_goal_async)
 
     def close(self, topic, _):
         self.in_executor(lambda: self.destroy(topic))
