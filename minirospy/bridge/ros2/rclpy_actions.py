@@ -164,8 +164,8 @@ class ActionClient:
 
     def close(self) -> None:
         """End the client."""
-        self._calls.node.destroy_subscription(self._feedback)
-        self._client.destroy()
+        self._calls.end(lambda: self._calls.node.destroy_subscription(self._feedback))
+        self._calls.end(self._client.destroy)
 
     def _send(
         self, goal: bytes, feedback: Callable[[bytes], None], accepted: Future[Ros2Goal | None]
@@ -293,7 +293,7 @@ class ActionServer:
 
     def close(self) -> None:
         """Offer it no more."""
-        self._server.destroy()
+        self._calls.end(self._server.destroy)
 
     async def _requested(self, goal: Message) -> object:
         feedback = Feedback(self._calls, self._class.Feedback)

@@ -176,6 +176,13 @@ class Calls:
         """Offer a service."""
         return Server(self, name, class_, answer)
 
+    def end(self, destroy: Callable[[], object]) -> None:
+        """Destroy something in the executor's thread, which may be about to wait for it. From any thread.
+
+        rclpy's executor fails on what is destroyed while it makes its list of what it waits for.
+        """
+        self.executor.create_task(destroy)
+
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
         """Return what a future of another thread brings, in a coroutine of the executor.
 
@@ -221,7 +228,7 @@ class Client:
 
     def close(self) -> None:
         """End the client."""
-        self._calls.node.destroy_client(self._client)
+        self._calls.end(lambda: self._calls.node.destroy_client(self._client))
 
     def _send(self, data: bytes, answered: Future[bytes]) -> None:
         if answered.cancelled():
@@ -266,7 +273,7 @@ class Server:
 
     def close(self) -> None:
         """Offer it no more."""
-        self._calls.node.destroy_service(self._service)
+        self._calls.end(lambda: self._calls.node.destroy_service(self._service))
 
     async def _arrived(self, request: Message, response: Message) -> Message:
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import importlib
 import time
 from collections.abc import Callable, Coroutine, Sequence
@@ -61,7 +62,7 @@ class ParameterServer:
     def close(self) -> None:
         """End the services."""
         for service in self._services:
-            self._calls.node.destroy_service(service)
+            self._calls.end(functools.partial(self._calls.node.destroy_service, service))
 
     def _guarded(self, handler: _Handler) -> Callable[[Message, Message], Coroutine[object, None, Message]]:
         async def guarded(request: Message, response: Message) -> Message:

@@ -149,7 +149,7 @@ class RclpySide:
         self._calls = Calls(self._node, self._executor)
         self._thread = threading.Thread(target=self._spin, name="ros2-executor", daemon=True)
         self._is_closed = False
-        self._served: set[str] = set()
+        self._served: list[str] = []
         self._thread.start()
 
     @property
@@ -176,7 +176,8 @@ class RclpySide:
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
         """Return a publisher, which is reliable: so it suits every subscriber. Raise TypesDiffer."""
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
-        return _Publisher(self._node, self._node.create_publisher(self._class(type_), topic, profile))
+        publisher = self._node.create_publisher(self._class(type_), topic, profile)
+        return _Publisher(self._calls, self._node, publisher)
 
     def subscribe(
         self,
@@ -190,7 +191,7 @@ class RclpySide:
     ) -> Ros2Handle:
         """Call ``deliver`` with each serialized message, in the executor's thread. Raise TypesDiffer."""
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
-        return _Subscription(self._node, self._class(type_), topic, deliver, profile)
+        return _Subscription(self._calls, self._node, self._class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
         """Return the names and namespaces of all nodes but those of bridges."""
@@ -202,11 +203,11 @@ class RclpySide:
         # Services that have clients only are among them.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
-            own = self._served
+            own = tuple(self._served)
             return {
                 name: type_
                 for name, type_ in named.items()
-                if self._node.count_services(name) > (1 if name in own else 0)
+                if self._node.count_services(name) > own.count(name)
             }
         # Before ROS 2 Jazzy.
         offered: dict[str, str] = {}
@@ -232,8 +233,8 @@ class RclpySide:
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
         """Offer a service. Raise TypesDiffer."""
         server = self._calls.server(service, self._service_class(type_), answer)
-        self._served.add(service)
-        return _Served(server, lambda: self._served.discard(service))
+        self._served.append(service)
+        return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
         """Return the fields of an action's goal, result and feedback. Raise TypesDiffer where it is not installed."""
@@ -251,8 +252,8 @@ class RclpySide:
         """Offer an action. Raise TypesDiffer."""
         service = send_goal_service(action)
         server = ActionServer(self._calls, action, self._action_class(type_), accept)
-        self._served.add(service)
-        return _Served(server, lambda: self._served.discard(service))
+        self._served.append(service)
+        return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Offer the parameters of ROS 1 as those of this node."""
@@ -328,17 +329,19 @@ class RclpySide:
 class _Served:
     """A service of the bridge, which is its own until it ends."""
 
-    def __init__(self, server: Ros2Handle, on_close: Callable[[], None]) -> None:
+    def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
+        self._calls = calls
         self._server = server
         self._on_close = on_close
 
     def close(self) -> None:
         self._server.close()
-        self._on_close()
+        self._calls.end(self._on_close)
 
 
 class _Publisher:
-    def __init__(self, node: _Node, publisher: _RclpyPublisher) -> None:
+    def __init__(self, calls: Calls, node: _Node, publisher: _RclpyPublisher) -> None:
+        self._calls = calls
         self._node = node
         self._publisher = publisher
 
@@ -350,18 +353,20 @@ class _Publisher:
         self._publisher.publish(data)
 
     def close(self) -> None:
-        self._node.destroy_publisher(self._publisher)
+        self._calls.end(lambda: self._node.destroy_publisher(self._publisher))
 
 
 class _Subscription:
     def __init__(
         self,
+        calls: Calls,
         node: _Node,
         class_: MessageClass,
         topic: str,
         deliver: Callable[[bytes], None],
         profile: _Profile,
     ) -> None:
+        self._calls = calls
         self._node = node
         self._class = class_
         self._deliver = deliver
@@ -372,7 +377,7 @@ class _Subscription:
 
     def close(self) -> None:
         self._is_closed = True
-        self._node.destroy_subscription(self._subscription)
+        self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
         """Deliver a message, and those that have come after it: the executor brings one at a time, slowly."""
