@@ -40,7 +40,22 @@ SERVICE_HASHES = {
     "std_srvs/SetBool": "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a",
     "nav_msgs/GetMap": "RIHS01_c8ae77c9995b3554b5ba80e4d4d443f970ac65143102a1d893ec24fc07b31147",
     "sensor_msgs/SetCameraInfo": "RIHS01_a10cca5d33dc637c8d49db50ab288701a3592bb9cd854f2f16a0659613b68984",
+    "rcl_interfaces/DescribeParameters": "RIHS01_845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff",
+    "rcl_interfaces/GetParameters": "RIHS01_bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc",
+    "rcl_interfaces/GetParameterTypes": "RIHS01_da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca",
+    "rcl_interfaces/ListParameters": "RIHS01_3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d",
+    "rcl_interfaces/SetParameters": "RIHS01_56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0",
+    "rcl_interfaces/SetParametersAtomically": "RIHS01_0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd",
+    "action_msgs/CancelGoal": "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
 }
+ACTION_HASHES = {
+    "send_goal": "RIHS01_d807633803e38e164276573cd97e9fbd71e109c290bbf4cc312a0a1c9da7bbd9",
+    "get_result": "RIHS01_5d30fdeb21d20e117aa5f36c7b4f0b6874f1a8cf7a9c038d58f1156c5737b209",
+    "feedback": "RIHS01_37487bae8cea358366b97003c1ef1ca7ce7c08df36f9e8cca496624226aee64e",
+    "cancel_goal": "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
+    "status": "RIHS01_6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e",
+}
+"""Of the ends of an action of test_msgs/Fibonacci."""
 RULES = """
 - ros1_package_name: turtlesim
   ros1_message_name: Color
@@ -184,7 +199,7 @@ def test_hashes_are_those_of_rosbags() -> None:
                 name = BUILT_IN.ros2_messages(spec.full_name)[0]
                 # rosbags calls its number a char, which ROS 2 makes a uint8: see below.
                 if (whole := name.replace("/", "/msg/")) in store.fielddefs and name != "std_msgs/Char":
-                    assert found.message_hash(name) == store.hash_rihs01(whole), name
+                    assert found.hash(name) == store.hash_rihs01(whole), name
                     compared += 1
     assert compared > 200
 
@@ -192,9 +207,22 @@ def test_hashes_are_those_of_rosbags() -> None:
 def test_hashes_are_those_of_real_ros2() -> None:
     found = definitions()
     for name, digest in HASHES.items():
-        assert found.message_hash(name) == digest, name
+        assert found.hash(name) == digest, name
     for name, digest in SERVICE_HASHES.items():
-        assert found.service_hash(name) == digest, name
+        assert found.hash(name.replace("/", "/srv/")) == digest, name
+
+
+def test_hashes_of_actions_are_those_of_real_ros2() -> None:
+    renamed = "- {ros1_package_name: actionlib_tutorials, ros1_action_name: Fibonacci, ros2_package_name: test_msgs, "
+    rules = parse_rules(renamed + "ros2_action_name: Fibonacci}", "rules")
+    found = Definitions(BUILT_IN.with_(rules), catalogue())
+    parts = {"send_goal": "SendGoal", "get_result": "GetResult", "feedback": "FeedbackMessage"}
+    for name, part in parts.items():
+        assert found.hash(f"test_msgs/action/Fibonacci_{part}") == ACTION_HASHES[name], part
+    assert found.hash("action_msgs/GoalStatusArray") == ACTION_HASHES["status"]
+    assert found.action("test_msgs/Fibonacci")[0] == {"order": "int32"}
+    with pytest.raises(TypesDiffer, match=r"the action type \[test_msgs/Other\] is not defined here"):
+        found.hash("test_msgs/action/Other_SendGoal")
 
 
 def test_a_field_of_a_type_that_messages_lack_has_no_hash() -> None:

@@ -24,6 +24,8 @@ NO_HASH = "TypeHashNotSupported"
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"
 _ID = "unique_identifier_msgs/UUID"
+_GOAL = "action_msgs/GoalInfo"
+_RANGE = ("from_value", "to_value", "step")
 
 _ONLY_IN_ROS2: dict[str, Fields] = {
     "builtin_interfaces/Time": _TIME,
@@ -38,6 +40,36 @@ _ONLY_IN_ROS2: dict[str, Fields] = {
         "line": "uint32",
     },
     _ID: {"uuid": "uint8[16]"},
+    _GOAL: {"goal_id": _ID, "stamp": _STAMP},
+    "action_msgs/GoalStatus": {"goal_info": _GOAL, "status": "int8"},
+    "action_msgs/GoalStatusArray": {"status_list": "sequence<action_msgs/GoalStatus>"},
+    "rcl_interfaces/FloatingPointRange": dict.fromkeys(_RANGE, "double"),
+    "rcl_interfaces/IntegerRange": {"from_value": "int64", "to_value": "int64", "step": "uint64"},
+    "rcl_interfaces/ListParametersResult": dict.fromkeys(("names", "prefixes"), "sequence<string>"),
+    "rcl_interfaces/Parameter": {"name": "string", "value": "rcl_interfaces/ParameterValue"},
+    "rcl_interfaces/ParameterDescriptor": {
+        "name": "string",
+        "type": "uint8",
+        "description": "string",
+        "additional_constraints": "string",
+        "read_only": "boolean",
+        "dynamic_typing": "boolean",
+        "floating_point_range": "sequence<rcl_interfaces/FloatingPointRange, 1>",
+        "integer_range": "sequence<rcl_interfaces/IntegerRange, 1>",
+    },
+    "rcl_interfaces/ParameterValue": {
+        "type": "uint8",
+        "bool_value": "boolean",
+        "integer_value": "int64",
+        "double_value": "double",
+        "string_value": "string",
+        "byte_array_value": "sequence<octet>",
+        "bool_array_value": "sequence<boolean>",
+        "integer_array_value": "sequence<int64>",
+        "double_array_value": "sequence<double>",
+        "string_array_value": "sequence<string>",
+    },
+    "rcl_interfaces/SetParametersResult": {"successful": "boolean", "reason": "string"},
     "service_msgs/ServiceEventInfo": {
         "event_type": "uint8",
         "stamp": _STAMP,
@@ -46,6 +78,28 @@ _ONLY_IN_ROS2: dict[str, Fields] = {
     },
     "visualization_msgs/MeshFile": {"filename": "string", "data": "sequence<uint8>"},
     "visualization_msgs/UVCoordinate": {"u": "float32", "v": "float32"},
+}
+
+_NAMES: Fields = {"names": "sequence<string>"}
+_PARAMETERS: Fields = {"parameters": "sequence<rcl_interfaces/Parameter>"}
+_RESULT = "rcl_interfaces/SetParametersResult"
+_SERVICES_ONLY_IN_ROS2: dict[str, tuple[Fields, Fields]] = {
+    "action_msgs/CancelGoal": (
+        {"goal_info": _GOAL},
+        {"return_code": "int8", "goals_canceling": f"sequence<{_GOAL}>"},
+    ),
+    "rcl_interfaces/DescribeParameters": (
+        _NAMES,
+        {"descriptors": "sequence<rcl_interfaces/ParameterDescriptor>"},
+    ),
+    "rcl_interfaces/GetParameters": (_NAMES, {"values": "sequence<rcl_interfaces/ParameterValue>"}),
+    "rcl_interfaces/GetParameterTypes": (_NAMES, {"types": "sequence<uint8>"}),
+    "rcl_interfaces/ListParameters": (
+        {"prefixes": "sequence<string>", "depth": "uint64"},
+        {"result": "rcl_interfaces/ListParametersResult"},
+    ),
+    "rcl_interfaces/SetParameters": (_PARAMETERS, {"results": f"sequence<{_RESULT}>"}),
+    "rcl_interfaces/SetParametersAtomically": (_PARAMETERS, {"result": _RESULT}),
 }
 
 _ADDED: dict[tuple[str, str], Fields] = {
@@ -82,49 +136,84 @@ class Definitions:
         return self._found[key]
 
     def service(self, name: str) -> tuple[Fields, Fields]:
-        """Return the fields of a service's request and response."""
+        """Return the fields of a service's request and response; ``name``: ``pkg/Name``."""
         whole = name.replace("/", "/srv/")
-        return self._part(f"{whole}_Request"), self._part(f"{whole}_Response")
+        return self.fields(f"{whole}_Request"), self.fields(f"{whole}_Response")
 
-    def message_hash(self, name: str) -> str:
-        """Return the hash of a message."""
-        return self._hash(name, {})
-
-    def service_hash(self, name: str) -> str:
-        """Return the hash of a service."""
-        whole = name.replace("/", "/srv/")
-        request, response, event = (f"{whole}_{part}" for part in ("Request", "Response", "Event"))
-        return self._hash(
-            whole,
-            {
-                whole: {"request_message": request, "response_message": response, "event_message": event},
-                event: {
-                    "info": "service_msgs/ServiceEventInfo",
-                    "request": f"sequence<{request}, 1>",
-                    "response": f"sequence<{response}, 1>",
-                },
-            },
+    def action(self, name: str) -> tuple[Fields, Fields, Fields]:
+        """Return the fields of an action's goal, result and feedback; ``name``: ``pkg/Name``."""
+        whole = name.replace("/", "/action/")
+        return (
+            self.fields(f"{whole}_Goal"),
+            self.fields(f"{whole}_Result"),
+            self.fields(f"{whole}_Feedback"),
         )
 
-    def _hash(self, name: str, own: dict[str, Fields]) -> str:
+    def hash(self, name: str) -> str:
+        """Return the hash of a message, ``pkg/Name``, or of what :meth:`fields` knows."""
         if name not in self._hashes:
             try:
-                self._hashes[name] = type_hash(
-                    name, lambda each: own[each] if each in own else self._part(each)
-                )
+                self._hashes[name] = type_hash(name, self.fields)
             except ValueError as error:
                 raise TypesDiffer(str(error)) from error
         return self._hashes[name]
 
-    def _part(self, name: str) -> Fields:
-        """Return the fields of a message, or of a part of a service: ``pkg/srv/Name_Request``."""
+    def fields(self, name: str) -> Fields:
+        """Return the fields of a message, or of what ROS 2 makes of services and actions.
+
+        That is ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and their parts.
+        """
         if name.count("/") == 1:
             return self.message(name)
-        package, _, inner = name.split("/")
+        package, kind, inner = name.split("/")
         base, _, part = inner.rpartition("_")
-        service = self._service(f"{package}/{base}")
-        spec = service.request if part == "Request" else service.response
-        return self._fields(spec, spec.full_name, f"{package}/{base}", is_humble=False)
+        whole = f"{package}/{kind}/{base}"
+        if part in ("Request", "Response", "Event"):
+            return self._part_of_service(whole, part)
+        if kind == "srv" or part in ("SendGoal", "GetResult"):
+            parts = (
+                ("request_message", "Request"),
+                ("response_message", "Response"),
+                ("event_message", "Event"),
+            )
+            return {field: f"{name}_{each}" for field, each in parts}
+        if part == "FeedbackMessage":
+            return {"goal_id": _ID, "feedback": f"{whole}_Feedback"}
+        return self._part_of_action(f"{package}/{base}", part, name)
+
+    def _part_of_service(self, whole: str, part: str) -> Fields:
+        """Return the fields of a service's request, response or event."""
+        if part == "Event":
+            return {
+                "info": "service_msgs/ServiceEventInfo",
+                "request": f"sequence<{whole}_Request, 1>",
+                "response": f"sequence<{whole}_Response, 1>",
+            }
+        package, kind, inner = whole.split("/")
+        name = f"{package}/{inner}"
+        place = part == "Response"
+        if kind == "action":
+            action, _, service = whole.rpartition("_")
+            if service == "SendGoal":
+                return ({"goal_id": _ID, "goal": f"{action}_Goal"}, {"accepted": "boolean", "stamp": _STAMP})[
+                    place
+                ]
+            return ({"goal_id": _ID}, {"status": "int8", "result": f"{action}_Result"})[place]
+        if name in _SERVICES_ONLY_IN_ROS2:
+            return _SERVICES_ONLY_IN_ROS2[name][place]
+        service_spec = self._service(name)
+        spec = service_spec.response if place else service_spec.request
+        return self._fields(spec, spec.full_name, name, is_humble=False)
+
+    def _part_of_action(self, name: str, part: str, whole: str) -> Fields:
+        """Return the fields of an action's goal, result or feedback."""
+        for action in self._rules.ros1_actions(name) or (name,):
+            with contextlib.suppress(KeyError, NotFoundError, DefinitionError):
+                ros1 = f"{action}{part}"
+                return self._fields(self._catalogue.message(ros1), ros1, whole, is_humble=False)
+        raise TypesDiffer(
+            f"the action type [{name}] is not defined here: put its package on ROS_PACKAGE_PATH"
+        )
 
     def _service(self, name: str) -> ServiceSpec:
         for each in self._rules.ros1_services(name) or (name,):

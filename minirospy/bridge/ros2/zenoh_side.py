@@ -80,7 +80,7 @@ class ZenohSide:
 
     def fields(self, type_: str) -> dict[str, str]:
         """Return the fields of a message type. Raise TypesDiffer, also where the other side's is another one."""
-        hash_ = self._agreed(type_, self._definitions.message_hash(type_), _TOPIC)
+        hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC)
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
@@ -190,12 +190,12 @@ class ZenohSide:
         self._node.close()
 
     def _topic_end(self, kind: Kind, topic: str, type_: str, qos: Qos) -> Entity:
-        hash_ = self._agreed(type_, self._definitions.message_hash(type_), _TOPIC, topic)
+        hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC, topic)
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
         whole = type_.replace("/", "/srv/")
-        hash_ = self._agreed(whole, self._definitions.service_hash(type_), _SERVICE, name)
+        hash_ = self._agreed(whole, self._definitions.hash(whole), _SERVICE, name)
         return self._node.entity(kind, name, whole, hash_, Qos())
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
