@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.bridge.ros2.zenoh_keys import Kind, reply_attachment
 from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
-from minirospy.errors import BridgeError, MinirospyError
+from minirospy.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.escape import escaped
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.idl.type_hash import Fields
@@ -33,6 +33,8 @@ _log = logging.getLogger(__name__)
 MOST_BYTES = 64 << 20
 MOST_UNDER_WAY = 200
 """Requests of a service whose responses are not written yet."""
+_MOST_OF_ACTION = 2_000
+"""More than goals: a request for a result waits for the goal's end."""
 _LONGEST_SECONDS = 10_000_000
 """The bridge has time limits of its own; those of Zenoh would end a goal that takes long."""
 
@@ -106,11 +108,16 @@ class ZenohServer:
     """A service that is offered in ROS 2; ``answer`` gets the CDR of a request and returns that of the response.
 
     A MinirospyError of its future is why the call fails: the text of a response that has a place for it, else the error of the
-    query, which rmw_zenoh writes to its log.
+    query, which rmw_zenoh writes to its log. ``thread``: of the caller's, in which all of this happens.
     """
 
     def __init__(
-        self, node: ZenohNode, end: Entity, response: Fields, answer: Callable[[bytes], Future[bytes]]
+        self,
+        node: ZenohNode,
+        end: Entity,
+        response: Fields,
+        answer: Callable[[bytes], Future[bytes]],
+        thread: concurrent.futures.ThreadPoolExecutor | None = None,
     ) -> None:
         self._node = node
         self._end = end
@@ -118,32 +125,45 @@ class ZenohServer:
         self._answer = answer
         self._under_way = 0
         self._lock = threading.Lock()
+        self._most = MOST_UNDER_WAY if thread is None else _MOST_OF_ACTION
         # A reply may block where the network is slow.
-        self._replies = concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
-        queryable = node.session.declare_queryable(end.key, node.handler(self._arrived), complete=True)
+        self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
+        self._own = None if thread else self._replies
+        handler = node.handler(self._arrived)
+        queryable = node.session.declare_queryable(end.key, handler, complete=True)
         self._handle = Handle(node, end, queryable)
 
     def close(self) -> None:
         """Offer it no more. Idempotent."""
         self._handle.close()
-        self._replies.shutdown(wait=False)
+        if self._own:
+            self._own.shutdown(wait=False)
 
     def _arrived(self, query: Query) -> None:
         with self._lock:
-            has_room = self._under_way < MOST_UNDER_WAY
+            has_room = self._under_way < self._most
             self._under_way += has_room
         if not has_room:
-            self._refuse(query, f"the bridge is answering {MOST_UNDER_WAY} other requests")
-            return
+            self._refuse(query, f"the bridge is answering {self._most} other requests")
+        elif self._own:
+            self._take(query)
+        else:
+            try:
+                self._replies.submit(self._take, query)
+            except RuntimeError:
+                self._done()
+                query.drop()  # the action is closed
+
+    def _take(self, query: Query) -> None:
         try:
             if query.payload is None or query.attachment is None or len(query.payload) > MOST_BYTES:
                 raise ValueError("this is not a request of rmw_zenoh, or too large")
             back = reply_attachment(query.attachment.to_bytes(), time.time_ns())
             answered = self._answer(query.payload.to_bytes())
-        except (ValueError, RuntimeError) as error:
+        except (DeserializationError, ValueError, RuntimeError) as error:
             self._done()
             # RuntimeError: the loop has ended.
-            self._refuse(query, str(error) if isinstance(error, ValueError) else "the bridge has ended")
+            self._refuse(query, "the bridge has ended" if isinstance(error, RuntimeError) else str(error))
             return
 
         def finished(_: object) -> None:
@@ -165,7 +185,7 @@ class ZenohServer:
     def _reply(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
         try:
             data = answered.result()
-        except MinirospyError as error:
+        except (MinirospyError, DeserializationError) as error:
             reason = " ".join(str(error).split())
             _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
             if self._response != ["bool", "string"]:

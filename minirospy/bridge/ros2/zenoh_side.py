@@ -7,12 +7,9 @@ side differs is not bridged.
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import importlib
-import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING
 
 from minirospy.bridge.ros2.definitions import NO_HASH, Definitions
 from minirospy.bridge.ros2.interface import (
@@ -24,10 +21,12 @@ from minirospy.bridge.ros2.interface import (
 )
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import Ros2End, Ros2Topic, is_bridge
+from minirospy.bridge.ros2.zenoh_actions import ActionEnds, ActionType, ZenohActionClient, ZenohActionServer
 from minirospy.bridge.ros2.zenoh_calls import ZenohClient, ZenohServer
 from minirospy.bridge.ros2.zenoh_keys import Entity, Kind, Qos
-from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
-from minirospy.bridge.zenoh_library import Declared, NetworkOptions, Outlet, Sample
+from minirospy.bridge.ros2.zenoh_node import ZenohNode
+from minirospy.bridge.ros2.zenoh_topics import ZenohPublisher, subscribe
+from minirospy.bridge.zenoh_library import NetworkOptions
 from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -37,11 +36,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ZenohSide"]
 
-_log = logging.getLogger(__name__)
 _TOPIC = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
 _SERVICE = (Kind.SERVICE, Kind.CLIENT)
-_NO_ACTIONS = "actions are not passed on by --zenoh"
 _NO_PARAMETERS = "parameters are not passed on by --zenoh: run the bridge next to an installed ROS 2"
+_LATCHED = Qos(True, True, 1)
 
 
 class ZenohSide:
@@ -50,8 +48,6 @@ class ZenohSide:
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
         """Open the session; waits for the router. Raises BridgeError."""
         self._node = ZenohNode(name, options)
-        self._zenoh = self._node.zenoh
-        self._extension = importlib.import_module("zenoh.ext")
         self._graph = self._node.graph
         self._definitions = definitions
 
@@ -86,22 +82,7 @@ class ZenohSide:
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
         """Return a publisher. Raise TypesDiffer."""
         end = self._topic_end(Kind.PUBLISHER, topic, type_, Qos(True, is_latched, depth))
-        drop = self._zenoh.CongestionControl.DROP
-        if is_latched:
-            outlet: _Outlet = self._extension.declare_advanced_publisher(
-                self._node.session,
-                end.key,
-                congestion_control=drop,
-                cache=self._extension.CacheConfig(max_samples=depth),
-                sample_miss_detection=self._extension.MissDetectionConfig(
-                    heartbeat=None, sporadic_heartbeat=1.0
-                ),
-                publisher_detection=True,
-            )
-        else:
-            declared = self._node.session.declare_publisher(end.key, congestion_control=drop)
-            outlet = cast("_Outlet", declared)
-        return _Publisher(self._node, end, outlet)
+        return ZenohPublisher(self._node, end)
 
     def subscribe(
         self,
@@ -115,35 +96,7 @@ class ZenohSide:
     ) -> Ros2Handle:
         """Call ``deliver`` with each serialized message, in a thread of Zenoh's. Raise TypesDiffer."""
         end = self._topic_end(Kind.SUBSCRIPTION, topic, type_, Qos(is_reliable, is_latched, depth))
-
-        def arrived(sample: Sample) -> None:
-            if sample.kind != self._zenoh.SampleKind.PUT:
-                return
-            try:
-                deliver(sample.payload.to_bytes())
-            except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
-                _log.exception("a message of ROS 2 could not be passed on")
-
-        handler = self._node.handler(arrived)
-        remote = self._zenoh.Locality.REMOTE
-        if is_latched:
-            extension = self._extension
-            recovery = (
-                extension.RecoveryConfig(periodic_queries=None, heartbeat=True) if is_reliable else None
-            )
-            declared: Declared = extension.declare_advanced_subscriber(
-                self._node.session,
-                end.key,
-                handler,
-                allowed_origin=remote,
-                history=extension.HistoryConfig(detect_late_publishers=True, max_samples=depth),
-                recovery=recovery,
-                subscriber_detection=True,
-            )
-        else:
-            # What this bridge sends does not come back.
-            declared = self._node.session.declare_subscriber(end.key, handler, allowed_origin=remote)
-        return Handle(self._node, end, declared)
+        return subscribe(self._node, end, deliver)
 
     def services(self) -> Mapping[str, str]:
         """Return the services that others than bridges offer, and their types."""
@@ -152,30 +105,39 @@ class ZenohSide:
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer."""
-        self._service_end(Kind.CLIENT, "", type_)
+        self._service_end(Kind.CLIENT, "", type_.replace("/", "/srv/"))
         request, response = self._definitions.service(type_)
         return dict(request), dict(response)
 
     def client(self, service: str, type_: str) -> Ros2Client:
         """Return a client. Raise TypesDiffer."""
-        return ZenohClient(self._node, self._service_end(Kind.CLIENT, service, type_))
+        return ZenohClient(self._node, self._service_end(Kind.CLIENT, service, type_.replace("/", "/srv/")))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
         """Offer a service. Raise TypesDiffer."""
         response = self._definitions.service(type_)[1]
-        return ZenohServer(self._node, self._service_end(Kind.SERVICE, service, type_), response, answer)
+        end = self._service_end(Kind.SERVICE, service, type_.replace("/", "/srv/"))
+        return ZenohServer(self._node, end, response, answer)
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Raise TypesDiffer."""
-        raise TypesDiffer(_NO_ACTIONS)
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer, as :meth:`fields`."""
+        whole = type_.replace("/", "/action/")
+        self._service_end(Kind.CLIENT, "", f"{whole}_SendGoal")
+        self._service_end(Kind.CLIENT, "", f"{whole}_GetResult")
+        feedback = f"{whole}_FeedbackMessage"
+        self._agreed(feedback, self._definitions.hash(feedback), _TOPIC)
+        goal, result, feedback_fields = self._definitions.action(type_)
+        return dict(goal), dict(result), dict(feedback_fields)
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Raise TypesDiffer."""
-        raise TypesDiffer(_NO_ACTIONS)
+        """Return a client of an action. Raise TypesDiffer."""
+        ends = self._action_ends(action, type_, Kind.CLIENT, Kind.SUBSCRIPTION)
+        return ZenohActionClient(self._node, ends, self._action_type(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Raise TypesDiffer."""
-        raise TypesDiffer(_NO_ACTIONS)
+        """Offer an action. Raise TypesDiffer."""
+        ends = self._action_ends(action, type_, Kind.SERVICE, Kind.PUBLISHER)
+        return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Return a handle of nothing: parameters are not offered over Zenoh."""
@@ -194,9 +156,23 @@ class ZenohSide:
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
-        whole = type_.replace("/", "/srv/")
-        hash_ = self._agreed(whole, self._definitions.hash(whole), _SERVICE, name)
-        return self._node.entity(kind, name, whole, hash_, Qos())
+        """Return an end of a service; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
+        hash_ = self._agreed(type_, self._definitions.hash(type_), _SERVICE, name)
+        return self._node.entity(kind, name, type_, hash_, Qos())
+
+    def _action_ends(self, action: str, type_: str, service: Kind, topic: Kind) -> ActionEnds:
+        whole = type_.replace("/", "/action/")
+        space = f"{action}/_action"
+        return ActionEnds(
+            self._service_end(service, f"{space}/send_goal", f"{whole}_SendGoal"),
+            self._service_end(service, f"{space}/get_result", f"{whole}_GetResult"),
+            self._service_end(service, f"{space}/cancel_goal", "action_msgs/srv/CancelGoal"),
+            self._topic_end(topic, f"{space}/feedback", f"{whole}_FeedbackMessage", Qos()),
+            self._topic_end(topic, f"{space}/status", "action_msgs/GoalStatusArray", _LATCHED),
+        )
+
+    def _action_type(self, type_: str) -> ActionType:
+        return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
         """Return the hash that keys have for a type: one's own where the other side has it too. Raise TypesDiffer."""
@@ -232,37 +208,6 @@ class _NoParameters:
     def set(self, node: str, name: str, value: Value) -> None:
         """Raise BridgeError."""
         raise BridgeError(_NO_PARAMETERS)
-
-
-class _Matching(Protocol):
-    matching: bool
-
-
-class _Outlet(Outlet, Protocol):
-    matching_status: _Matching
-
-
-class _Publisher(Handle):
-    def __init__(self, node: ZenohNode, end: Entity, outlet: _Outlet) -> None:
-        super().__init__(node, end, outlet)
-        self._graph = node.graph
-        self._end = end
-        self._outlet = outlet
-
-    @property
-    def subscribers(self) -> int:
-        """Return the number of subscribers; 0 while those of other sessions are not reached yet."""
-        found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
-        count = len([each for each in found if each.key == self._end.key])
-        # One that keeps its messages loses none.
-        is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
-        return count if is_ready else 0
-
-    def publish(self, data: bytes) -> None:
-        """Send a message; a network that is too slow drops it."""
-        # A session that is closed.
-        with contextlib.suppress(self._fault):
-            self._outlet.put(data, attachment=self.attachment())
 
 
 def _end(entity: Entity) -> Ros2End:

@@ -1,0 +1,296 @@
+"""Actions and parameters of the bridge over Zenoh, and its topics of every robot, with a node that writes each byte itself.
+
+Its keys and messages are those of rcl_action, rmw_zenoh and the definitions of ROS 2 Kilted, whose hashes are here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import queue
+import struct
+import uuid
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
+
+from minirospy import Node
+from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
+from minirospy.bridge.ros2.definitions import Definitions
+from minirospy.bridge.ros2.links import BRIDGE_PREFIX
+from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
+from minirospy.bridge.ros2.zenoh_keys import attachment
+from minirospy.bridge.ros2.zenoh_side import ZenohSide
+from minirospy.bridge.zenoh_library import NetworkOptions
+from minirospy.graph.goals import GoalState
+from tests.bridge.ros2_definitions import catalogue, typestore
+from tests.bridge.test_ros2_zenoh import GID, LIMIT, RmwNode, domain, endpoint, node, zenoh
+from tests.bridge.test_ros2_zenoh_keys import ACTION_HASHES
+from tests.waiting import until, wait_until
+
+__all__ = ["domain", "endpoint", "node"]  # fixtures
+
+RULES = """
+- {ros1_package_name: actionlib_tutorials, ros1_action_name: Fibonacci, ros2_package_name: test_msgs, ros2_action_name: Fibonacci}
+"""
+ROBOT_RULES = BUILT_IN.with_(parse_rules(RULES, "rules"))
+PARTS = {
+    "send_goal": "test_msgs::action::dds_::Fibonacci_SendGoal_",
+    "get_result": "test_msgs::action::dds_::Fibonacci_GetResult_",
+    "cancel_goal": "action_msgs::srv::dds_::CancelGoal_",
+    "feedback": "test_msgs::action::dds_::Fibonacci_FeedbackMessage_",
+    "status": "action_msgs::msg::dds_::GoalStatusArray_",
+}
+TOPICS = ("feedback", "status")
+HEADER = b"\0\1\0\0"
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait longer than a machine may stop everything for."""
+    for module, name in (
+        ("action_to_ros1", "_SERVER_SECONDS"),
+        ("action_to_ros2", "_ACCEPT_SECONDS"),
+        ("zenoh_actions", "_CLOSE_SECONDS"),
+    ):
+        monkeypatch.setattr(f"minirospy.bridge.ros2.{module}.{name}", LIMIT)
+
+
+def key_of(part: str) -> str:
+    return f"0/fly/_action/{part}/{PARTS[part]}/{ACTION_HASHES[part]}"
+
+
+def numbers(*values: int) -> bytes:
+    """Return a sequence of int32."""
+    return struct.pack(f"<I{len(values)}i", len(values), *values)
+
+
+def bridged(
+    node: RmwNode, endpoint: str, scene: Callable[[Node, RmwNode, Ros2Bridge], Awaitable[None]]
+) -> None:
+    async def run() -> None:
+        side = ZenohSide(BRIDGE_PREFIX, NetworkOptions((endpoint,)), Definitions(ROBOT_RULES, catalogue()))
+        async with Node("other", rosout=False) as other, Node(BRIDGE_PREFIX, rosout=False) as own:
+            bridge = Ros2Bridge(own, side, Ros2Options(rules=ROBOT_RULES), catalogue())
+            try:
+                await bridge.start()
+                await asyncio.wait_for(scene(other, node, bridge), LIMIT)
+            finally:
+                await bridge.close()
+
+    asyncio.run(run())
+
+
+async def in_thread(work: Callable[..., Any], *words: object) -> Any:
+    return await asyncio.get_running_loop().run_in_executor(None, work, *words)
+
+
+async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
+    with pytest.raises(GoalError) as caught:
+        await goal
+    return caught.value.state, list(getattr(caught.value.result, "sequence", []))
+
+
+# --- goals of ROS 1
+
+
+class Server:
+    """A server of /fly in ROS 2: refuses a negative order, aborts 13, and ends 7 when it is cancelled."""
+
+    def __init__(self, node: RmwNode) -> None:
+        self.node = node
+        self.goals: dict[bytes, int] = {}
+        self.waiting: dict[bytes, Any] = {}
+        self.cancelled: list[bytes] = []
+        self.publisher = node.session.declare_publisher(key_of("feedback"))
+        answers = {"send_goal": self.send_goal, "get_result": self.get_result, "cancel_goal": self.cancel}
+        for id, (part, answer) in enumerate(answers.items(), 1):
+            node.kept.append(node.session.declare_queryable(key_of(part), answer, complete=True))
+            node.end(id, "SS", key_of(part))
+        for id, part in enumerate(TOPICS, 4):
+            node.end(id, "MP", key_of(part))
+
+    def reply(self, query: Any, part: str, data: bytes) -> None:
+        query.reply(key_of(part), HEADER + data, attachment=query.attachment)
+        query.drop()
+
+    def send_goal(self, query: Any) -> None:
+        data = query.payload.to_bytes()
+        assert data[:4] == HEADER
+        id, (order,) = data[4:20], struct.unpack("<i", data[20:])
+        self.goals[id] = order
+        self.reply(query, "send_goal", struct.pack("<?xxxiI", order >= 0, 12, 34))
+        for count in range(1, order + 1):
+            self.publisher.put(HEADER + id + numbers(*range(count)))
+
+    def get_result(self, query: Any) -> None:
+        id = query.payload.to_bytes()[4:]
+        if self.goals[id] == 7:
+            self.waiting[id] = query
+        else:
+            self.end(query, ABORTED if self.goals[id] == 13 else SUCCEEDED, self.goals[id])
+
+    def end(self, query: Any, status: int, order: int) -> None:
+        self.reply(query, "get_result", struct.pack("<bxxx", status) + numbers(*range(order)))
+
+    def cancel(self, query: Any) -> None:
+        id = query.payload.to_bytes()[4:20]
+        self.cancelled.append(id)
+        self.reply(query, "cancel_goal", struct.pack("<bxxxI", 0, 1) + id + bytes(8))
+        self.end(self.waiting.pop(id), CANCELED, 3)
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_of_ros1_reach_a_server_over_zenoh(node: RmwNode, endpoint: str) -> None:
+    async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
+        server = await in_thread(Server, peer)
+        async with ActionClient(other, "/fly", FibonacciAction) as client:
+            await client.wait_for_server()
+            goal = client.send(FibonacciGoal(order=3))
+            assert [list(each.sequence) async for each in goal] == [[0], [0, 1], [0, 1, 2]]
+            assert list((await goal).sequence) == [0, 1, 2]
+            assert await end_of(client.send(FibonacciGoal(order=13))) == (
+                GoalState.ABORTED,
+                list(range(13)),
+            )
+            assert await end_of(client.send(FibonacciGoal(order=-1))) == (GoalState.REJECTED, [])
+
+            goal = client.send(FibonacciGoal(order=7))
+            await until(lambda: bool(server.waiting))
+            goal.cancel()
+            assert await end_of(goal) == (GoalState.PREEMPTED, [0, 1, 2])
+            assert [server.goals[id] for id in server.cancelled] == [7]
+
+            goal = client.send(FibonacciGoal(order=7))
+            await until(lambda: bool(server.waiting))
+            await in_thread(peer.session.close)
+            assert (await end_of(goal))[0] is GoalState.ABORTED
+            assert "has ended" in goal.text
+
+    bridged(node, endpoint, scene)
+
+
+# --- goals of ROS 2
+
+
+class Client:
+    """A client of /fly in ROS 2."""
+
+    def __init__(self, node: RmwNode) -> None:
+        self.node = node
+        self.feedback = node.subscribe(key_of("feedback"))
+        self.statuses: queue.Queue[Any] = queue.Queue()
+        node.kept.append(
+            zenoh.ext.declare_advanced_subscriber(
+                node.session,
+                key_of("status"),
+                self.statuses.put,
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+                subscriber_detection=True,
+            )
+        )
+        wait_until(lambda: len([each for each in node.tokens() if "fly%_action" in each]) == 5)
+        querier = node.session.declare_querier(key_of("send_goal"))
+        wait_until(lambda: querier.matching_status.matching)
+
+    def call(self, part: str, data: bytes) -> bytes:
+        replies = self.node.session.get(
+            key_of(part),
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            payload=HEADER + data,
+            attachment=attachment(1, 1, GID),
+            timeout=LIMIT,
+        )
+        found = next(iter(replies)).ok.payload.to_bytes()
+        assert found[:4] == HEADER
+        return bytes(found[4:])
+
+    def send(self, order: int, id: bytes = b"") -> bytes:
+        """Send a goal; return its id, none where it is refused."""
+        id = id or uuid.uuid4().bytes
+        found = self.call("send_goal", id + struct.pack("<i", order))
+        is_accepted, sec, _ = struct.unpack("<?xxxiI", found)
+        assert sec
+        return id if is_accepted else b""
+
+    def result(self, id: bytes) -> tuple[int, bytes]:
+        found = self.call("get_result", id)
+        return found[0], found[4:]
+
+    def cancel(self, id: bytes) -> tuple[int, list[bytes]]:
+        found = self.call("cancel_goal", id + bytes(8))
+        code, count = struct.unpack_from("<bxxxI", found)
+        return code, [found[8 + 24 * each : 24 + 24 * each] for each in range(count)]
+
+    def said(self, id: bytes) -> bytes:
+        """Return the next feedback of a goal."""
+        data = self.feedback.get(timeout=LIMIT).payload.to_bytes()
+        assert data[4:20] == id
+        return bytes(data[20:])
+
+    def until_status(self, id: bytes, status: int) -> None:
+        store = typestore()
+        while True:
+            data = self.statuses.get(timeout=LIMIT).payload.to_bytes()
+            listed = store.deserialize_cdr(data, "action_msgs/msg/GoalStatusArray").status_list
+            if (id, status) in [(bytes(each.goal_info.goal_id.uuid), each.status) for each in listed]:
+                return
+
+
+@pytest.mark.usefixtures("master")
+def test_goals_over_zenoh_reach_a_server_of_ros1(node: RmwNode, endpoint: str) -> None:
+    async def execute(goal: Any) -> dict[str, list[int]]:
+        order = goal.request.order
+        for count in range(1, order + 1):
+            await goal.publish_feedback(list(range(count)))
+        if order == 13:
+            raise GoalError("unlucky", {"sequence": [13]})
+        if order == 7:
+            with pytest.raises(asyncio.CancelledError):
+                await asyncio.sleep(LIMIT)
+        return {"sequence": list(range(order))}
+
+    def use(client: Client) -> None:
+        id = client.send(3)
+        assert [client.said(id) for _ in range(3)] == [numbers(0), numbers(0, 1), numbers(0, 1, 2)]
+        assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
+        client.until_status(id, SUCCEEDED)
+        # The result is kept for who comes later, and the id of a goal is used once.
+        assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
+        assert not client.send(3, id)
+        assert not client.send(-1)
+        assert client.result(bytes(range(16))) == (0, numbers())
+
+        id = client.send(7)
+        for count in range(1, 8):
+            assert client.said(id) == numbers(*range(count))
+        assert client.cancel(bytes(range(1, 17))) == (2, [])
+        assert client.cancel(id) == (0, [id])
+        assert client.result(id) == (CANCELED, numbers(*range(7)))
+        client.until_status(id, CANCELED)
+        assert client.cancel(id) == (3, [])
+
+        id = client.send(13)
+        for _ in range(13):
+            client.said(id)
+        assert client.result(id) == (ABORTED, numbers(13))
+
+    async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
+        server = await ActionServer(
+            other, "/fly", FibonacciAction, execute, accepts=lambda goal: goal.order >= 0
+        )
+        client = await in_thread(Client, peer)
+        await in_thread(use, client)
+        id = await in_thread(client.send, 7)
+        await in_thread(client.until_status, id, 2)
+        # What runs is aborted as the bridge ends.
+        await bridge.actions.close()
+        await in_thread(client.until_status, id, ABORTED)
+        await in_thread(wait_until, lambda: not any("fly%_action" in each for each in peer.tokens()))
+        await server.close()
+
+    bridged(node, endpoint, scene)
