@@ -12,11 +12,14 @@ import uuid
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.aio.raw import call_raw
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX
@@ -24,10 +27,12 @@ from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.zenoh_keys import attachment
 from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
+from minirospy.errors import ServiceException
 from minirospy.graph.goals import GoalState
+from minirospy.idl.load import service_class
 from tests.bridge.ros2_definitions import catalogue, typestore
-from tests.bridge.test_ros2_zenoh import GID, LIMIT, RmwNode, domain, endpoint, node, zenoh
-from tests.bridge.test_ros2_zenoh_keys import ACTION_HASHES
+from tests.bridge.test_ros2_zenoh import GID, LIMIT, RmwNode, called, domain, endpoint, node, zenoh
+from tests.bridge.test_ros2_zenoh_keys import ACTION_HASHES, SERVICE_HASHES
 from tests.waiting import until, wait_until
 
 __all__ = ["domain", "endpoint", "node"]  # fixtures
@@ -55,6 +60,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
         ("action_to_ros1", "_SERVER_SECONDS"),
         ("action_to_ros2", "_ACCEPT_SECONDS"),
         ("zenoh_actions", "_CLOSE_SECONDS"),
+        ("zenoh_parameters", "_SECONDS"),
     ):
         monkeypatch.setattr(f"minirospy.bridge.ros2.{module}.{name}", LIMIT)
 
@@ -292,5 +298,149 @@ def test_goals_over_zenoh_reach_a_server_of_ros1(node: RmwNode, endpoint: str) -
         await in_thread(client.until_status, id, ABORTED)
         await in_thread(wait_until, lambda: not any("fly%_action" in each for each in peer.tokens()))
         await server.close()
+
+    bridged(node, endpoint, scene)
+
+
+# --- parameters
+
+TEXT = struct.Struct("<I")
+VALUES = get_typestore(Stores.ROS2_KILTED)
+VALUES.register(
+    {
+        **get_types_from_msg("rcl_interfaces/ParameterValue[] values", "rcl_interfaces/msg/Values"),
+        **get_types_from_msg("rcl_interfaces/Parameter[] parameters", "rcl_interfaces/msg/Parameters"),
+    }
+)
+"""With the requests and responses of services, which rosbags lacks."""
+
+
+def text(value: str) -> bytes:
+    data = value.encode() + b"\0"
+    return TEXT.pack(len(data)) + data
+
+
+@pytest.mark.usefixtures("master")
+def test_parameters_of_ros1_are_those_of_the_bridge_over_zenoh(node: RmwNode, endpoint: str) -> None:
+    def call(service: str, part: str, request: bytes) -> bytes:
+        type_ = f"rcl_interfaces::srv::dds_::{part}_"
+        key = f"0/{BRIDGE_PREFIX}/{service}/{type_}/{SERVICE_HASHES[f'rcl_interfaces/{part}']}"
+        found = called(node, key, HEADER + request, attachment(1, 1, GID)).ok.payload.to_bytes()
+        assert found[:4] == HEADER
+        return bytes(found[4:])
+
+    def value_of(name: str) -> Any:
+        """Return what ``get_parameters`` returns of one, as rosbags reads it."""
+        request = TEXT.pack(1) + text(name)
+        found = call("get_parameters", "GetParameters", request)
+        assert TEXT.unpack(found[:4]) == (1,)
+        (value,) = VALUES.deserialize_cdr(HEADER + found, "rcl_interfaces/msg/Values").values
+        return value
+
+    def set_to(name: str, value: Any) -> bytes:
+        made = VALUES.types["rcl_interfaces/msg/Parameter"](name, value)
+        request = VALUES.types["rcl_interfaces/msg/Parameters"]([made])
+        data = bytes(VALUES.serialize_cdr(request, "rcl_interfaces/msg/Parameters"))[4:]
+        return call("set_parameters", "SetParameters", data)
+
+    def use() -> None:
+        wait_until(
+            lambda: sum(f"%{BRIDGE_PREFIX}%" in each and "/SS/" in each for each in node.tokens()) == 6
+        )
+        listed = call("list_parameters", "ListParameters", TEXT.pack(1) + text("robot") + bytes(14))
+        names = ["robot.ids", "robot.name", "robot.on", "robot.speed"]
+        assert all(text(name) in listed for name in names)
+        speed = value_of("robot.speed")
+        assert (speed.type, speed.double_value) == (3, 1.5)
+        assert value_of("robot.name").string_value == "r2"
+        assert list(value_of("robot.ids").integer_array_value) == [1, 2]
+        assert value_of("robot.none").type == 0
+        assert call("get_parameter_types", "GetParameterTypes", TEXT.pack(1) + text("robot.on")) == (
+            TEXT.pack(1) + b"\1"
+        )
+        described = call("describe_parameters", "DescribeParameters", TEXT.pack(1) + text("robot.on"))
+        assert described.startswith(TEXT.pack(1) + text("robot.on"))
+        assert text("a parameter of ROS 1") in described
+
+        speed.type, speed.integer_value = 2, 3
+        assert set_to("robot.speed", speed) == TEXT.pack(1) + b"\1\0\0\0" + text("")
+        assert value_of("robot.speed").integer_value == 3
+        speed.integer_value = 2**40
+        refused = set_to("robot.speed", speed)
+        assert refused[4] == 0
+        assert b"does not fit into the 32 bits" in refused
+        # What is no request is refused, and the next one is answered.
+        key = f"0/{BRIDGE_PREFIX}/get_parameters/rcl_interfaces::srv::dds_::GetParameters_"
+        key += f"/{SERVICE_HASHES['rcl_interfaces/GetParameters']}"
+        broken = called(node, key, HEADER + b"\xff\xff\xff\xff", attachment(1, 1, GID))
+        assert broken.err.payload.to_bytes() == b"the message ends too early"
+        assert value_of("robot.speed").integer_value == 3
+
+    async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
+        await other.set_param("/robot", {"speed": 1.5, "name": "r2", "ids": [1, 2], "on": True})
+        await in_thread(use)
+
+    bridged(node, endpoint, scene)
+
+
+@pytest.mark.usefixtures("master")
+def test_parameters_over_zenoh_are_reached_by_services_of_ros1(node: RmwNode, endpoint: str) -> None:
+    asked: list[bytes] = []
+
+    def serve(id: int, service: str, part: str, answer: Callable[[bytes], bytes]) -> None:
+        key = (
+            f"0/peer/{service}/rcl_interfaces::srv::dds_::{part}_/{SERVICE_HASHES[f'rcl_interfaces/{part}']}"
+        )
+
+        def arrived(query: Any) -> None:
+            asked.append(query.payload.to_bytes()[4:])
+            query.reply(key, HEADER + answer(asked[-1]), attachment=query.attachment)
+            query.drop()
+
+        node.kept.append(node.session.declare_queryable(key, arrived, complete=True))
+        node.end(id, "SS", key)
+
+    def values(request: bytes) -> bytes:
+        types = VALUES.types
+        empty: dict[str, Any] = {f"{kind}_value": 0 for kind in ("bool", "integer", "double")}
+        kinds = {"byte": np.uint8, "bool": np.bool_, "integer": np.int64, "double": np.float64}
+        arrays: dict[str, Any] = {f"{kind}_array_value": np.array([], of) for kind, of in kinds.items()}
+        kind = 3 if text("gain") in request else 0
+        value = types["rcl_interfaces/msg/ParameterValue"](
+            **{
+                **empty,
+                **arrays,
+                "type": kind,
+                "double_value": 0.5,
+                "string_value": "",
+                "string_array_value": [],
+            }
+        )
+        message = types["rcl_interfaces/msg/Values"]([value])
+        return bytes(VALUES.serialize_cdr(message, "rcl_interfaces/msg/Values"))[4:]
+
+    def results(request: bytes) -> bytes:
+        is_known = text("gain") in request
+        return TEXT.pack(1) + bytes((is_known, 0, 0, 0)) + text("" if is_known else "not declared")
+
+    serve(1, "list_parameters", "ListParameters", lambda _: TEXT.pack(1) + text("gain") + bytes(7))
+    serve(2, "get_parameters", "GetParameters", values)
+    serve(3, "set_parameters", "SetParameters", results)
+
+    async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
+        async def call(service: str, *texts: str) -> bytes:
+            type_ = "rosapi/" + service.title().replace("_", "")
+            request = b"".join(TEXT.pack(len(each)) + each.encode() for each in texts)
+            md5 = service_class(type_)._md5sum
+            return await call_raw(other, f"/{BRIDGE_PREFIX}/{service}", md5, request)
+
+        await until(lambda: len(bridge.side.services()) == 3)
+        assert await call("get_param_names") == TEXT.pack(1) + TEXT.pack(10) + b"/peer:gain"
+        assert await call("get_param", "/peer:gain", "") == TEXT.pack(3) + b"0.5"
+        assert await call("get_param", "/peer:none", "7") == TEXT.pack(1) + b"7"
+        assert await call("set_param", "/peer:gain", "0.75") == b""
+        assert struct.pack("<d", 0.75) in asked[-1]
+        with pytest.raises(ServiceException, match=r"refuses \[none\]: not declared"):
+            await call("set_param", "/peer:none", "1")
 
     bridged(node, endpoint, scene)

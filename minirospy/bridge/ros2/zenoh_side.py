@@ -25,12 +25,11 @@ from minirospy.bridge.ros2.zenoh_actions import ActionEnds, ActionType, ZenohAct
 from minirospy.bridge.ros2.zenoh_calls import ZenohClient, ZenohServer
 from minirospy.bridge.ros2.zenoh_keys import Entity, Kind, Qos
 from minirospy.bridge.ros2.zenoh_node import ZenohNode
+from minirospy.bridge.ros2.zenoh_parameters import ZenohNodeParameters, ZenohParameterServer
 from minirospy.bridge.ros2.zenoh_topics import ZenohPublisher, subscribe
 from minirospy.bridge.zenoh_library import NetworkOptions
-from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
-    from minirospy.bridge.ros2.parameter_values import Value
     from minirospy.bridge.ros2.rclpy_actions import Accept
     from minirospy.bridge.ros2.rclpy_parameters import ParameterStore
 
@@ -38,7 +37,6 @@ __all__ = ["ZenohSide"]
 
 _TOPIC = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
 _SERVICE = (Kind.SERVICE, Kind.CLIENT)
-_NO_PARAMETERS = "parameters are not passed on by --zenoh: run the bridge next to an installed ROS 2"
 _LATCHED = Qos(True, True, 1)
 
 
@@ -47,6 +45,7 @@ class ZenohSide:
 
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
         """Open the session; waits for the router. Raises BridgeError."""
+        self._name = name
         self._node = ZenohNode(name, options)
         self._graph = self._node.graph
         self._definitions = definitions
@@ -140,12 +139,12 @@ class ZenohSide:
         return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Return a handle of nothing: parameters are not offered over Zenoh."""
-        return _NoParameters()
+        """Offer the parameters of ROS 1 as those of this node."""
+        return ZenohParameterServer(self, self._name, self._definitions.fields, store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
-        """Return access to parameters that refuses."""
-        return _NoParameters()
+        """Return access to the parameters of other nodes."""
+        return ZenohNodeParameters(self, self._definitions.fields)
 
     def close(self) -> None:
         """End the session, and all that it has declared. Idempotent."""
@@ -189,25 +188,6 @@ class ZenohSide:
         # No end has it: as most do.
         are_humble = [end.hash == NO_HASH for end in self._graph.ends(*_TOPIC, *_SERVICE)]
         return NO_HASH if are_humble and all(are_humble) else own
-
-
-class _NoParameters:
-    """Parameters, which this side does not have."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def names(self, node: str) -> list[str]:
-        """Raise BridgeError."""
-        raise BridgeError(_NO_PARAMETERS)
-
-    def get(self, node: str, name: str) -> Value:
-        """Raise BridgeError."""
-        raise BridgeError(_NO_PARAMETERS)
-
-    def set(self, node: str, name: str, value: Value) -> None:
-        """Raise BridgeError."""
-        raise BridgeError(_NO_PARAMETERS)
 
 
 def _end(entity: Entity) -> Ros2End:
