@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import os
 import re
@@ -12,7 +11,9 @@ import sys
 import tarfile
 import zipfile
 from base64 import urlsafe_b64encode
+from collections.abc import Iterator
 from pathlib import Path
+from types import CodeType
 
 import pytest
 
@@ -184,9 +185,17 @@ def test_modules_of_the_wheel_are_those_of_the_sources_without_lines_of_comment(
                 continue
             text, packed = source.read_text(encoding="utf-8"), archive.read(name).decode()
             blanked += packed != text
-            ours, theirs = (ast.dump(ast.parse(each), include_attributes=True) for each in (text, packed))
+            ours, theirs = (list(_code(compile(each, name, "exec"))) for each in (text, packed))
             assert ours == theirs, name
     assert blanked > 100
+
+
+def _code(code: CodeType) -> Iterator[object]:
+    """Yield what a module is compiled to, with its line numbers: far faster than comparing syntax trees as text."""
+    yield code, tuple(code.co_lines())
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _code(each)
 
 
 def test_comments_in_texts_and_behind_code_stay() -> None:
