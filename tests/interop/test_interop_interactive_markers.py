@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -16,11 +17,13 @@ from typing import Any
 import pytest
 
 from minirospy.bridge.access import Access
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import REAL_PYTHON, start, stop
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_dashboard_3d import Serve, drag, drawn, levels, look_down, mouse, status
+from tests.waiting import wait_until
 
 __all__ = ["browse", "serve"]
 
@@ -186,6 +189,21 @@ def test_texts_of_markers_never_become_html(served: tuple[Served, Server], brows
     page.wait_text("[role=status]", hostile)
     assert not page.evaluate("document.querySelectorAll('img').length")
     assert page.evaluate("document.title") != "taken"
+
+
+@needs_chromium
+def test_feedback_is_published_no_longer_than_the_view_is_open(
+    served: tuple[Served, Server], browse: Browse
+) -> None:
+    def is_published() -> bool:
+        publishers = master.call("getSystemState")[0]
+        return "/markers/feedback" in [topic for topic, _ in publishers]
+
+    page, _ = opened(served[0], browse)
+    with contextlib.closing(MasterProxy(os.environ["ROS_MASTER_URI"], "/test")) as master:
+        wait_until(is_published)
+        page.evaluate("location.hash = '#/topics'")
+        wait_until(lambda: not is_published())
 
 
 @needs_chromium

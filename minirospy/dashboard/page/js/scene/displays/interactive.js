@@ -170,7 +170,8 @@ export class InteractiveMarkers extends TopicDisplay {
       return;
     }
     this.space = this.topic.slice(0, -SUFFIX.length);
-    this.ends.push(() => this.endFetch?.(), this.context.link.watch(["state"], () => this.offer()));
+    const { link } = this.context;
+    this.ends.push(() => this.endFetch?.(), link.watch(["state"], () => this.offer()), () => link.unpublish(`${this.space}/feedback`));
     this.fetch();
   }
 
