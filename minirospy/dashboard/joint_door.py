@@ -123,6 +123,7 @@ class JointDoor(JsonDoor["JointSession"]):
         loop = asyncio.get_running_loop()
         next_load = loop.time()
         next_message = loop.time()
+        self._follow(self._legal_sources())
 
         while self.sessions or self.always_publishes or self._publisher:
             self._work_changed.clear()
@@ -141,6 +142,8 @@ class JointDoor(JsonDoor["JointSession"]):
                 publisher, self._publisher = self._publisher, None
                 await publisher.close()
             await wait_until(self._work_changed, end)
+        # The next page follows them again.
+        self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
         """Read the parameters, and the description again where one has changed. Raise MinirospyError."""
@@ -172,11 +175,18 @@ class JointDoor(JsonDoor["JointSession"]):
         except (JointError, UrdfError) as error:
             self.joints = self.parameters = None
             self.why = str(error)
-        self._follow(self.parameters.sources if self.parameters else [])
+        for topic in self.parameters.sources if self.parameters else []:
+            if why := why_illegal(topic):
+                self.warnings.append(f"The source_list parameter has [{topic[:200]}]: {why}")
+        self._follow(self._legal_sources())
         self.changed()
 
+    def _legal_sources(self) -> list[str]:
+        sources = self.parameters.sources if self.parameters else []
+        return [topic for topic in sources if not why_illegal(topic)]
+
     def _follow(self, topics: Sequence[str]) -> None:
-        """Follow the topics of source_list, and no others."""
+        """Follow these topics of source_list, and no others."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:
@@ -192,12 +202,9 @@ class JointDoor(JsonDoor["JointSession"]):
             finally:
                 await subscription.close()
 
-        self._sources = []
-        for topic in topics:
-            if why := why_illegal(topic):
-                self.warnings.append(f"The source_list parameter has [{topic[:200]}]: {why}")
-                continue
-            self._sources.append(asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)))
+        self._sources = [
+            asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)) for topic in topics
+        ]
 
     async def _publish(self) -> None:
         from sensor_msgs.msg import JointState

@@ -177,6 +177,13 @@ def test_topics_are_left_with_the_page_and_the_parameter(
     page.socket.close()
     wait_until(lambda: not any(topics()))
 
+    def is_followed() -> bool:
+        return "/from_other" in served.run(fetch(node._node.master)).subscribers
+
+    wait_until(lambda: not is_followed())
+    client(served)
+    wait_until(is_followed)
+
 
 def test_description_that_comes_later_or_is_broken_is_followed(
     serve: Callable[..., Served], client: Callable[..., Client]
