@@ -5,6 +5,7 @@ Runs under real ROS and under ours; test_interop_called_names.py compares the tw
 ``seconds``, after which a call counts as one that waits. Prints a line a call: its text, a tab, its outcome as JSON.
 """
 
+import functools
 import gc
 import importlib
 import inspect
@@ -126,7 +127,8 @@ NORMAL_OF = {
     "tf.transformations.data": "[3.0, 4.0]", "tf.transformations.seq": "'sxyz'",
     "rosgraph.xmlrpc.addr": "('127.0.0.1', 0)", "rosmsg.mode": "'.msg'", "rosmsg.full": "'rosmsg msg'",
     "rosclean.d": "'.'", "rosbag.bag.mode": "'w'", "rosbag.bag.f": "'b.bag'", "rosbag.mode": "'w'", "rosbag.f": "'b.bag'",
-    "dynamic_reconfigure.client.name": "'/n'", "rosmsg.type_": "'std_msgs/String'",
+    "dynamic_reconfigure.client.changes": "{'speed': 1.5}", "dynamic_reconfigure.server.changes": "{'speed': 1.5}",
+    "rosmsg.type_": "'std_msgs/String'",
 }  # fmt: skip
 
 # How an object of a class is made whose constructor's normal case is something else, or does not fit.
@@ -138,6 +140,9 @@ OBJECTS = {
     "rospy.Duration": "rospy.Duration(1, 5)", "rospy.Time": "rospy.Time(1, 5)",
     "rospy.timer.Rate": "rate()", "rospy.Rate": "rate()",
     "dynamic_reconfigure.parameter_generator_catkin.ParameterGenerator": "generator()",
+    "dynamic_reconfigure.server.Server": "reconfigure_server()",
+    "dynamic_reconfigure.client.Client": "reconfigure_client()",
+    "interactive_markers.interactive_marker_server.InteractiveMarkerServer": "markers()",
     "message_filters.Subscriber": "message_filters.Subscriber('/t', String)",
     "rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler": "object.__new__(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler)",
 }  # fmt: skip
@@ -161,6 +166,76 @@ def rate():
 
     rospy.rostime.set_rostime_initialized(True)
     return rospy.Rate(1000)
+
+
+@functools.lru_cache(None)
+def node():
+    """Initialize this process's node."""
+    import rospy
+
+    rospy.init_node("called", disable_signals=True)
+
+
+@functools.lru_cache(None)
+def markers():
+    """Return a server of interactive markers."""
+    from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+
+    node()
+    return InteractiveMarkerServer("markers")
+
+
+@functools.lru_cache(None)
+def reconfigure_server():
+    """Return a server of a configuration with one number, as the generator describes it."""
+    from dynamic_reconfigure.server import Server
+
+    node()
+    shared = {"srcline": 1, "srcfile": "a.cfg", "type": "double", "level": 1}
+    speed = {
+        **shared,
+        "name": "speed",
+        "description": "",
+        "edit_method": "",
+        "cconsttype": "const double",
+        "ctype": "double",
+    }
+    group = {
+        "name": "Default",
+        "type": "",
+        "state": True,
+        "cstate": "true",
+        "id": 0,
+        "parent": 0,
+        "groups": [],
+    }
+    names = {
+        "upper": "DEFAULT",
+        "lower": "groups",
+        "class": "DEFAULT",
+        "field": "default",
+        "parentname": "Default",
+        "parentclass": "",
+    }
+    speed.update(default=1.0, min=0.0, max=2.0)
+    config = types.SimpleNamespace(
+        config_description={**shared, **group, **names, "parameters": [speed]},
+        defaults={"speed": 1.0}, min={"speed": 0.0}, max={"speed": 2.0}, level={"speed": 1}, all_level=1,
+    )  # fmt: skip
+    return Server(config, lambda values, level: values)
+
+
+@functools.lru_cache(None)
+def reconfigure_client():
+    """Return a client of it."""
+    from dynamic_reconfigure.client import Client
+
+    reconfigure_server()
+    client = Client("/called", timeout=60)
+    # What comes by topics is then there.
+    client.get_configuration(60)
+    client.get_group_descriptions(60)
+    return client
 
 
 def generator():
@@ -220,6 +295,9 @@ def namespace():
         "image": image,
         "rate": rate,
         "generator": generator,
+        "markers": markers,
+        "reconfigure_server": reconfigure_server,
+        "reconfigure_client": reconfigure_client,
     }
     for module in (
         "rospy", "genmsg", "genpy", "rosgraph", "rosgraph.impl.graph", "rospkg", "rospkg.os_detect", "rosbag", "rosbag.migration",
