@@ -73,3 +73,9 @@ def test_number_is_the_name_of_nothing_at_the_master(master: str) -> None:
     ]
     with pytest.raises(rosservice.ROSServiceException):
         rosservice.get_service_class_by_name(3)
+
+
+@pytest.mark.parametrize("name", [None, ""])
+def test_services_of_no_type_are_looked_up_at_the_master(name: object) -> None:
+    with pytest.raises(rosservice.ROSServiceIOException):
+        rosservice.rosservice_find(name)

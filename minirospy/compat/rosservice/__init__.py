@@ -104,7 +104,11 @@ def get_service_class_by_name(service_name: str) -> ServiceClass:
 def rosservice_find(service_type: str) -> list[str]:
     """Return the services of a type."""
     with _graph() as graph:
-        return services.find_services_of_type(graph, service_type) if service_type else []
+        if service_type:
+            return services.find_services_of_type(graph, service_type)
+        # No service has it; as ROS's, it raises where no master answers.
+        services.list_services(graph)
+        return []
 
 
 def call_service(
