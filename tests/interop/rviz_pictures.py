@@ -11,6 +11,7 @@ import base64
 import contextlib
 import io
 import json
+import math
 import os
 import shutil
 import struct
@@ -21,11 +22,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import Point, Point32, PoseStamped
+from geometry_msgs.msg import Point, Point32, PoseStamped, Quaternion
 from nav_msgs.msg import GridCells
 from nav_msgs.msg import Path as PathMessage
 from PIL import Image
-from sensor_msgs.msg import ChannelFloat32, PointCloud
+from sensor_msgs.msg import CameraInfo, ChannelFloat32, PointCloud
+from sensor_msgs.msg import Image as ImageMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy.bridge.access import Access
@@ -119,6 +121,32 @@ def _cells() -> GridCells:
     return robot_scene.stamped(GridCells, "map", cell_width=0.25, cell_height=0.25, cells=cells)
 
 
+def depth_camera() -> dict[str, Any]:
+    """Return what a depth camera at the frame lens sees: a wavy wall, a ball in front of it, and a place without depths."""
+    width, height, focal = 80, 60, 70.0
+    depths, colors = [], bytearray()
+    for y in range(height):
+        for x in range(width):
+            ball = 100 - (x - 50) ** 2 - (y - 30) ** 2
+            depth = 1.4 - 0.04 * math.sqrt(ball) if ball > 0 else 2 + 0.15 * math.sin(x / 6)
+            is_seen = x > 12 or y > 12
+            depths.append(round(1000 * depth) if is_seen else 0)
+            colors += bytes((230, 60, 40) if ball > 0 else (40 + 2 * x, 90, 255 - 3 * y))
+    info = robot_scene.stamped(CameraInfo, "lens", width=width, height=height)
+    info.K = [focal, 0, 39.5, 0, focal, 29.5, 0, 0, 1]
+    info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    info.P = [focal, 0, 39.5, 0, 0, focal, 29.5, 0, 0, 0, 1, 0]
+    size = {"width": width, "height": height}
+    data = struct.pack(f"<{width * height}H", *depths)
+    depth_image = robot_scene.stamped(
+        ImageMessage, "lens", **size, encoding="16UC1", step=2 * width, data=data
+    )
+    color_image = robot_scene.stamped(
+        ImageMessage, "lens", **size, encoding="rgb8", step=3 * width, data=bytes(colors)
+    )
+    return {"/depth/image": depth_image, "/depth/camera_info": info, "/color/image": color_image}
+
+
 def shapes() -> MarkerArray:
     """Return a marker of each type, and glass."""
     return MarkerArray(
@@ -131,8 +159,12 @@ def messages() -> dict[str, Any]:
     found = robot_scene.everything()
     # More than RViz hides as a small value.
     found["/wrench"].wrench.torque.y = 0.5
+    lens = robot_scene.transform("map", "lens", 0, 0, 1)
+    lens.transform.rotation = Quaternion(-0.5, 0.5, -0.5, 0.5)
+    found["/tf_static"].transforms.append(lens)
     return {
         **found,
+        **depth_camera(),
         "/shapes": shapes(),
         "/old_cloud": _old_cloud(),
         "/posed": _posed_path(),
@@ -196,6 +228,16 @@ SCENES: dict[str, tuple[list[Settings], Settings]] = {
             {**display("Path", "/posed", Pose_Style="Axes"), "Name": "axes"},
         ],
         orbit(8, x=-0.5, y=0.5, yaw=-1.2, pitch=0.8),
+    ),
+    "depth": (
+        [
+            display("Grid"),
+            {
+                **display("DepthCloud", Depth_Map_Topic="/depth/image", Color_Image_Topic="/color/image"),
+                "Auto Size": {"Auto Size Factor": 0.7, "Value": True},
+            },
+        ],
+        orbit(2.6, x=1.5, z=1, yaw=-2.6, pitch=0.3),
     ),
 }
 """Name -> displays, and the view."""

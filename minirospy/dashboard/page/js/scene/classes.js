@@ -13,7 +13,7 @@ const isColored = (transformer) => (settings) => settings["Color Transformer"] =
 
 const POINTS = (usualColors) => [
   ["Style", scheme(["Points", "Squares", "Flat Squares", "Spheres", "Boxes"]), "Flat Squares"],
-  ["Size (m)", number, 0.01, (settings) => settings.Style !== "Points"],
+  ["Size (m)", number, 0.01, (settings) => settings.Style !== "Points" && !settings["Auto Size"]?.Value],
   ["Size (Pixels)", number, 3, isStyle("Points")],
   ["Alpha", number, 1],
   ["Decay Time", number, 0],
@@ -90,9 +90,12 @@ export const CLASSES = {
   Camera: { types: ["sensor_msgs/Image"], topicKey: "Image Topic", settings: [
     ["Image Topic", topic, ""], ["Image Rendering", scheme(["background and overlay", "background", "overlay"]), "background and overlay"],
     ["Overlay Alpha", number, 0.5, (settings) => settings["Image Rendering"] !== "background"], ["Zoom Factor", number, 1]] },
+  DepthCloud: { types: ["sensor_msgs/Image"], topicKey: "Depth Map Topic", settings: [
+    ["Depth Map Topic", topic, ""], ["Color Image Topic", { kind: "topic", types: ["sensor_msgs/Image"] }, ""],
+    ["Auto Size/Value", bool, true], ["Auto Size/Auto Size Factor", number, 1, (settings) => settings["Auto Size"]?.Value !== false], ...POINTS("")] },
 };
 CLASSES.Wrench = CLASSES.WrenchStamped;
-const OFFERED_ONCE = new Set(["Camera", "Wrench"]);
+const OFFERED_ONCE = new Set(["Camera", "DepthCloud", "Wrench"]);
 
 export const classOf = (settings) => String(settings.Class ?? "").replace(/^rviz\//, "").replace(/^rviz_plugin_tutorials\//, "");
 export const topicKeyOf = (name) => CLASSES[name]?.topicKey ?? "Topic";

@@ -97,12 +97,12 @@ export function hairlines(positions, rgb, alpha) {
 }
 
 const POINT_VERTEX = `
-uniform float size; uniform float pixels; uniform float isMetres; uniform vec3 flatColor; uniform float isFlat;
+uniform float size; uniform float pixels; uniform float isMetres; uniform float grows; uniform vec3 flatColor; uniform float isFlat;
 attribute vec3 rgb; varying vec3 shade;
 void main() {
   shade = isFlat > 0.5 ? flatColor : rgb;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 1.0, 128.0) : size;
+  gl_PointSize = isMetres > 0.5 ? clamp(size * (grows > 0.5 ? position.z : 1.0) * pixels / gl_Position.w, 1.0, 128.0) : size;
 }`;
 const POINT_FRAGMENT = `
 uniform float opacity; uniform float isRound; varying vec3 shade;
@@ -117,15 +117,15 @@ void main() {
   gl_FragColor = vec4(shade * light, opacity);
 }`;
 
-/** Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres or pixels. */
-export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, size, isMetres, isRound = false }) {
+/** Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres (`grows`: times z) or pixels. */
+export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, size, isMetres, grows = false, isRound = false }) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   geometry.setAttribute("rgb", new BufferAttribute(colors ?? new Uint8Array(positions.length), 3, true));
   const material = new ShaderMaterial({
     vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, transparent: alpha < 0.9998, depthWrite: alpha >= 0.9998,
     uniforms: {
-      size: { value: size }, isMetres: { value: isMetres ? 1 : 0 }, pixels: { value: 1 }, opacity: { value: alpha }, isRound: { value: isRound ? 1 : 0 },
+      size: { value: size }, isMetres: { value: isMetres ? 1 : 0 }, grows: { value: grows ? 1 : 0 }, pixels: { value: 1 }, opacity: { value: alpha }, isRound: { value: isRound ? 1 : 0 },
       isFlat: { value: colors ? 0 : 1 }, flatColor: { value: new Vector3(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255) } } });
   const found = new Points(geometry, material);
   const viewport = { copy({ w }) { this.height = w; return this; } };

@@ -8,6 +8,7 @@ import { Config, readView, writeView } from "./config.js";
 import { Context } from "./context.js";
 import { Camera } from "./displays/camera.js";
 import { Cloud } from "./displays/cloud.js";
+import { DepthCloud } from "./displays/depth.js";
 import { Axes, Grid, TF } from "./displays/frames.js";
 import { InteractiveMarkers } from "./displays/interactive.js";
 import { MapDisplay } from "./displays/map.js";
@@ -22,7 +23,7 @@ import { TOOLS, Tools } from "./tools.js";
 const DISPLAYS = {
   __proto__: null, // a file may name a class constructor
   Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, InteractiveMarkers, Path, Pose,
-  PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera };
+  PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera, DepthCloud };
 const KEY = "3d"; // of what the browser keeps
 const MOST_AUTOMATIC = 20; // displays that are added without a click
 const LEFT_OUT = /_updates$|^\/rosout/;

@@ -36,17 +36,16 @@ export class Cloud extends TopicDisplay {
     // Of a cloud that is too large every second, third, ... point.
     const stride = Math.max(1, Math.ceil(total / this.context.stage.mostPoints));
     const settings = this.colored(message);
-    const found = message.ranges ? pointsOfScan(message) : message.point_step === undefined ? pointsOfOldCloud(message)
-      : pointsOfCloud(message, wantedChannels(settings), stride);
+    const found = this.pointsOf(message, settings, stride);
     const { frame_id: frame } = message.header;
     const colors = colorsOf(found, settings, this.context.transformNow(frame) ?? IDENTITY);
 
     const isPixels = settings.Style === "Points";
-    const size = isPixels ? this.number("Size (Pixels)", 3) : this.number("Size (m)", 0.01);
+    const { size, grows } = isPixels ? { size: this.number("Size (Pixels)", 3) } : this.sizeOf();
     const paint = { rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1) };
     // Boxes are 36 corners each: of very many a square is drawn.
-    const object = settings.Style === "Boxes" && found.count <= MOST_BOXES ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
-      : points(found.positions, colors, { ...paint, size, isMetres: !isPixels, isRound: settings.Style === "Spheres" });
+    const object = settings.Style === "Boxes" && found.count <= MOST_BOXES && !grows ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
+      : points(found.positions, colors, { ...paint, size, isMetres: !isPixels, grows, isRound: settings.Style === "Spheres" });
     const item = this.addAt(message.header, object);
     item.until = performance.now() + this.number("Decay Time") * 1000;
     this.setStatus("Points", stride > 1 ? 1 : 0, stride > 1
@@ -54,9 +53,23 @@ export class Cloud extends TopicDisplay {
       : t("Showing {count} points from {all}", { count: found.count, all: message.ranges ? message.ranges.length : found.total }));
   }
 
+  pointsOf(message, settings, stride) {
+    if (message.ranges) return pointsOfScan(message);
+    return message.point_step === undefined ? pointsOfOldCloud(message) : pointsOfCloud(message, wantedChannels(settings), stride);
+  }
+
+  namesOf(message) {
+    return message.ranges ? ["intensity"] : (message.fields ?? message.channels).map(({ name }) => name);
+  }
+
+  /** Return the size of a point in metres; `grows`: with its depth, which is its z. */
+  sizeOf() {
+    return { size: this.number("Size (m)", 0.01), grows: false };
+  }
+
   /** Return the settings with a transformer, where none is set that which suits the message's fields. */
   colored(message) {
-    const names = message.ranges ? ["intensity"] : (message.fields ?? message.channels).map(({ name }) => name);
+    const names = this.namesOf(message);
     if (!this.get("Color Transformer")) this.settings["Color Transformer"] = suitableTransformer(names);
     const settings = { ...this.settings };
     const isThere = !(message.ranges && !message.intensities.length) && wantedChannels(settings).some((name) => names.includes(name));
