@@ -173,6 +173,10 @@ def _window(
     return Command(name, make_parser, body)
 
 
+def _top() -> tuple[str, Fields]:
+    return "nodes", {"sort": ["cpu"]}
+
+
 def _rviz_parser() -> Parser:
     parser = _parser("rviz", "Shows robots, sensors and maps in three dimensions, in a browser.")
     parser.add_argument(
@@ -444,6 +448,7 @@ WINDOWS = {
         _window("rqt_runtime_monitor", "diagnostics", "Shows diagnostics"),
         _window("rqt_service_caller", "services", "Calls services by forms"),
         _window("rqt_tf_tree", "tf", "Shows the tree of frames"),
+        _window("rqt_top", "nodes", "Shows CPU and memory of nodes", chosen=_top),
         _window("rqt_topic", "topics", "Shows topics with their values"),
         Command("rviz", _rviz_parser, _rviz),
         _window("smach_viewer", "smach", "Shows state machines"),

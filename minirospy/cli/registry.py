@@ -112,6 +112,7 @@ COMMANDS = (
     Entry("dashboard", "rqt_runtime_monitor", "RQT_RUNTIME_MONITOR", "rqt_runtime_monitor"),
     Entry("dashboard", "rqt_service_caller", "RQT_SERVICE_CALLER", "rqt_service_caller"),
     Entry("dashboard", "rqt_tf_tree", "RQT_TF_TREE", "rqt_tf_tree"),
+    Entry("dashboard", "rqt_top", "RQT_TOP", "rqt_top"),
     Entry("dashboard", "rqt_topic", "RQT_TOPIC", "rqt_topic"),
     Entry("dashboard", "rviz", "RVIZ", "rviz"),
     Entry("dashboard", "smach_viewer", "SMACH_VIEWER", "smach_viewer"),

@@ -24,6 +24,7 @@ from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes
+from minirospy.introspect.processes import ProcessLoads
 from minirospy.introspect.survey import Survey, describe, survey
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -55,6 +56,7 @@ class ToolsDoor(JsonDoor["ToolsSession"]):
         self._reporting: asyncio.Task[None] | None = None
         self._surveyor = ThreadPoolExecutor(1, "tools-survey")
         self._last: Survey | None = None
+        self._processes = ProcessLoads()
 
     async def close(self) -> None:
         """Cancel what still runs."""
@@ -106,7 +108,7 @@ class ToolsDoor(JsonDoor["ToolsSession"]):
 
     def _survey(self) -> Survey:
         with self.graph() as graph:
-            return survey(graph)
+            return survey(graph, self._processes)
 
 
 class ToolsSession(JsonSession):

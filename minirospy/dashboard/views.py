@@ -58,6 +58,7 @@ _PLUGINS = {
     "rqt_service_caller": "services",
     "rqt_reconfigure": "reconfigure",
     "rqt_tf_tree": "tf",
+    "rqt_top": "nodes",
 }
 """rqt's plug-ins -> the view that shows the same."""
 

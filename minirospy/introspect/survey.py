@@ -1,5 +1,7 @@
 """The whole graph as its nodes report it: processes, types, connections, and the traffic between two moments.
 
+Of processes of this machine also what they cost.
+
 What nodes count themselves (getBusStats), so that nobody has to subscribe to measure a topic.
 Source: http://wiki.ros.org/ROS/Slave_API (getBusStats, getBusInfo).
 """
@@ -11,9 +13,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from minirospy.environment import is_own_host
 from minirospy.introspect.doctor.graph import Answers, NodeAnswer, ask_nodes, differing_types, node_trouble
 from minirospy.introspect.doctor.reach import MasterPlace, host_port, look_up
 from minirospy.introspect.graph import Graph
+from minirospy.introspect.processes import ProcessLoad, ProcessLoads
 from minirospy.runtime.rpc.master_proxy import SystemState
 
 __all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
@@ -36,17 +40,18 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """The graph at a moment (seconds of a monotonic clock). ``counts``: by process, connection and edge."""
+    """The graph at a moment (seconds of a monotonic clock). ``counts``: by process, connection and edge; ``loads``: by node."""
 
     seconds: float
     state: SystemState
     answers: Answers
     place: MasterPlace
     counts: Mapping[tuple[int, object, Edge], Counts] = field(default_factory=dict)
+    loads: Mapping[str, ProcessLoad] = field(default_factory=dict)
 
 
-def survey(graph: Graph) -> Survey:
-    """Query the master and all nodes, side by side. Raise MasterUnreachableError."""
+def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
+    """Query the master and all nodes, side by side; with ``processes`` their loads, too. Raise MasterUnreachableError."""
     state = graph.state()
     answers = ask_nodes(graph, state, with_stats=True)
     host, port = host_port(graph.master.uri)
@@ -57,7 +62,9 @@ def survey(graph: Graph) -> Survey:
     counts: dict[tuple[int, object, Edge], Counts] = {}
     for answer in answers.values():
         counts.update(_counts(answer))
-    return Survey(time.monotonic(), state, answers, place, counts)
+    return Survey(
+        time.monotonic(), state, answers, place, counts, _loads(answers, processes) if processes else {}
+    )
 
 
 def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
@@ -86,6 +93,7 @@ def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
         "nodes": [
             {
                 **_described(answer, now.place),
+                **(now.loads[name]._asdict() if name in now.loads else {}),
                 "publishes": _topics(now.state.publishers, answer, answer.publications),
                 "subscribes": _topics(now.state.subscribers, answer, answer.subscriptions),
                 "services": sorted(held.get(name, ())),
@@ -115,6 +123,18 @@ def _described(answer: NodeAnswer, place: MasterPlace) -> dict[str, object]:
             for link in answer.links
         ],
     }
+
+
+def _loads(answers: Answers, processes: ProcessLoads) -> dict[str, ProcessLoad]:
+    hosts = {host_port(answer.node.uri or "")[0] for answer in answers.values() if answer.pid}
+    own = {host for host in hosts if is_own_host(host)}
+    pids = {
+        name: answer.pid
+        for name, answer in answers.items()
+        if answer.pid and host_port(answer.node.uri or "")[0] in own
+    }
+    found = processes.look(pids.values())
+    return {name: found[pid] for name, pid in pids.items() if pid in found}
 
 
 def _topics(

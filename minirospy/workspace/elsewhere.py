@@ -150,7 +150,6 @@ _QT_PLUGINS = (
     "rqt_py_console",
     "rqt_shell",
     "rqt_srv",
-    "rqt_top",
     "rqt_web",
 )
 _QT_LIBRARIES = (

@@ -22,6 +22,7 @@ from minirospy.dashboard.tools_door import SUBPROTOCOL
 
 if TYPE_CHECKING:
     from minirospy.introspect.graph import Graph
+    from minirospy.introspect.processes import ProcessLoads
     from minirospy.introspect.survey import Survey
     from tests.dashboard.conftest import Served
 
@@ -212,11 +213,11 @@ def test_survey_that_fails_is_reported_and_repeated(
     survey = tools_door.survey
     failed = threading.Event()
 
-    def fail_once(graph: Any) -> Any:
+    def fail_once(graph: Any, processes: Any) -> Any:
         if not failed.is_set():
             failed.set()
             raise OSError("no more files")
-        return survey(graph)
+        return survey(graph, processes)
 
     monkeypatch.setattr(tools_door, "survey", fail_once)
     monkeypatch.setattr(tools_door, "_REPORT_SECONDS", 0.05)
@@ -233,14 +234,14 @@ def test_surveys_do_not_pile_up_where_watching_is_switched_on_and_off(
     lock, go_on = threading.Lock(), threading.Event()
     survey = tools_door.survey
 
-    def slow(graph: Any) -> Any:
+    def slow(graph: Any, processes: Any) -> Any:
         with lock:
             running[0] += 1
             most[0] = max(most[0], running[0])
         go_on.wait(60)
         with lock:
             running[0] -= 1
-        return survey(graph)
+        return survey(graph, processes)
 
     monkeypatch.setattr(tools_door, "survey", slow)
     with Tools(serve()) as tools:
@@ -261,10 +262,10 @@ def test_request_that_fails_is_answered_and_reports_go_on(
     faults = iter([ZeroDivisionError])
     survey = tools_door.survey
 
-    def failing(graph: Graph) -> Survey:
+    def failing(graph: Graph, processes: ProcessLoads) -> Survey:
         for fault in faults:
             raise fault
-        return survey(graph)
+        return survey(graph, processes)
 
     def ping(*_: object) -> float:
         raise ZeroDivisionError

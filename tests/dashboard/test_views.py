@@ -65,6 +65,7 @@ def test_word_that_is_not_a_path_is_refused(word: str) -> None:
 def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
     assert view_of_plugin("topics") == "topics"
     assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
+    assert view_of_plugin("rqt_top") == view_of_plugin("rqt_top/Top") == "nodes"
     assert view_of_plugin("rqt_robot_steering") == "teleop"
     assert view_of_plugin("rqt_robot_monitor") == view_of_plugin("rqt_runtime_monitor") == "diagnostics"
     with pytest.raises(

@@ -60,6 +60,38 @@ def test_nodes_of_each_kind_are_shown_pinged_and_killed(
 
 
 @needs_chromium
+def test_nodes_are_sorted_by_what_they_cost(
+    serve: Callable[..., Served],
+    peer: Callable[[str, str, str], subprocess.Popen[str]],
+    browse: Callable[..., Page],
+) -> None:
+    served = serve()
+    program = peer("rospy", "talk", os.environ["ROS_MASTER_URI"])
+    served.node("mine")
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        master.registerPublisher("/a_dead_one", "/nothing", "std_msgs/String", "http://127.0.0.1:1/")
+    page = browse(address(served, "nodes?sort=memory"))
+    pids = [os.getpid(), program.pid]
+    # CPU is what was used between two reports.
+    page.wait(
+        "const rows = [...document.querySelectorAll('tr[data-node]')];"
+        f"return {pids}.every(pid => rows.some(({{children: c}}) => c[2].textContent === String(pid)"
+        " && /^[0-9.]+ %$/.test(c[3].textContent) && /^[0-9.]+ MB$/.test(c[4].textContent)))"
+    )
+    for column, title in ((4, "Memory"), (3, "CPU")):
+        page.click("th button", title)
+        page.wait(f"return document.querySelector('th:nth-child({column + 1})').ariaSort === 'descending'")
+        values = page.evaluate(
+            f"[...document.querySelectorAll('tr[data-node]')].map(e => parseFloat(e.children[{column}].textContent) || 0)"
+        )
+        assert values == sorted(values, reverse=True)
+        assert values[-1] == 0, "what is not known of a node that does not answer is last"
+        assert f"sort={title.lower()}" in page.evaluate("location.hash")
+    page.click("th button", "Node")
+    page.wait("return document.querySelector('tr[data-node]').dataset.node === '/a_dead_one'")
+
+
+@needs_chromium
 def test_dead_nodes_are_marked_and_cleaned_up(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:

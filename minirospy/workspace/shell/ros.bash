@@ -307,7 +307,7 @@ _ros_commands() {
         catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
         catkin_topological_order rqt rqt_bag rqt_console rqt_graph rqt_image_view rqt_launch rqt_logger_level rqt_plot \
         rqt_publisher rqt_reconfigure rqt_robot_monitor rqt_robot_steering rqt_runtime_monitor \
-        rqt_service_caller rqt_tf_tree rqt_topic rviz smach_viewer minirospy
+        rqt_service_caller rqt_tf_tree rqt_top rqt_topic rviz smach_viewer minirospy
 }
 
 if [ -n "${ZSH_VERSION:-}" ]; then

@@ -133,7 +133,7 @@ export const GERMAN = {
   "enum of ": "Auswahl aus ", "default {value}": "Standard {value}", "Slider of {name}": "Regler von {name}",
   // nodes
   "Filter nodes and hosts": "Nodes und Rechner filtern", "Clean up …": "Aufräumen …", "Clean up": "Aufräumen", "Confirm": "Bestätigen", "Host": "Rechner",
-  "Process": "Prozess", "Answers in": "Antwortet in", "{count} node": "{count} Node", "{count} nodes": "{count} Nodes",
+  "Process": "Prozess", "CPU": "CPU", "Memory": "Speicher", "{count} thread": "{count} Thread", "{count} threads": "{count} Threads", "sort": "sortieren", "Answers in": "Antwortet in", "{count} node": "{count} Node", "{count} nodes": "{count} Nodes",
   ", {count} without an answer": ", {count} ohne Antwort", "looking …": "sucht …", "no answer": "keine Antwort", "{out} out, {in} in": "{out} raus, {in} rein",
   "Kill …": "Beenden …", "Kill": "Beenden", "Keep": "Behalten", "It does not answer: {trouble}.": "Er antwortet nicht: {trouble}.", "host": "Rechner", "process": "Prozess",
   "address": "Adresse", "Ping": "Ping", "this page": "diese Seite", "read-only": "nur lesen", "Connections": "Verbindungen",

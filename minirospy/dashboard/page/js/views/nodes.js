@@ -3,11 +3,15 @@
 import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
+const COLUMNS = ["Node", "Host", "Process", "CPU", "Memory", "Answers in", "Topics", "Services"];
+const SORTED = { __proto__: null, Node: "", CPU: "cpu", Memory: "memory" }; // by these columns: the setting's value
+
 export class Nodes {
   constructor(link, words, main, place) {
     this.link = link;
     this.place = place;
     this.chosen = words.get("node");
+    this.sort = words.get("sort") ?? "";
     this.nodes = new Map();
     this.rows = new Map();
     this.pings = new Map(); // name -> text of the last ping
@@ -17,7 +21,8 @@ export class Nodes {
     this.question = h("div", { class: "panel details question", hidden: true, role: "alertdialog", "aria-label": "Confirm" });
     this.result = h("p", { class: "note", role: "status" });
     this.body = h("tbody", {});
-    this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, ["Node", "Host", "Process", "Answers in", "Topics", "Services"].map((each) => h("th", { scope: "col" }, t(each))))), this.body);
+    this.heads = COLUMNS.map((each) => h("th", { scope: "col" }, each in SORTED ? h("button", { type: "button", class: "link", title: "sort", onclick: () => this.sortBy(SORTED[each]) }, t(each)) : t(each)));
+    this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, this.heads)), this.body);
     this.side = h("aside", { class: "panel details side wide", hidden: true });
     this.empty = h("p", { class: "empty" });
     main.append(h("div", { class: "bar" }, this.filter, this.count, this.cleanButton), this.result, this.question,
@@ -50,7 +55,15 @@ export class Nodes {
       this.rows.delete(name);
     }
     let before = null;
-    for (const [name, node] of this.nodes) {
+    COLUMNS.forEach((each, index) => {
+      if (SORTED[each] === this.sort) this.heads[index].setAttribute("aria-sort", this.sort ? "descending" : "ascending");
+      else this.heads[index].removeAttribute("aria-sort");
+    });
+    const { sort } = this;
+    const shown = [...this.nodes];
+    // Those of other machines last.
+    if (sort) shown.sort(([, one], [, other]) => (other[sort] ?? -1) - (one[sort] ?? -1));
+    for (const [name, node] of shown) {
       const row = this.rows.get(name) ?? this.makeRow(name);
       this.showRow(row, node);
       row.hidden = !`${name} ${node.host}`.toLowerCase().includes(words);
@@ -66,21 +79,34 @@ export class Nodes {
     setText(this.empty, this.nodes.size || this.link.state !== "open" ? "" : t("looking …"));
   }
 
+  remember() {
+    this.place.remember({ node: this.chosen, sort: this.sort });
+  }
+
+  sortBy(sort) {
+    this.sort = sort;
+    this.remember();
+    this.showList();
+  }
+
   get mayChange() {
     return this.link.state === "open" && this.link.mayWrite;
   }
 
   makeRow(name) {
-    const row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.choose(name) }, name)), [1, 2, 3, 4, 5].map(() => h("td", {})));
+    const row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.choose(name) }, name)), COLUMNS.slice(1).map(() => h("td", {})));
     row.dataset.node = name;
     this.rows.set(name, row);
     return row;
   }
 
   showRow(row, node) {
-    const [, host, pid, answer, topics, services] = row.children;
+    const [, host, pid, cpu, memory, answer, topics, services] = row.children;
     setText(host, node.host);
     setText(pid, node.pid ? String(node.pid) : "");
+    setText(cpu, Number.isFinite(node.cpu) ? `${node.cpu.toFixed(1)} %` : "");
+    setText(memory, node.memory ? `${(node.memory / 1e6).toFixed(1)} MB` : "");
+    memory.title = node.threads ? t(node.threads === 1 ? "{count} thread" : "{count} threads", { count: node.threads }) : "";
     setText(answer, node.trouble ? t("no answer") : `${node.milliseconds.toFixed(1)} ms`);
     setText(topics, t("{out} out, {in} in", { out: node.publishes.length, in: node.subscribes.length }));
     setText(services, String(node.services.length));
@@ -91,7 +117,7 @@ export class Nodes {
   choose(name) {
     this.chosen = this.chosen === name ? null : name;
     this.shown = null;
-    this.place.remember({ node: this.chosen });
+    this.remember();
     this.showList();
     this.showSide();
   }
@@ -100,7 +126,7 @@ export class Nodes {
     const node = this.nodes.get(this.chosen);
     this.side.hidden = !node;
     if (!node) return;
-    const content = JSON.stringify([{ ...node, milliseconds: 0 }, this.mayChange]);
+    const content = JSON.stringify([{ ...node, milliseconds: 0, cpu: 0, memory: 0, threads: 0 }, this.mayChange]);
     if (content === this.shown) return;
     this.shown = content;
     const topics = (title, list) => part(title, list.map(([topic, type]) => h("li", {}, h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic), " ", h("span", { class: "muted" }, type))));
