@@ -14,6 +14,7 @@ from geometry_msgs.msg import Vector3
 from minirospy.dashboard.files import FOLDER
 from tests.dashboard.conftest import Served
 from tests.interop.browser import PATIENCE, Page
+from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import (
     address,
     browse,
@@ -88,6 +89,63 @@ def test_series_over_another_takes_its_newest_value_of_the_moment() -> None:
         [0, 1],
         [1.8, 2.2],
     ]
+
+
+def selected(path: str) -> dict[str, float]:
+    """Return what a path leads to in a message with markers, by labels; of the error its text."""
+    body = f"""
+      const markers = [["goal", 1, 0.5], ["goal", 2, 1.5], ["base", 2, 2.5]].map(([ns, id, x], index) => (
+        {{ ns, id, on: index > 0, stamp: {{ secs: index, nsecs: 0 }}, pose: {{ x }} }}));
+      const found = {{}};
+      try {{
+        select({{ markers }}, parseSteps({path!r}), (label, number) => {{ found[label] = number; }});
+      }} catch (error) {{ return {{ [error.message]: 0 }}; }}
+      return found;"""
+    answer: dict[str, float] = run_script("parseSteps, select", "js/paths.js", body)
+    return answer
+
+
+@needs_node
+def test_filters_of_a_path_choose_elements() -> None:
+    assert selected("/markers[:]{id==2}/pose/x") == {"/markers[:]{id==2}/pose/x": 2.5}
+    both = '/markers[:]{ns=="goal"}{id >= 2}/pose/x'
+    assert selected(both) == {both: 1.5}
+    assert list(selected("/markers[:]{ns=='base'}.pose.x").values()) == [2.5]
+    assert list(selected("/markers[0]{on==false}/id").values()) == [1]
+    assert list(selected("/markers[1]{pose.x>1}{pose/x<2}{stamp==1}/id").values()) == [2]
+    assert list(selected("/markers[2:]{ns!=goal}/id").values()) == [2]
+    assert selected("/markers[:]{missing==1}/id") == selected("/markers[:]{ns<5}/id") == {}
+    assert list(selected("/markers[:]{id=2}/id")) == [
+        '"{id=2}/id" is not a field, nor an index, nor a filter as {id==1}'
+    ]
+
+
+@needs_node
+def test_topic_of_a_filtered_path_is_found() -> None:
+    body = "return [topicOf('/a{on==true}/x', ['/a', '/a/b']), topicOf('/a/b[:]{id==1}/x', ['/a', '/a/b'])];"
+    assert run_script("topicOf", "js/paths.js", body) == ["/a", "/a/b"]
+
+
+@needs_chromium
+def test_field_is_dragged_from_the_topics_to_a_plot(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/path", Vector3, latch=True, queue_size=None).publish(8.0, 5.0, 0.0))
+    page = browse(address(served, "layout?tree=row(topics?open=%252Fpath,plot)"), width=1400)
+    page.wait_text("a.plot[title='Plot /path/y']", "plot")
+    page.wait_text(".pane .chart", "or drag the field here")
+    page.evaluate("""
+      (() => {
+        const dataTransfer = new DataTransfer();
+        const send = (element, kind) =>
+          element.dispatchEvent(new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
+        send(document.querySelector("a.plot[title='Plot /path/y']").closest("[draggable=true]"), "dragstart");
+        const place = document.querySelector(".chart");
+        if (send(place, "dragover")) throw new Error("the plot takes nothing");
+        send(place, "drop");
+      })()""")
+    page.wait_text(".series[data-label='/path/y'] .num", "5")
 
 
 @needs_chromium

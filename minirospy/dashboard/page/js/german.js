@@ -44,7 +44,7 @@ export const GERMAN = {
   "what a node logs, from this level on": "was ein Node meldet, ab dieser Stufe", "regex": "regulärer Ausdruck", "exclude": "ausschließen",
   // plot
   "What to plot": "Was gezeichnet wird", "Time shown": "Gezeigte Zeit", "5 s": "5 s", "10 s": "10 s", "30 s": "30 s", "1 min": "1 min", "5 min": "5 min", "Follow": "Folgen",
-  "Type a path above, or choose “plot” next to a field in Topics.": "Oben einen Pfad eingeben, oder in Topics neben einem Feld „Kurve“ wählen.", "Series": "Kurven", "Show or hide": "Zeigen oder verbergen",
+  "Type a path above, choose “plot” next to a field in Topics, or drag the field here.": "Oben einen Pfad eingeben, in Topics neben einem Feld „Kurve“ wählen oder das Feld hierher ziehen.", "Series": "Kurven", "Show or hide": "Zeigen oder verbergen",
   "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow": "ziehen: zoomen · Rad: zoomen · Umschalt und Rad: schieben · Doppelklick: folgen",
   "Move to the other axis": "Auf die andere Achse", "left axis": "linke Achse", "right axis": "rechte Achse",
   "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",

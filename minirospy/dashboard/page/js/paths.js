@@ -1,33 +1,53 @@
-// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]". Pure.
+// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the elements with
+// a value: "/markers/markers[:]{ns=='goal'}{id>=2}/pose/position/x". Pure.
 
 import { isNumeric } from "./ros1.js";
 
 const MOST_VALUES = 50; // of one path, as of a whole array
+const MOST_TESTED = 10_000; // elements
+
+const TESTS = {
+  "==": (one, other) => one === other, "!=": (one, other) => one !== other, "<": (one, other) => one < other,
+  "<=": (one, other) => one <= other, ">": (one, other) => one > other, ">=": (one, other) => one >= other };
 
 /** Return the topic of a path among those that are known, the longest that fits; null where none does. */
 export function topicOf(path, topics) {
   let found = null;
   for (const topic of topics) {
     const next = path[topic.length];
-    const fits = path.startsWith(topic) && (next === undefined || "/.[".includes(next));
+    const fits = path.startsWith(topic) && (next === undefined || "/.[{".includes(next));
     if (fits && (found === null || topic.length > found.length)) found = topic;
   }
   return found;
 }
 
-/** Return the steps of a path behind its topic: names, numbers, {from, to}. Throws Error. */
+/** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws Error. */
 export function parseSteps(text) {
   const steps = [];
   let rest = text;
   while (rest) {
-    const match = /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]/.exec(rest);
-    if (!match) throw new Error(`"${rest}" is not a field, nor an index`);
+    const match = /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(rest);
+    if (!match) throw new Error(`"${rest}" is not a field, nor an index, nor a filter as {id==1}`);
     if (match[1] !== undefined) steps.push(match[1]);
     else if (match[2] !== undefined) steps.push(Number(match[2]));
+    else if (match[5] !== undefined) steps.push({ test: testOf(match), text: match[0] });
     else steps.push({ from: match[3] ? Number(match[3]) : 0, to: match[4] ? Number(match[4]) : Infinity });
     rest = rest.slice(match[0].length);
   }
   return steps;
+}
+
+function testOf([, , , , , path, operator, ...texts]) {
+  const names = path.split(/[./]/);
+  const text = texts.find((each) => each !== undefined).trim();
+  const wanted = texts[2] === undefined ? text : { true: 1, false: 0 }[text] ?? (text !== "" && Number.isFinite(Number(text)) ? Number(text) : text);
+  return (value) => {
+    const found = names.reduce((each, name) => (each !== null && typeof each === "object" && Object.hasOwn(each, name) ? each[name] : undefined), value);
+    if (found === undefined) return false;
+    if (typeof wanted !== "number") return TESTS[operator](String(found), wanted);
+    const number = numberOf(found);
+    return number === null ? operator === "!=" : TESTS[operator](number, wanted);
+  };
 }
 
 /** Call found(label, number) for each number that the steps lead to. */
@@ -41,14 +61,18 @@ export function select(value, steps, found, label = "", depth = 0) {
     if (value !== null && typeof value === "object" && Object.hasOwn(value, step)) {
       select(value[step], steps, found, `${label}/${step}`, depth + 1);
     }
+  } else if (step.test) {
+    if (step.test(value)) select(value, steps, found, label + step.text, depth + 1);
   } else if (value?.length === undefined || typeof value === "string") {
     return;
   } else if (typeof step === "number") {
     const index = step < 0 ? value.length + step : step;
     if (index in value) select(value[index], steps, found, `${label}[${step}]`, depth + 1);
   } else {
-    const end = Math.min(step.to, value.length, step.from + MOST_VALUES);
-    for (let index = step.from; index < end; index++) select(value[index], steps, found, `${label}[${index}]`, depth + 1);
+    // What a filter finds is one series, wherever it is in the array.
+    const isFiltered = Boolean(steps[depth + 1]?.test);
+    const end = Math.min(step.to, value.length, step.from + (isFiltered ? MOST_TESTED : MOST_VALUES));
+    for (let index = step.from; index < end; index++) select(value[index], steps, found, `${label}[${isFiltered ? ":" : index}]`, depth + 1);
   }
 }
 

@@ -41,7 +41,7 @@ export class Plot {
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
       this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"), this.problem);
     this.area = h("div", { class: "panel chart" });
-    this.hint = h("p", { class: "empty" }, "Type a path above, or choose “plot” next to a field in Topics.");
+    this.hint = h("p", { class: "empty" }, "Type a path above, choose “plot” next to a field in Topics, or drag the field here.");
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
     main.append(this.form,
       h("div", { class: "bar" }, this.pauseButton, this.window, h("label", {}, "x axis", this.axis), this.liveButton,
@@ -51,6 +51,10 @@ export class Plot {
         h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow"))),
       this.area, this.legend);
     this.area.append(this.hint);
+    for (const element of [this.area, this.form, this.legend]) {
+      element.addEventListener("dragover", (event) => { if (event.dataTransfer.types.includes("text/plain")) event.preventDefault(); });
+      element.addEventListener("drop", (event) => this.dropped(event));
+    }
     this.pause(this.isPaused);
     this.showAxis();
 
@@ -80,6 +84,13 @@ export class Plot {
     }
     this.known.replaceChildren(...paths.map((value) => h("option", { value })));
     this.showProblems();
+  }
+
+  /** Take over a field that was dragged here from the topics. */
+  dropped(event) {
+    const path = event.dataTransfer.getData("text/plain").trim();
+    event.preventDefault();
+    if (path.startsWith("/")) this.add(path);
   }
 
   addTyped() {

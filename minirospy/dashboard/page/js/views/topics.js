@@ -218,7 +218,7 @@ class Field {
     this.value = h("span", { class: "value" });
     this.plot = h("a", { class: "plot", href: `#/plot?path=${encodeURIComponent(path)}`, title: t("Plot {path}", { path }), hidden: true }, t("plot"));
     this.head = h("button", { type: "button", class: "field", disabled: true, onclick: () => this.toggle() }, h("span", { class: "key" }, label));
-    this.element = h("li", {}, this.head, this.value, this.plot);
+    this.element = h("li", { ondragstart: (event) => this.drag(event) }, this.head, this.value, this.plot);
     this.tree = null;
     this.isOpen = null;
   }
@@ -229,6 +229,7 @@ class Field {
     if (!isNested) {
       setText(this.value, shown(numberOf(value) !== null && typeof value === "object" ? numberOf(value) : value, 2000));
       this.plot.hidden = numberOf(value) === null;
+      this.element.draggable = !this.plot.hidden;
       return;
     }
     // Messages start open, arrays closed.
@@ -244,6 +245,12 @@ class Field {
       this.tree.show(value);
     }
     if (this.tree) this.tree.element.hidden = !this.isOpen;
+  }
+
+  /** Let a plot have the field: of another pane, or another window. */
+  drag(event) {
+    event.stopPropagation();
+    event.dataTransfer.setData("text/plain", this.path);
   }
 
   toggle() {
