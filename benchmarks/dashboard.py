@@ -3,8 +3,8 @@
 page: a layout in headless chromium with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and the
 topics with the scan open; frames a second by requestAnimationFrame. clients: ten programs that speak what the page speaks, on
 50 topics in fast motion: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
-soak: ten such clients and two pages in chromium, on 50 topics, a scan, and frames that move, each in fast motion: the default
-of 100 Hz for 360 s is an hour of 10 Hz; memory of the server and of the pages at the start, in the middle, at the end.
+soak: ten such clients and two pages in chromium, on 50 topics, a scan, and frames that move, all in fast motion: at 100 Hz, until
+each client has had the messages that an hour has at 10 Hz; memory of the server, the clients and the pages over the run.
 CPU is that of a process, in percent of one core.
 """
 
@@ -250,8 +250,8 @@ def measure_clients(seconds: float, rate: float) -> None:
     )
 
 
-def measure_soak(seconds: float, rate: float) -> None:
-    """Print memory over a long run with ten clients and two pages."""
+def measure_soak(hours: float, rate: float) -> None:
+    """Print memory over a long run with ten clients and two pages; ``hours`` of 50 topics at 10 Hz."""
     from tests.interop.browser import Page
 
     opened = "&".join(f"open=%2Fmany%2Ft{index}" for index in range(50))
@@ -278,9 +278,14 @@ def measure_soak(seconds: float, rate: float) -> None:
 
         spent, started = cpu(server), time.monotonic()
         counts = [(each.messages, each.bytes) for each in clients]
+        wanted = hours * 50 * 10 * 3600
         print("soak: seconds  server  clients  page 1: heap, processes  page 2: heap, processes  (MB)")
         for step in range(13):
-            time.sleep(max(0.0, started + seconds * step / 12 - time.monotonic()))
+            while (
+                min(each.messages - count for each, (count, _) in zip(clients, counts, strict=True))
+                < wanted * step / 12
+            ):
+                time.sleep(0.2)
             row = [memory_of(server), memory_of(psutil.Process())]
             for page in pages:
                 row += [page.evaluate(HEAP) / 1e6, sum(memory_of(each) for each in page.processes())]
@@ -310,15 +315,16 @@ def main() -> None:
     """Measure what the words name, by default all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients", "soak"])
-    parser.add_argument("--seconds", type=float, help="of the measurement: 10, of the soak 360")
+    parser.add_argument("--seconds", type=float, default=10.0, help="of the measurement")
+    parser.add_argument("--hours", type=float, default=1.0, help="of the soak, in slow motion")
     parser.add_argument("--rate", type=float, default=100.0, help="of each of the 50 topics, in Hz")
     words = parser.parse_args()
     if "page" in words.what:
-        measure_page(words.seconds or 10.0)
+        measure_page(words.seconds)
     if "clients" in words.what:
-        measure_clients(words.seconds or 10.0, words.rate)
+        measure_clients(words.seconds, words.rate)
     if "soak" in words.what:
-        measure_soak(words.seconds or 360.0, words.rate)
+        measure_soak(words.hours, words.rate)
 
 
 if __name__ == "__main__":
