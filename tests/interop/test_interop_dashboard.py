@@ -27,6 +27,7 @@ from std_msgs.msg import String
 from minirospy.dashboard.views import VIEWS
 from tests.dashboard.conftest import TOKEN, Served, serve
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
+from tests.interop.page_modules import run_script
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.robots.conftest import start
 
@@ -302,6 +303,64 @@ def test_console_holds_many_lines_with_few_elements(
     page.wait_text(".line .text", "the first")
     page.click("button", "Latest")
     page.wait_text(".line .text", "line 19999")
+
+
+@needs_node
+def test_log_files_of_each_kind_are_read() -> None:
+    text = """1795414410.408634901  Node Startup
+1795414411.500000000 INFO /talker [talker.py:10(main)] [topics: /rosout, /chat] hello [x] (y)
+1795414412.250000000 WARN /talker [:0()] two
+  lines
+[rospy.client][INFO] 2026-11-23 06:46:25,120: init_node
+[rosout][CRITICAL] 2026-11-23 06:46:25,121: no memory
+\x1b[33m[ WARN] [1795414413.100000]: printed\x1b[0m
+[ERROR] [1795414413.200000, 12.500000]: of a simulation
+"""
+    body = f"return linesOf({json.dumps(text)}, 'a.log').map(({{stamp: _, ...rest}}) => Object.values(rest));"
+    assert run_script("linesOf", "js/logs.js", body) == [
+        [2, "a.log", "1795414410.408634901  Node Startup", "a.log", 0, ""],
+        [2, "/talker", "hello [x] (y)", "talker.py", 10, "main"],
+        [4, "/talker", "two\n  lines", "", 0, ""],
+        [2, "rospy.client", "init_node", "a.log", 0, ""],
+        [16, "rosout", "no memory", "a.log", 0, ""],
+        [4, "a.log", "printed", "a.log", 0, ""],
+        [8, "a.log", "of a simulation", "a.log", 0, ""],
+    ]
+    body = f"return linesOf({json.dumps(text)}, 'a.log').map(each => each.stamp);"
+    stamps = run_script("linesOf", "js/logs.js", body)
+    assert stamps[1:3] + stamps[5:] == [1795414411.5, 1795414412.25, 1795414413.1, 1795414413.2]
+    assert run_script("linesOf", "js/logs.js", "return linesOf('\\n\\n', 'a.log');") == []
+
+
+@needs_chromium
+def test_console_opens_a_log_file_and_marks_lines(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    page = browse(address(served, "console"))
+    page.wait_text("button", "Open log")
+    text = "".join(
+        f"1795414411.{number:09d} INFO /talker [talker.py:10(main)] [topics: ] line {number} {HOSTILE}\n"
+        for number in range(30)
+    )
+    page.evaluate(
+        f"(() => {{ const data = new DataTransfer(); data.items.add(new File([{json.dumps(text)}], 'rosout.log'));"
+        "const field = document.querySelector('input[type=file]'); field.files = data.files;"
+        "field.dispatchEvent(new Event('change')); })()"
+    )
+    page.wait_text(".bar", "30 of 30 lines")
+    page.wait_text(".line .text", f"line 29 {HOSTILE}")
+    page.click("label", "highlight")
+    page.type("input[type=search]", "line 29")
+    page.wait(
+        "const marked = [...document.querySelectorAll('.line.marked:not([hidden])')];"
+        "return marked.length === 1 && marked[0].textContent.includes('line 29')"
+    )
+    page.wait_text(".bar", "30 of 30 lines")
+    assert "mark=1" in page.evaluate("location.hash")
+    page.click("label", "highlight")
+    page.wait_text(".bar", "1 of 30 lines")
+    page.wait("return !document.querySelector('.line.marked:not([hidden])')")
 
 
 @needs_chromium

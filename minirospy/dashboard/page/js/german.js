@@ -132,6 +132,8 @@ export const GERMAN = {
   "{count} values of {name}": "{count} Werte aus {name}", "; not known here: {names}": "; hier nicht bekannt: {names}", " from {min} to {max},": " von {min} bis {max},",
   "enum of ": "Auswahl aus ", "default {value}": "Standard {value}", "Slider of {name}": "Regler von {name}",
   // nodes
+  "highlight": "hervorheben", "Show all lines, and mark those that fit": "Alle Zeilen zeigen und die passenden hervorheben", "Open log": "Logdatei öffnen", "Log file": "Logdatei",
+  "rosout.log, or a node's log of ~/.ros/log": "rosout.log oder das Log eines Nodes aus ~/.ros/log", "{name} is larger than {size} MB": "{name} ist größer als {size} MB", "{name} has no lines": "{name} hat keine Zeilen",
   "Filter nodes and hosts": "Nodes und Rechner filtern", "Clean up …": "Aufräumen …", "Clean up": "Aufräumen", "Confirm": "Bestätigen", "Host": "Rechner",
   "Process": "Prozess", "CPU": "CPU", "Memory": "Speicher", "{count} thread": "{count} Thread", "{count} threads": "{count} Threads", "sort": "sortieren", "Answers in": "Antwortet in", "{count} node": "{count} Node", "{count} nodes": "{count} Nodes",
   ", {count} without an answer": ", {count} ohne Antwort", "looking …": "sucht …", "no answer": "keine Antwort", "{out} out, {in} in": "{out} raus, {in} rein",

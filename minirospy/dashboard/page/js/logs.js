@@ -9,6 +9,28 @@ export function lineOf({ message, seconds }) {
   return { stamp, level: message.level, node: message.name, text: message.msg, file: message.file, line: message.line, function: message.function };
 }
 
+// As rosout.log has a line, a node's own log, and what a node prints.
+const HEADS = [
+  /^(?<stamp>\d+\.\d+) (?<level>DEBUG|INFO|WARN|ERROR|FATAL) +(?<node>\S+) \[(?<file>[^\]]*?):(?<line>\d+)\((?<function>[^)]*)\)\](?: \[topics: [^\]]*\])? ?(?<text>.*)$/,
+  /^\[(?<node>[\w.]+)\]\[(?<level>DEBUG|INFO|WARNING|ERROR|CRITICAL)\] (?<day>\d{4}-\d\d-\d\d) (?<time>\d\d:\d\d:\d\d),(?<part>\d{3}): ?(?<text>.*)$/,
+  /^\[ ?(?<level>DEBUG|INFO|WARN|ERROR|FATAL)\] \[(?<stamp>\d+\.\d+)(?:, \d+\.\d+)?\]: ?(?<text>.*)$/];
+const WORDS = { DEBUG: 1, INFO: 2, WARN: 4, WARNING: 4, ERROR: 8, CRITICAL: 16, FATAL: 16 };
+
+/** Return the lines of a log file; what follows a line without a head of its own belongs to it. `name` is for those that name no node. */
+export function linesOf(text, name) {
+  const found = [];
+  for (const row of text.replace(/\x1b\[[\d;]*m/g, "").split(/\r?\n/)) {
+    const { groups: head } = HEADS.map((each) => each.exec(row)).find(Boolean) ?? {};
+    if (head) {
+      const stamp = head.stamp ? Number(head.stamp) : new Date(`${head.day}T${head.time}.${head.part}`).getTime() / 1000;
+      found.push({ stamp, level: WORDS[head.level], node: head.node ?? name, text: head.text, file: head.file ?? name, line: Number(head.line ?? 0), function: head.function ?? "" });
+    } else if (found.length) found.at(-1).text += `\n${row}`;
+    else if (row.trim()) found.push({ stamp: 0, level: 2, node: name, text: row, file: name, line: 0, function: "" });
+  }
+  for (const line of found) line.text = line.text.trimEnd();
+  return found;
+}
+
 /** Return a function that says whether a line passes. Throws SyntaxError on a bad regular expression. */
 export function filterOf({ levels, node, text, isRegex, isExcluded }) {
   const words = text.toLowerCase();

@@ -1,11 +1,12 @@
 // The log lines of all nodes (/rosout_agg): filters, search, pause, copy, export, and the levels of loggers.
 
 import { download, fill, h, setText } from "../dom.js";
-import { LEVELS, NAMES, csv, filterOf, lineOf, plainText, timeText } from "../logs.js";
+import { LEVELS, NAMES, csv, filterOf, lineOf, linesOf, plainText, timeText } from "../logs.js";
 import { VirtualList } from "../virtual_list.js";
 import { t } from "../texts.js";
 
 const MOST_LINES = 50_000;
+const MOST_BYTES = 100_000_000; // of a log file
 const ROW = 26; // pixels, as .line in style.css
 
 // The lines outlive the view: they are collected from the first visit on.
@@ -17,20 +18,23 @@ let removed = 0;
 
 function collect(link) {
   end ??= link.subscribe({ topic: "/rosout_agg", mode: "all" }, (item) => {
-    for (const each of item.lines ?? []) {
-      const line = lineOf(each);
-      line.number = removed + lines.length;
-      lines.push(line);
-      counts.set(line.level, (counts.get(line.level) ?? 0) + 1);
-    }
-    let cut = 0;
-    if (lines.length > MOST_LINES) {
-      cut = lines.length - MOST_LINES + MOST_LINES / 10;
-      lines.splice(0, cut);
-      removed += cut;
-    }
-    for (const listener of listeners) listener(cut);
+    append((item.lines ?? []).map(lineOf));
   });
+}
+
+function append(added) {
+  for (const line of added) {
+    line.number = removed + lines.length;
+    lines.push(line);
+    counts.set(line.level, (counts.get(line.level) ?? 0) + 1);
+  }
+  let cut = 0;
+  if (lines.length > MOST_LINES) {
+    cut = lines.length - MOST_LINES + MOST_LINES / 10;
+    lines.splice(0, cut);
+    removed += cut;
+  }
+  for (const listener of listeners) listener(cut);
 }
 
 export class Console {
@@ -51,6 +55,8 @@ export class Console {
     this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.change() });
     this.isRegex = h("input", { type: "checkbox", checked: words.get("regex") === "1", onchange: () => this.change() });
     this.isExcluded = h("input", { type: "checkbox", checked: words.get("exclude") === "1", onchange: () => this.change() });
+    this.isMarked = h("input", { type: "checkbox", checked: words.get("mark") === "1", onchange: () => this.change() });
+    this.file = h("input", { type: "file", accept: ".log,.txt", hidden: true, "aria-label": "Log file", onchange: () => this.open(this.file) });
     this.pauseButton = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.pause() }, "Pause");
     this.latest = h("button", { type: "button", hidden: true, class: "primary", onclick: () => { this.list.follow(); this.showCount(); } }, "↓ Latest");
     this.loggersButton = h("button", { type: "button", onclick: () => this.toggleLoggers() }, "Logger levels");
@@ -63,11 +69,13 @@ export class Console {
     this.loggers = h("div", { class: "panel details loggers", hidden: true });
     main.append(
       h("div", { class: "bar" }, [...this.buttons.values()], this.node, this.text,
-        h("label", {}, this.isRegex, t("regex")), h("label", {}, this.isExcluded, t("exclude")), this.problem),
+        h("label", {}, this.isRegex, t("regex")), h("label", {}, this.isExcluded, t("exclude")),
+        h("label", { title: "Show all lines, and mark those that fit" }, this.isMarked, "highlight"), this.problem),
       h("div", { class: "bar" }, this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),
         h("button", { type: "button", onclick: () => this.save() }, "Export CSV"),
+        h("button", { type: "button", title: "rosout.log, or a node's log of ~/.ros/log", onclick: () => this.file.click() }, "Open log"), this.file,
         this.loggersButton, this.count, this.latest),
       this.loggers, h("div", { class: "panel lines" }, this.list.element), this.details);
 
@@ -111,12 +119,16 @@ export class Console {
   change() {
     this.filter();
     const isAll = this.levels.size === LEVELS.length;
-    this.place.remember({ text: this.text.value, node: this.node.value, levels: isAll ? "" : [...this.levels].join(",") || "0", regex: this.isRegex.checked, exclude: this.isExcluded.checked });
+    this.place.remember({ text: this.text.value, node: this.node.value, levels: isAll ? "" : [...this.levels].join(",") || "0", regex: this.isRegex.checked, exclude: this.isExcluded.checked, mark: this.isMarked.checked });
   }
 
   filter() {
+    const { checked: isMarked } = this.isMarked;
     try {
-      this.passes = filterOf({ levels: this.levels, node: this.node.value, text: this.text.value, isRegex: this.isRegex.checked, isExcluded: this.isExcluded.checked });
+      const filter = { levels: this.levels, node: this.node.value, text: this.text.value, isRegex: this.isRegex.checked, isExcluded: this.isExcluded.checked };
+      const passes = filterOf(filter);
+      this.marks = isMarked && filter.text ? passes : null;
+      this.passes = isMarked ? filterOf({ ...filter, text: "" }) : passes;
       setText(this.problem, "");
     } catch (error) {
       setText(this.problem, error.message);
@@ -160,6 +172,7 @@ export class Console {
 
   showRow(row, line) {
     row.classList.toggle("selected", line === this.selected);
+    row.classList.toggle("marked", Boolean(this.marks?.(line)));
     if (row.line === line) return;
     row.line = line;
     row.dataset.level = line.level;
@@ -200,6 +213,19 @@ export class Console {
     lines.length = 0;
     for (const level of counts.keys()) counts.set(level, 0);
     for (const listener of listeners) listener(Infinity);
+  }
+
+  /** Put the lines of a log file behind those that are there. */
+  async open({ files: [file] }) {
+    if (!file) return;
+    this.file.value = "";
+    if (file.size > MOST_BYTES) {
+      setText(this.problem, t("{name} is larger than {size} MB", { name: file.name, size: MOST_BYTES / 1e6 }));
+      return;
+    }
+    const found = linesOf(await file.text(), file.name);
+    append(found.slice(-MOST_LINES));
+    setText(this.problem, found.length ? "" : t("{name} has no lines", { name: file.name }));
   }
 
   async copy(button) {
