@@ -819,6 +819,21 @@ def test_diagnostics_are_a_tree_with_levels_and_values(
 
 
 @needs_chromium
+def test_history_of_a_status_has_its_changes(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    page = browse(address(served, "diagnostics?name=/Drive"))
+    first = statuses(("/Drive", 0, "cool"))
+    target = publisher(served, "/diagnostics_agg", type(first), queue_size=None)
+    for level, text in ((0, "cool"), (2, HOSTILE), (0, "cool again")):
+        with repeated(served, target, statuses(("/Drive", level, text))):
+            page.wait_text(".side", text)
+    found = page.evaluate("[...document.querySelectorAll('.history li')].map(e => e.textContent)")
+    assert [each.split(" ", 1)[1] for each in found] == ["OK cool again", f"Error {HOSTILE}", "OK cool"]
+
+
+@needs_chromium
 def test_diagnostics_that_nobody_aggregates_are_a_list(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
@@ -992,6 +1007,45 @@ def test_mosaics_and_depths_are_shown(
     for index, color in enumerate(colors):
         if color:
             assert tuple(pixels[index * 4 : index * 4 + 3]) == color, index
+
+
+@needs_chromium
+def test_image_is_zoomed_and_its_depths_are_scaled(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from sensor_msgs.msg import Image
+
+    served = serve()
+    depths = Image(height=1, width=4, encoding="16UC1", step=8, data=struct.pack("<4H", 0, 100, 200, 1000))
+    served.run(publisher(served, "/depth", Image, latch=True).publish(depths))
+    page = browse(address(served, "image?topic=/depth&high=400"))
+    grays = (
+        "[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 4, 1).data]"
+        ".filter((_, index) => index % 4 === 0)"
+    )
+    page.wait(
+        f"const g = {grays}; return g[3] === 255 && Math.abs(g[1] - 64) < 2 && Math.abs(g[2] - 128) < 2"
+    )
+    page.type("input[aria-label='Black at']", "100")
+    page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
+    page.wait(f"const g = {grays}; return g[1] === 0 && Math.abs(g[2] - 85) < 2")
+    assert "low=100&high=400" in page.evaluate("location.hash")
+
+    wide = page.evaluate("document.querySelector('canvas').getBoundingClientRect().width")
+    x, y = page.evaluate(
+        "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
+        "return [r.x + r.width * 0.8, r.y + r.height / 2] })()"
+    )
+    page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    page.wait_text(".status", "(3, 0): 1000")
+    page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-800)
+    page.wait(f"return document.querySelector('canvas').getBoundingClientRect().width > {wide} * 2")
+    # What was under the mouse is there again.
+    page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + 1, y=y)
+    page.wait_text(".status", "(3, 0): 1000")
+    assert page.evaluate("document.querySelector('.frame').scrollLeft") > 0
+    page.evaluate("document.querySelector('.frame').dispatchEvent(new MouseEvent('dblclick'))")
+    page.wait(f"return Math.abs(document.querySelector('canvas').getBoundingClientRect().width - {wide}) < 2")
 
 
 @needs_chromium

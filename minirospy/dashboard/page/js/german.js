@@ -134,7 +134,7 @@ export const GERMAN = {
   // nodes
   "highlight": "hervorheben", "Show all lines, and mark those that fit": "Alle Zeilen zeigen und die passenden hervorheben", "Open log": "Logdatei öffnen", "Log file": "Logdatei",
   "rosout.log, or a node's log of ~/.ros/log": "rosout.log oder das Log eines Nodes aus ~/.ros/log", "{name} is larger than {size} MB": "{name} ist größer als {size} MB", "{name} has no lines": "{name} hat keine Zeilen",
-  "Filter nodes and hosts": "Nodes und Rechner filtern", "Clean up …": "Aufräumen …", "Clean up": "Aufräumen", "Confirm": "Bestätigen", "Host": "Rechner",
+  "History": "Verlauf", "Black at": "Schwarz bei", "White at": "Weiß bei", "black to white": "schwarz bis weiß", "Filter nodes and hosts": "Nodes und Rechner filtern", "Clean up …": "Aufräumen …", "Clean up": "Aufräumen", "Confirm": "Bestätigen", "Host": "Rechner",
   "Process": "Prozess", "CPU": "CPU", "Memory": "Speicher", "{count} thread": "{count} Thread", "{count} threads": "{count} Threads", "sort": "sortieren", "Answers in": "Antwortet in", "{count} node": "{count} Node", "{count} nodes": "{count} Nodes",
   ", {count} without an answer": ", {count} ohne Antwort", "looking …": "sucht …", "no answer": "keine Antwort", "{out} out, {in} in": "{out} raus, {in} rein",
   "Kill …": "Beenden …", "Kill": "Beenden", "Keep": "Behalten", "It does not answer: {trouble}.": "Er antwortet nicht: {trouble}.", "host": "Rechner", "process": "Prozess",

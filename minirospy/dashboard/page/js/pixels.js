@@ -2,8 +2,9 @@
 
 const BAYER = { rggb: [0, 1, 1, 2], bggr: [2, 1, 1, 0], gbrg: [1, 2, 0, 1], grbg: [1, 0, 2, 1] };
 
-/** Return {width, height, rgba, range, at(x, y) -> text} of a message; range: [low, high] of what is no color. Throws Error. */
-export function pixelsOf({ width, height, encoding, is_bigendian: isBig, step, data }) {
+/** Return {width, height, rgba, range, at(x, y) -> text} of a message; range: [low, high] of what is no color. Throws Error.
+ * Numbers such as depths are black to white from `low` to `high`; where one is null, from the lowest or to the highest. */
+export function pixelsOf({ width, height, encoding, is_bigendian: isBig, step, data }, low = null, high = null) {
   const kind = kindOf(encoding);
   const need = height ? (height - 1) * step + width * kind.bytes : 0;
   if (step < width * kind.bytes || data.length < need) throw new Error(`the image has ${data.length} bytes, ${encoding} of ${width} x ${height} needs ${need}`);
@@ -11,7 +12,10 @@ export function pixelsOf({ width, height, encoding, is_bigendian: isBig, step, d
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const read = (offset) => kind.get(view, offset, !isBig);
   let range = null;
-  if (kind.isScaled) range = rangeOf(width, height, step, kind, read);
+  if (kind.isScaled) {
+    range = low !== null && high !== null ? [low, high] : rangeOf(width, height, step, kind, read);
+    range = [low ?? range[0], high ?? range[1]];
+  }
   for (let y = 0, to = 0; y < height; y++) {
     for (let x = 0; x < width; x++, to += 4) kind.put(rgba, to, data, y * step + x * kind.bytes, { read, range, x, y, step, width, height });
   }

@@ -1,6 +1,7 @@
 // Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values on a click.
 
 import { fill, h, refill, setText } from "../dom.js";
+import { timeText } from "../logs.js";
 import { t } from "../texts.js";
 
 const TYPE = "diagnostic_msgs/DiagnosticArray";
@@ -9,6 +10,7 @@ const USUAL = "/diagnostics";
 const LEVELS = ["OK", "Warning", "Error", "Stale"];
 const STALE_SECONDS = 5; // without a message, as in rqt_runtime_monitor
 const MOST = 5000; // statuses that are kept
+const MOST_CHANGES = 30; // of one status
 
 export class Diagnostics {
   constructor(link, words, main, place) {
@@ -16,7 +18,7 @@ export class Diagnostics {
     this.place = place;
     this.topic = words.get("topic") ?? "";
     this.chosen = words.get("name");
-    this.statuses = new Map(); // path -> {path, name, level, message, hardware, values, at}
+    this.statuses = new Map(); // path -> {path, name, level, message, hardware, values, at, changes}
     this.rows = new Map(); // path -> row
     this.folded = new Set();
     this.end = null;
@@ -76,7 +78,10 @@ export class Diagnostics {
       for (const { name, level, message: text, hardware_id: hardware, values } of message.status) {
         const path = `/${name.split("/").filter(Boolean).join("/")}`;
         if (this.statuses.size >= MOST && !this.statuses.has(path)) continue;
-        this.statuses.set(path, { path, name, level, message: text, hardware, values, at });
+        const before = this.statuses.get(path);
+        const isSame = before?.level === level && before.message === text;
+        const changes = isSame ? before.changes : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MOST_CHANGES);
+        this.statuses.set(path, { path, name, level, message: text, hardware, values, at, changes });
       }
     }
     this.draw();
@@ -179,12 +184,14 @@ export class Diagnostics {
     this.side.hidden = !node;
     if (!node) return;
     const { status, level } = node;
-    const content = JSON.stringify([node.path, level, status?.message, status?.hardware, status?.values]);
+    const content = JSON.stringify([node.path, level, status?.message, status?.hardware, status?.values, status?.changes]);
     if (content === this.shown) return;
     this.shown = content;
     refill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
       status?.hardware ? h("p", { class: "muted" }, t("hardware: "), status.hardware) : null,
-      h("table", { class: "values" }, h("tbody", {}, (status?.values ?? []).map(({ key, value }) => h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value))))));
+      h("table", { class: "values" }, h("tbody", {}, (status?.values ?? []).map(({ key, value }) => h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value))))),
+      // What it was before, the newest first.
+      status?.changes.length > 1 ? [h("h3", {}, "History"), h("ul", { class: "history" }, status.changes.map((each) => h("li", {}, h("span", { class: "mono muted" }, timeText(each.time)), " ", h("span", { class: `badge d${Math.min(3, each.level)}` }, t(LEVELS[Math.min(3, each.level)])), " ", each.message)))] : null);
   }
 }
 

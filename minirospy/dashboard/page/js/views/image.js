@@ -5,6 +5,7 @@ import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
 
+const LARGEST = 40_000; // pixels of the screen, of an image that is zoomed
 const TYPES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 
 export class Image {
@@ -18,16 +19,20 @@ export class Image {
     this.isDecoding = false;
     this.next = null; // the newest that came meanwhile
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
-    this.isActual = h("input", { type: "checkbox", onchange: () => this.fit() });
+    this.bounds = ["low", "high"].map((name) => h("input", { type: "number", step: "any", value: words.get(name) ?? "", placeholder: t("automatic"), "aria-label": name === "low" ? "Black at" : "White at", onchange: () => this.rescale() }));
+    this.scale = h("label", { hidden: true }, t("black to white"), this.bounds);
+    this.zoomed = null; // pixels of the screen for one of the image; null: as it fits
+    this.isActual = h("input", { type: "checkbox", onchange: () => this.unzoom() });
     this.about = h("span", { class: "muted" });
     this.value = h("span", { class: "mono" });
     this.problem = h("p", { class: "error" });
     this.canvas = h("canvas", { class: "image", width: 0, height: 0, onpointermove: (event) => this.point(event), onpointerleave: () => setText(this.value, "") });
     this.empty = h("p", { class: "empty" });
-    this.frame = h("div", { class: "panel frame" }, this.canvas, this.empty, this.problem);
+    this.frame = h("div", { class: "panel frame", ondblclick: () => this.unzoom() }, this.canvas, this.empty, this.problem);
+    this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.observer = new ResizeObserver(() => this.fit());
     this.observer.observe(this.frame);
-    main.append(h("div", { class: "bar" }, this.choice, h("label", {}, this.isActual, "actual size"), h("button", { type: "button", onclick: () => this.save() }, "PNG")),
+    main.append(h("div", { class: "bar" }, this.choice, h("label", {}, this.isActual, "actual size"), this.scale, h("button", { type: "button", onclick: () => this.save() }, "PNG")),
       this.frame, h("div", { class: "bar status" }, this.about, this.value));
     this.ending = link.watch(["channels"], () => this.update());
     this.timer = setInterval(() => this.showAbout(), 500);
@@ -53,7 +58,7 @@ export class Image {
 
   choose(topic) {
     this.topic = topic;
-    this.place.remember({ topic });
+    this.remember();
     this.end?.();
     this.end = null;
     this.pixels = this.next = null;
@@ -61,6 +66,21 @@ export class Image {
     this.rate = new Rate();
     if (topic) this.subscribe();
     this.update();
+  }
+
+  remember() {
+    const [low, high] = this.bounds.map(({ value }) => value);
+    this.place.remember({ topic: this.topic, low, high });
+  }
+
+  rescale() {
+    this.remember();
+    if (this.pixels?.range) this.show(this.decoded(this.message), this.message);
+    this.showAbout();
+  }
+
+  decoded(message) {
+    return pixelsOf(message, ...this.bounds.map(({ value }) => (value === "" ? null : Number(value))));
   }
 
   subscribe() {
@@ -80,7 +100,7 @@ export class Image {
       const [message, { topic }] = [this.next, this];
       this.next = null;
       try {
-        const found = "encoding" in message ? pixelsOf(message) : await decompressed(message);
+        const found = "encoding" in message ? this.decoded(message) : await decompressed(message);
         if (topic === this.topic && !this.isClosed) this.show(found, message);
         else found.bitmap?.close();
         setText(this.problem, "");
@@ -94,6 +114,7 @@ export class Image {
   show(found, message) {
     this.pixels = found;
     this.message = message;
+    this.scale.hidden = !found.range;
     setText(this.empty, "");
     if (this.canvas.width !== found.width || this.canvas.height !== found.height) {
       this.canvas.width = found.width;
@@ -107,13 +128,30 @@ export class Image {
     if (this.pointed) this.showValue();
   }
 
-  /** Show the image as large as it fits, or pixel by pixel. */
+  unzoom() {
+    this.zoomed = null;
+    this.fit();
+  }
+
+  /** Zoom; what is under the mouse stays there. */
+  wheel(event) {
+    if (!this.canvas.width) return;
+    event.preventDefault();
+    const before = this.canvas.getBoundingClientRect();
+    const [x, y] = [(event.clientX - before.left) / before.width, (event.clientY - before.top) / before.height];
+    this.zoomed = Math.min(LARGEST / Math.max(this.canvas.width, this.canvas.height), Math.max(0.05, (before.width / this.canvas.width) * Math.exp(-event.deltaY * 0.0015)));
+    this.fit();
+    const after = this.canvas.getBoundingClientRect();
+    this.frame.scrollBy(after.left + x * after.width - event.clientX, after.top + y * after.height - event.clientY);
+  }
+
+  /** Show the image as large as it fits, pixel by pixel, or as large as a person has zoomed. */
   fit() {
     const { width, height } = this.canvas;
     if (!width) return;
     const isActual = this.isActual.checked;
-    const scale = isActual ? 1 : Math.min((this.frame.clientWidth - 2) / width, (this.frame.clientHeight - 2) / height);
-    this.canvas.classList.toggle("large", isActual || scale > 2);
+    const scale = this.zoomed ?? (isActual ? 1 : Math.min((this.frame.clientWidth - 2) / width, (this.frame.clientHeight - 2) / height));
+    this.canvas.classList.toggle("large", scale === 1 || scale > 2);
     this.canvas.style.width = `${Math.max(1, width * scale)}px`;
     this.canvas.style.height = `${Math.max(1, height * scale)}px`;
   }
@@ -127,6 +165,7 @@ export class Image {
   }
 
   point(event) {
+    if (event.buttons & 1) this.frame.scrollBy(-event.movementX, -event.movementY);
     const box = this.canvas.getBoundingClientRect();
     this.pointed = [Math.floor(((event.clientX - box.left) / box.width) * this.canvas.width), Math.floor(((event.clientY - box.top) / box.height) * this.canvas.height)];
     this.showValue();
