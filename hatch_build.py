@@ -29,6 +29,7 @@ _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
 _PAGE = re.compile(r"minirospy/dashboard/page/(?!vendor/).*\.(js|css)")
 _MODULE = re.compile(r"minirospy/(?!overlay/|ros_packages/).*\.py")
 _COMMENT = re.compile(r"//.*|/\*((?!\*/).)*\*/")
+_CODE_AND_COMMENT = re.compile(r"(.*[;,{}(\[>)])\s+// [^`]*")
 
 
 def project_urls(address: str) -> dict[str, str]:
@@ -67,7 +68,7 @@ def readme_of_wheel(text: str, url: str = "") -> str:
 
 
 def lean(text: str) -> str:
-    """Return a script or style of the page without its comments' lines and indentation; what is in `...` stays as it is."""
+    """Return a script or style of the page without its comments and indentation; what is in `...` stays as it is."""
     if text.count("`") % 2:
         return text
     lines = []
@@ -76,6 +77,9 @@ def lean(text: str) -> str:
         short = line.strip()
         if not is_literal and (not short or _COMMENT.fullmatch(short)):
             continue
+        found = None if is_literal else _CODE_AND_COMMENT.fullmatch(short)
+        if found and not any(found[1].count(quote) % 2 for quote in "\"'`"):
+            short = found[1]
         lines.append(line if is_literal else short)
         is_literal ^= line.count("`") % 2 == 1
     return "\n".join(lines) + "\n"

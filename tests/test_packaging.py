@@ -164,7 +164,9 @@ def test_record_fits_the_files_of_the_wheel(wheel: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("// about\n\n/** Return. */\nif (x) {\n  y(); // why\n}\n", "if (x) {\ny(); // why\n}\n"),
+        ("// about\n\n/** Return. */\nif (x) {\n  y(); // why\n}\n", "if (x) {\ny();\n}\n"),
+        ("a('b; // c'); d(\"e) // f\");\n", "a('b; // c'); d(\"e) // f\");\n"),
+        ("  d(); // `e`\n", "d(); // `e`\n"),
         ("/* a */ b(); /* c */\n", "/* a */ b(); /* c */\n"),
         # Lines of a literal are its text.
         ("  a = `\n  // b\n\n  c`;\n  d();\n", "a = `\n  // b\n\n  c`;\nd();\n"),
