@@ -6,6 +6,7 @@ import contextlib
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 from minirospy import names
 from minirospy.environment import Environment, is_own_host
@@ -230,9 +231,44 @@ class Node:
         if not self.name:
             self.name = names.anonymous_name("".join(c if c.isalnum() else "_" for c in self.type))
 
+    def xmltype(self) -> str:
+        """Return the name of its tag."""
+        return "node"
+
+    def xmlattrs(self) -> list[tuple[str, object]]:
+        """Return (name, value) of its tag's attributes, those that are unset with None."""
+        return [
+            *self._placed(),
+            ("respawn", self.respawn),
+            ("respawn_delay", self.respawn_delay),
+            *self._named(),
+        ]
+
     def to_xml(self) -> str:
         """Return the node as the text of a launch file."""
-        return self.spec.to_xml()
+        return self._as_tag(self.xmlattrs())
+
+    def to_remote_xml(self) -> str:
+        """Return the same without its machine."""
+        return self._as_tag([each for each in self.xmlattrs() if each[0] != "machine"])
+
+    def _placed(self) -> list[tuple[str, object]]:
+        return [
+            ("pkg", self.package), ("type", self.type), ("machine", self.machine_name), ("ns", self.namespace),
+            ("args", self.args), ("output", self.output), ("cwd", self.cwd),
+        ]  # fmt: skip
+
+    def _named(self) -> list[tuple[str, object]]:
+        return [("name", self.name), ("launch-prefix", self.launch_prefix), ("required", self.required)]
+
+    def _as_tag(self, attributes: list[tuple[str, object]]) -> str:
+        words = [f"{name}={_quoted(value)}" for name, value in attributes if value is not None]
+        remaps = [f"  <remap from={_quoted(old)} to={_quoted(new)} />" for old, new in self.remap_args]
+        variables = [
+            f"  <env name={_quoted(name)} value={_quoted(value)} />" for name, value in self.env_args
+        ]
+        lines = [f"<{self.xmltype()} {' '.join(words)}>", *remaps, *variables, f"</{self.xmltype()}>"]
+        return "\n".join(lines)
 
     @property
     def spec(self) -> NodeSpec:
@@ -289,6 +325,19 @@ class Test(Node):
             raise ValueError("'time-limit' must be a positive number")
         self.retry = retry or 0
 
+    def xmltype(self) -> str:
+        """Return the name of its tag."""
+        return "test"
+
+    def xmlattrs(self) -> list[tuple[str, object]]:
+        """Return (name, value) of its tag's attributes: retry and time-limit where they are not the default."""
+        attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
+        if self.retry:
+            attributes.append(("retry", str(self.retry)))
+        if self.time_limit != TEST_TIME_LIMIT_DEFAULT:
+            attributes.append(("time-limit", self.time_limit))
+        return attributes
+
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
         """Return the test of a launch file."""
@@ -297,6 +346,10 @@ class Test(Node):
             spec.test_name, node.package, node.type, node.base_name, node.namespace, None, node.args, node.remaps,
             node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
         )  # fmt: skip
+
+
+def _quoted(value: object) -> str:
+    return '"' + escape(str(value), {'"': "&quot;"}) + '"'
 
 
 class _Handler:
