@@ -22,7 +22,6 @@ COMPILED_AHEAD = frozenset(
         "rospy_tutorials",
         "rpi_msgs",
         "sensor_msgs",
-        "shape_msgs",
         "sick_safetyscanners",
         "std_msgs",
         "std_srvs",
