@@ -1049,6 +1049,66 @@ def test_image_is_zoomed_and_its_depths_are_scaled(
 
 
 @needs_chromium
+def test_markers_are_drawn_over_the_image(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    import rospy
+    from geometry_msgs.msg import Point
+    from sensor_msgs.msg import Image
+    from std_msgs.msg import ColorRGBA
+    from visualization_msgs.msg import ImageMarker
+
+    served = serve()
+    image = Image(height=40, width=60, encoding="mono8", step=60, data=bytes(60 * 40))
+    served.run(publisher(served, "/camera", Image, latch=True).publish(image))
+    markers = publisher(served, "/found", ImageMarker)
+    page = browse(address(served, "image?topic=/camera&markers=/found"))
+    page.wait_text(".status", " 40 · mono8")
+    served.run(markers.wait_for_subscribers(1))
+
+    def draw(number: int, kind: int, **fields: Any) -> None:
+        served.run(markers.publish(ImageMarker(ns="a", id=number, type=kind, **fields)))
+
+    def corners(*places: tuple[float, float]) -> list[Point]:
+        return [Point(x=x, y=y) for x, y in places]
+
+    red, green, blue = ColorRGBA(r=1, a=1), ColorRGBA(g=1, a=1), ColorRGBA(b=1)
+    draw(1, ImageMarker.CIRCLE, position=Point(x=10, y=10), scale=12, filled=1, fill_color=red)
+    draw(2, ImageMarker.LINE_LIST, points=corners((30, 5), (50, 5), (30, 15), (50, 15)), scale=3,
+         outline_color=red, outline_colors=[green, blue])  # fmt: skip
+    draw(3, ImageMarker.POLYGON, points=corners((5, 22), (25, 22), (25, 38), (5, 38)), scale=1,
+         outline_color=green, filled=1, fill_color=blue)  # fmt: skip
+    draw(4, ImageMarker.POINTS, points=corners((40, 30), (52, 30)), scale=5, outline_color=red)
+
+    def color(x: int, y: int) -> str:
+        canvas = "document.querySelector('canvas.overlay').getContext('2d')"
+        return f"String([...{canvas}.getImageData({x}, {y}, 1, 1).data])"
+
+    for (x, y), shown in {
+        (10, 10): "255,0,0,255", (40, 5): "0,255,0,255", (40, 15): "0,0,255,255", (15, 30): "0,0,255,255",
+        (40, 30): "255,0,0,255", (52, 30): "255,0,0,255", (57, 38): "0,0,0,0",
+    }.items():  # fmt: skip
+        page.wait(f"return {color(x, y)} === '{shown}'")
+
+    # One is removed, one replaced by one that ends by itself.
+    draw(1, ImageMarker.CIRCLE, action=ImageMarker.REMOVE)
+    draw(
+        4,
+        ImageMarker.POINTS,
+        points=corners((40, 35)),
+        scale=5,
+        outline_color=green,
+        lifetime=rospy.Duration(0.2),
+    )
+    for x, y in ((10, 10), (40, 30), (40, 35)):
+        page.wait(f"return {color(x, y)} === '0,0,0,0'")
+
+    draw(5, 9)
+    page.wait_text(".error", "a/5: the marker type 9 is not known")
+    page.choose("select[aria-label='Markers over the image']", "")
+    page.wait(f"return {color(40, 5)} === '0,0,0,0'")
+    assert "markers" not in page.evaluate("location.hash")
+
+
+@needs_chromium
 def test_image_that_cannot_be_shown_is_named(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:

@@ -1,24 +1,29 @@
-// Images of a topic, raw and compressed: always the newest one; zoom, and the value of a pixel.
+// Images of a topic, raw and compressed: always the newest one; zoom, the value of a pixel, and markers over them.
 
 import { fill, h, number, setText } from "../dom.js";
+import { ImageMarkers } from "../image_markers.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
 
 const LARGEST = 40_000; // pixels of the screen, of an image that is zoomed
 const TYPES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
+const MARKER_TYPE = "visualization_msgs/ImageMarker";
 
 export class Image {
   constructor(link, words, main, place) {
     this.link = link;
     this.place = place;
     this.topic = words.get("topic") ?? "";
+    this.markerTopic = words.get("markers") ?? "";
+    this.markers = new ImageMarkers();
     this.rate = new Rate();
-    this.end = null;
+    this.end = this.markerEnd = null;
     this.pixels = null;
     this.isDecoding = false;
     this.next = null; // the newest that came meanwhile
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
+    this.markerChoice = h("select", { "aria-label": t("Markers over the image"), onchange: () => this.chooseMarkers(this.markerChoice.value) });
     this.bounds = ["low", "high"].map((name) => h("input", { type: "number", step: "any", value: words.get(name) ?? "", placeholder: t("automatic"), "aria-label": name === "low" ? "Black at" : "White at", onchange: () => this.rescale() }));
     this.scale = h("label", { hidden: true }, t("black to white"), this.bounds);
     this.zoomed = null; // pixels of the screen for one of the image; null: as it fits
@@ -27,15 +32,17 @@ export class Image {
     this.value = h("span", { class: "mono" });
     this.problem = h("p", { class: "error" });
     this.canvas = h("canvas", { class: "image", width: 0, height: 0, onpointermove: (event) => this.point(event), onpointerleave: () => setText(this.value, "") });
+    this.overlay = h("canvas", { class: "overlay", width: 0, height: 0 });
     this.empty = h("p", { class: "empty" });
-    this.frame = h("div", { class: "panel frame", ondblclick: () => this.unzoom() }, this.canvas, this.empty, this.problem);
+    this.frame = h("div", { class: "panel frame", ondblclick: () => this.unzoom() }, h("div", { class: "layers" }, this.canvas, this.overlay), this.empty, this.problem);
     this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.observer = new ResizeObserver(() => this.fit());
     this.observer.observe(this.frame);
-    main.append(h("div", { class: "bar" }, this.choice, h("label", {}, this.isActual, "actual size"), this.scale, h("button", { type: "button", onclick: () => this.save() }, "PNG")),
+    main.append(h("div", { class: "bar" }, this.choice, this.markerChoice, h("label", {}, this.isActual, "actual size"), this.scale, h("button", { type: "button", onclick: () => this.save() }, "PNG")),
       this.frame, h("div", { class: "bar status" }, this.about, this.value));
     this.ending = link.watch(["channels"], () => this.update());
     this.timer = setInterval(() => this.showAbout(), 500);
+    this.expiry = setInterval(() => this.markers.expire(performance.now()) && this.drawMarkers(), 100);
   }
 
   close() {
@@ -43,7 +50,9 @@ export class Image {
     this.ending();
     this.observer.disconnect();
     clearInterval(this.timer);
+    clearInterval(this.expiry);
     this.end?.();
+    this.markerEnd?.();
   }
 
   update() {
@@ -53,6 +62,7 @@ export class Image {
     if (!this.topic && topics.length === 1) this.choose(topics[0]);
     this.choice.value = this.topic;
     if (this.topic && !this.end) this.subscribe();
+    this.updateMarkers();
     setText(this.empty, this.pixels ? "" : this.topic ? t("Waiting for {topic} …", { topic: this.topic }) : t("Start a camera, or play a bag with images."));
   }
 
@@ -62,7 +72,7 @@ export class Image {
     this.end?.();
     this.end = null;
     this.pixels = this.next = null;
-    this.canvas.width = this.canvas.height = 0;
+    for (const each of [this.canvas, this.overlay]) each.width = each.height = 0;
     this.rate = new Rate();
     if (topic) this.subscribe();
     this.update();
@@ -70,8 +80,51 @@ export class Image {
 
   remember() {
     const [low, high] = this.bounds.map(({ value }) => value);
-    this.place.remember({ topic: this.topic, low, high });
+    this.place.remember({ topic: this.topic, markers: this.markerTopic, low, high });
   }
+
+  // --- markers
+
+  updateMarkers() {
+    const topics = [...this.link.channels.values()].filter(({ type }) => type === MARKER_TYPE).map(({ topic }) => topic);
+    if (this.markerTopic && !topics.includes(this.markerTopic)) topics.unshift(this.markerTopic);
+    fill(this.markerChoice, h("option", { value: "" }, t("no markers")), topics.map((topic) => h("option", { value: topic }, topic)));
+    this.markerChoice.value = this.markerTopic;
+    this.markerChoice.hidden = !topics.length;
+    if (this.markerTopic && !this.markerEnd) this.subscribeMarkers();
+  }
+
+  chooseMarkers(topic) {
+    this.markerTopic = topic;
+    this.remember();
+    this.markerEnd?.();
+    this.markerEnd = null;
+    this.markers = new ImageMarkers();
+    this.drawMarkers();
+    this.updateMarkers();
+  }
+
+  subscribeMarkers() {
+    this.markerEnd = this.link.subscribe({ topic: this.markerTopic, mode: "all" }, ({ lines = [], error = "" }) => {
+      for (const { message } of lines) {
+        try {
+          this.markers.process(message, performance.now());
+        } catch (failed) {
+          error = `${message.ns}/${message.id}: ${failed.message}`;
+        }
+      }
+      setText(this.problem, error);
+      this.drawMarkers();
+    });
+  }
+
+  drawMarkers() {
+    const context = this.overlay.getContext("2d");
+    context.clearRect(0, 0, this.overlay.width, this.overlay.height);
+    this.markers.draw(context);
+  }
+
+  // --- images
 
   rescale() {
     this.remember();
@@ -117,8 +170,8 @@ export class Image {
     this.scale.hidden = !found.range;
     setText(this.empty, "");
     if (this.canvas.width !== found.width || this.canvas.height !== found.height) {
-      this.canvas.width = found.width;
-      this.canvas.height = found.height;
+      for (const each of [this.canvas, this.overlay]) [each.width, each.height] = [found.width, found.height];
+      this.drawMarkers();
       this.fit();
     }
     const context = this.canvas.getContext("2d", { willReadFrequently: Boolean(found.bitmap) });
@@ -152,8 +205,7 @@ export class Image {
     const isActual = this.isActual.checked;
     const scale = this.zoomed ?? (isActual ? 1 : Math.min((this.frame.clientWidth - 2) / width, (this.frame.clientHeight - 2) / height));
     this.canvas.classList.toggle("large", scale === 1 || scale > 2);
-    this.canvas.style.width = `${Math.max(1, width * scale)}px`;
-    this.canvas.style.height = `${Math.max(1, height * scale)}px`;
+    for (const { style } of [this.canvas, this.overlay]) [style.width, style.height] = [width, height].map((pixels) => `${Math.max(1, pixels * scale)}px`);
   }
 
   showAbout() {
@@ -180,7 +232,9 @@ export class Image {
 
   save() {
     if (!this.pixels) return;
-    this.canvas.toBlob((blob) => {
+    const picture = h("canvas", { width: this.canvas.width, height: this.canvas.height });
+    for (const each of [this.canvas, this.overlay]) picture.getContext("2d").drawImage(each, 0, 0);
+    picture.toBlob((blob) => {
       const url = URL.createObjectURL(blob);
       h("a", { href: url, download: "image.png" }).click();
       setTimeout(() => URL.revokeObjectURL(url), 60_000);
