@@ -83,7 +83,7 @@ class StatusList(GoalStatusArray):
             seq, secs, nsecs, length = _HEADER.unpack_from(data)
             self._start = _HEADER.size + length + _COUNT.size
             (self._count,) = _COUNT.unpack_from(data, self._start - _COUNT.size)
-        except struct.error:
+        except (struct.error, OverflowError):  # the second: of an offset that 32 bits do not hold
             self._fail(data)
         self.header.seq = seq
         self.header.stamp.secs, self.header.stamp.nsecs = secs, nsecs
@@ -102,7 +102,7 @@ class StatusList(GoalStatusArray):
                 end += 17 + _STAMP_AND_LENGTH.unpack_from(data, start)[2]
                 end += _STATUS_AND_LENGTH.unpack_from(data, end - 5)[1]
                 bounds.append((start, end))
-        except struct.error:
+        except (struct.error, OverflowError):  # the second: of an offset that 32 bits do not hold
             self._fail(data)
         return bounds
 

@@ -258,7 +258,8 @@ class _Generator:
                 line("add = parts.append")
                 self._items(layout)
                 self._flush()
-            with self._source.block("except struct.error as error:"):
+            # Where Python has 32 bits, an offset of 2 GiB and more is an OverflowError.
+            with self._source.block("except (struct.error, OverflowError) as error:"):
                 line('raise DeserializationError("the message ends too early") from error')
             with self._source.block("if end > len(data):"):
                 line('raise DeserializationError("the message ends too early")')

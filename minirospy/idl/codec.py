@@ -110,7 +110,8 @@ def write_deserialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None
         if spec.fields:
             with source.block("try:"):
                 _Reader(source, lookup, keeps_buffer(spec, lookup)).message(spec)
-            with source.block("except struct.error as error:"):
+            # Where Python has 32 bits, an offset of 2 GiB and more is an OverflowError.
+            with source.block("except (struct.error, OverflowError) as error:"):
                 source.line("raise genpy.DeserializationError(error) from error")
         source.line("return self")
 

@@ -206,7 +206,7 @@ def _find_transforms(data: bytes) -> list[_Offsets]:
             end += length
             found.append(_Offsets(without_slash(parent), without_slash(child), header, end))
             end += _BODY.size
-    except struct.error as error:
+    except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
         raise DeserializationError(error) from error
     if end > len(data):
         raise DeserializationError("the message ends too early")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from sys import getsizeof
+from sys import getsizeof, maxsize
 from types import MethodType
 from typing import Any
 
@@ -238,7 +238,9 @@ def test_registrations_count_what_they_take_in_memory(kind: str) -> None:
     for number in range(count):
         KINDS[kind](registry, number)
     taken = size_of(registry, set())
-    assert 0.8 * taken < registry._shares.total < 2.5 * taken
+    # Counted for 64 bits: with 32 an object takes about half.
+    most = 2.5 if maxsize > 2**32 else 5.0
+    assert 0.8 * taken < registry._shares.total < most * taken
 
 
 def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:

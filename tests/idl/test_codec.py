@@ -176,6 +176,14 @@ def test_any_bytes_are_read_or_refused(text: str, data: bytes) -> None:
     assert len(wire(message)) <= len(data) + data.count(0xEF) * 3 + 3 * len(data)
 
 
+@pytest.mark.parametrize("text", ["int8[] a\nint8 b\n", "string a\nint8 b\n", "string[] a\nint8 b\n"])
+@pytest.mark.parametrize("length", [2**31 - 1, 2**31, 2**32 - 1])
+def test_lengths_that_32_bits_do_not_hold_are_refused(text: str, length: int) -> None:
+    data = length.to_bytes(4, "little")
+    with pytest.raises(DeserializationError):
+        class_from_text("p/M1", text)().deserialize(data * 2 if "[] a" in text else data)
+
+
 @given(full_texts())
 def test_the_default_message_is_all_zeros(text: str) -> None:
     assert not any(serialized(class_from_text("p/M0", text)()))

@@ -62,7 +62,7 @@ class FrameRewriter:
         pieces: list[bytes] = []
         try:
             copied, _ = _run(self._steps, data, 0, 0, change, pieces)
-        except struct.error as error:
+        except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
             raise DeserializationError("the message ends too early") from error
         pieces.append(data[copied:])
         return b"".join(pieces)

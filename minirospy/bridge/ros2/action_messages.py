@@ -150,5 +150,5 @@ def _parse_text(data: bytes, start: int) -> tuple[str, int]:
 def _unpacked(struct_: struct.Struct, data: bytes, start: int) -> tuple[int, ...]:
     try:
         return struct_.unpack_from(data, start)
-    except struct.error as error:
+    except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
         raise DeserializationError("the message ends too early") from error

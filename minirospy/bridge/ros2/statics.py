@@ -48,7 +48,7 @@ class StaticTransforms:
                 if end > len(data):
                     raise DeserializationError("the message ends too early")
                 self._keep(child, data[start:end])
-        except struct.error as error:
+        except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
             raise DeserializationError("the message ends too early") from error
         return _LENGTH.pack(len(self._by_child)) + b"".join(self._by_child.values())
 
