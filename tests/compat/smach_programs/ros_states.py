@@ -294,6 +294,9 @@ for order in (5, -1, -9):
     say("wrapped", order, state, client.get_result().sequence)
 client.send_goal(FibonacciGoal(70))
 works.wait(30)
+# A goal that is canceled before it is acknowledged is lost to a list of statuses that was sent before it came.
+while client.get_state() != GoalStatus.ACTIVE:
+    pause.wait(0.01)
 client.cancel_goal()
 say("wrapped", client.wait_for_result(rospy.Duration(20)), client.get_state(), client.get_result().sequence)
 
