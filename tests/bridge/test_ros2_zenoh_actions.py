@@ -369,7 +369,7 @@ def test_parameters_of_ros1_are_those_of_the_bridge_over_zenoh(node: RmwNode, en
         refused = set_to("robot.speed", speed)
         assert refused[4] == 0
         assert b"does not fit into the 32 bits" in refused
-        # What is no request is refused, and the next one is answered.
+        # An invalid request is refused, and the next one is answered.
         key = f"0/{BRIDGE_PREFIX}/get_parameters/rcl_interfaces::srv::dds_::GetParameters_"
         key += f"/{SERVICE_HASHES['rcl_interfaces/GetParameters']}"
         broken = called(node, key, HEADER + b"\xff\xff\xff\xff", attachment(1, 1, GID))
