@@ -28,7 +28,6 @@ COMPILED_AHEAD = frozenset(
         "tf",
         "tf2_msgs",
         "topic_tools",
-        "trajectory_msgs",
         "visualization_msgs",
     ]
 )
