@@ -509,8 +509,7 @@ class _File:
         for key in ("output", "respawn"):
             if tag.has(key):
                 raise tag.error(f"<test> tags cannot have '{key}' attribute")
-        # rostest runs a test without a name under the name of its tag.
-        test_name = tag.required("test-name", may_be_empty=True) or "test"
+        test_name = tag.required("test-name", may_be_empty=True)
         name = tag.optional("name") or test_name
         if "/" in name:
             raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
@@ -530,6 +529,8 @@ class _File:
         scope = self._below(tag, scope)
         full_name = names.canonicalize(f"{scope.namespace}/{name}")
         if tag.flag("clear_params"):
+            if not name:
+                raise tag.error("<node> tag must have a 'name' attribute to use 'clear_params' attribute")
             self._spec.clear.append(full_name)
         for private, value in scope.private:
             self._set(tag, f"{full_name}/{private}", value)
@@ -543,7 +544,7 @@ class _File:
         for private, value in inner.private:
             self._set(tag, f"{full_name}/{private}", value)
         return NodeSpec(
-            name=full_name,
+            name=full_name if name else full_name.rstrip("/") + "/",
             package=tag.required("pkg"),
             type=tag.required("type"),
             args=tag.optional("args") or "",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from minirospy.errors import LaunchError
+from minirospy.names import anonymous_name
 
 __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand", "TestSpec"]
 
@@ -14,6 +15,7 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 class NodeSpec:
     """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` hold those of the groups around it too.
 
+    ``name`` ends in a slash where a ``<test>`` has none: its parameters are in the namespace, and it is ``named()`` when it runs.
     ``output`` and ``cwd`` are empty where the file does not set them, which means ``log`` and ``ROS_HOME``.
     """
 
@@ -42,6 +44,13 @@ class NodeSpec:
     def namespace(self) -> str:
         """The namespace, with a slash at its end."""
         return self.name.rpartition("/")[0] + "/"
+
+    def named(self) -> NodeSpec:
+        """Return the node, with a generated unique name where it has none."""
+        if self.base_name:
+            return self
+        base = "".join(c if c.isalnum() else "_" for c in self.type)
+        return replace(self, name=f"{self.namespace}{anonymous_name(base)}")
 
     def to_xml(self) -> str:
         """Return the equivalent ``<node>`` of a launch file; its machine is left out."""

@@ -85,6 +85,7 @@ class RosTest:
         if why:
             case.add_failure(_failure(why))
             return
+        test = replace(test, node=test.node.named())
         for tries_left in range(max(test.retry, 0), -1, -1):
             case.errors.clear()
             case.failures.clear()

@@ -75,7 +75,19 @@ def test_a_name_is_required() -> None:
         load_text('<launch><test pkg="p" type="t"/></launch>', {}, Packages.below(), {})
 
 
-def test_empty_name_is_that_of_the_tag() -> None:
-    """As with rostest, which runs it under the name ``test``."""
-    spec = load_text('<launch><test test-name="" pkg="p" type="t"/></launch>', {}, Packages.below(), {})
-    assert [(test.test_name, test.node.name) for test in spec.tests] == [("test", "/test")]
+def test_empty_name_leaves_the_node_unnamed() -> None:
+    """As with rostest: the parameters are in the namespace, and the node gets a unique name when it runs."""
+    param = '<param name="~v" value="1"/>'
+    text = f'<launch><group ns="g"><test test-name="" pkg="p" type="t.py">{param}</test></group></launch>'
+    spec = load_text(text, {}, Packages.below(), {})
+
+    (test,) = spec.tests
+    assert (test.test_name, test.node.base_name, test.node.namespace) == ("", "", "/g/")
+    assert spec.params == {"/g/v": 1}
+    one, other = test.node.named(), test.node.named()
+    assert one.name.startswith("/g/t_py_")
+    assert one.name != other.name
+    assert one.named() == one
+
+    with pytest.raises(LaunchError, match="must have a 'name' attribute to use 'clear_params'"):
+        load_text(text.replace("type=", 'clear_params="true" type='), {}, Packages.below(), {})

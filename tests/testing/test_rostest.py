@@ -100,6 +100,22 @@ def test_a_test_called_as_a_node_is_warned_of(tmp_path: Path) -> None:
     assert "x.test:1: test [a] is called as the node [/a]" in err
 
 
+def test_a_test_without_a_name_runs_under_a_unique_one(tmp_path: Path) -> None:
+    """As with real rostest: its results have no name, and its node is called after its type."""
+    text = '<test test-name="" pkg="tested" type="good.py"/><test test-name="" name="x" pkg="tested" type="good.py"/>'
+    status, out, _ = ran("rostest", "--package=a", "--pkgdir=/", write_test(tmp_path / "x.test", text))
+    assert status == 1
+    assert "FAILURE: Duplicate tests named [] in rostest suite" in out
+
+    text = text[: text.index("/>") + 2]
+    status, out, _ = ran("rostest", "--package=a", "--pkgdir=/", write_test(tmp_path / "x.test", text))
+    assert status == 0
+    assert "[Testcase: test] ... ok" in out
+    assert "[a.rosunit-/test_one][passed]" in out
+    assert len(list((tmp_path / "log").rglob("good_py_*-1-stdout.log"))) == 1
+    assert (tmp_path / "test_results" / "a" / "rosunit-.xml").is_file()
+
+
 def test_a_failed_test_is_status_2_and_names_are_as_requested(tmp_path: Path) -> None:
     file = write_test(tmp_path / "x.test", '<test test-name="bad" pkg="tested" type="bad.py"/>')
     base = tmp_path / "results"

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
-from minirospy import names
 from minirospy.environment import Environment, is_own_host
 from minirospy.launch.command import node_environment
 from minirospy.launch.output import ERROR, Output
@@ -228,8 +227,7 @@ class Node:
 
     def give_name(self) -> None:
         """Generate a unique name, where it has none."""
-        if not self.name:
-            self.name = names.anonymous_name("".join(c if c.isalnum() else "_" for c in self.type))
+        self.name = self.spec.named().base_name
 
     def xmltype(self) -> str:
         """Return the name of its tag."""

@@ -59,6 +59,17 @@ for attributes in ("", ' clear_params="true"', ' clear_params="false"', ' cwd="n
         attributes, config.clear_params, [(node.cwd, node.output, node.machine_name) for node in config.nodes]
     )
 
+# A test without a name is given one when it runs.
+TEST = '<test test-name="" pkg="p" type="t.py" {}><param name="~v" value="1"/></test>'
+for attributes in ("", 'ns="g"', 'name="x"', 'name=""'):
+    config = ROSLaunchConfig()
+    XmlLoader().load_string(f"<launch>{TEST.format(attributes)}</launch>", config, verbose=False)
+    show(
+        attributes,
+        [(test.test_name, test.name, test.namespace) for test in config.tests],
+        list(config.params),
+    )
+
 # The port that a node's server is asked for.
 for port in (0, None, "", 3, "3", "x", ()):
     outcome(f"port {port!r}", lambda: rosgraph.xmlrpc.XmlRpcNode(port).port)
