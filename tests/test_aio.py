@@ -14,6 +14,7 @@ from collections.abc import Callable, Coroutine, Iterator
 from typing import Any
 
 import pytest
+from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, Header, String
@@ -522,6 +523,36 @@ def test_services_of_both_kinds(master: str) -> None:
                 proxy.close()
 
     run(main)
+
+
+class Turn:
+    """A service whose request and response start with a header."""
+
+    _type = "p/Turn"
+    _md5sum = PoseStamped._md5sum
+    _request_class = PoseStamped
+    _response_class = PoseStamped
+
+
+def test_headers_of_requests_and_responses_are_numbered(master: str) -> None:
+    async def turn(request: PoseStamped) -> PoseStamped:
+        numbers.append(request.header.seq)
+        response = PoseStamped()
+        response.header.frame_id = None  # type: ignore[assignment]
+        return response
+
+    async def main() -> None:
+        async with Node("a") as a, Node("b") as b:
+            await a.serve("/turn", Turn, turn)
+            proxy = b.service_proxy("/turn", Turn)
+            responses = [await proxy() for _ in range(2)]
+            responses.append(await b.call("/turn", Turn))
+            assert [each.header.seq for each in responses] == [1, 2, 3]
+            assert responses[0].header.frame_id == "0"
+
+    numbers: list[int] = []
+    run(main)
+    assert numbers == [1, 2, 1]
 
 
 def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture) -> None:

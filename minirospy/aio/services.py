@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import inspect
+import itertools
 import traceback
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -19,7 +20,7 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
-from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.message import args_kwds_to_message, number_header
 from minirospy.idl.protocols import Message
 from minirospy.idl.service import to_response
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
@@ -64,12 +65,15 @@ class ServiceProxy(Generic[_Response_co]):
         self._service_class = service_class
         self._persistent = persistent
         self._headers = dict(headers or {})
+        self._sequence = itertools.count(1)
         self._client: AsyncServiceClient | None = None
         self._lock = asyncio.Lock()
 
     async def __call__(self, *args: object, **kwds: object) -> _Response_co:
         """Call the service. Raises as :meth:`Node.call` does."""
-        request = serialized(args_kwds_to_message(self._service_class._request_class, args, kwds))
+        message = args_kwds_to_message(self._service_class._request_class, args, kwds)
+        number_header(message, next(self._sequence))
+        request = serialized(message)
         if not self._persistent:
             client = await self._connect()
             try:
@@ -159,6 +163,7 @@ class Service(Handle):
         self._request_class = service_class._request_class
         self._response_class = service_class._response_class
         self._handler = handler
+        self._sequence = itertools.count(1)
 
         runtime = node._node
         is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(
@@ -207,7 +212,9 @@ class Service(Handle):
         return request
 
     def _response(self, returned: object) -> bytes:
-        return serialized(to_response(self._response_class, returned))
+        response = to_response(self._response_class, returned)
+        number_header(response, next(self._sequence))
+        return serialized(response)
 
     def _failure(self, error: Exception) -> ServiceException:
         if isinstance(error, ServiceException):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
 import threading
 import time
@@ -27,7 +28,7 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
-from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.message import args_kwds_to_message, number_header
 from minirospy.idl.service import to_response
 from minirospy.times import Duration
 from minirospy.wire.header import Header
@@ -83,6 +84,7 @@ class Service(Generic[_S_co]):
         self.handler = handler
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
+        self._sequence = itertools.count(1)
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
 
@@ -148,6 +150,7 @@ class Service(Generic[_S_co]):
             request.deserialize(body if self._takes_memoryview else bytes(body))
             request._connection_header = header
             response = to_response(self.response_class, self.handler(request))
+            number_header(response, next(self._sequence))
             buffer = BytesIO()
             response.serialize(buffer)
             return buffer.getvalue()
@@ -199,6 +202,8 @@ class ServiceProxy(Generic[_S_co]):
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
+        # The calls that reached the service: the seq of requests that start with a header.
+        self._calls = 0
         self._lock = threading.Lock()
 
     def __call__(self, *args: object, **kwds: object) -> Any:
@@ -236,12 +241,14 @@ class ServiceProxy(Generic[_S_co]):
 
     def _serialize(self, request: Message) -> bytes:
         buffer = BytesIO()
+        number_header(request, self._calls + 1)
         try:
             request.serialize(buffer)
         except SerializationError:
             # rospy connects first: a service that is missing or of another type is the error that it raises.
             if self._client is None:
                 self._connect_by_master(None, b"").close()
+            self._calls += 1
             raise
         return buffer.getvalue()
 
@@ -304,6 +311,7 @@ class ServiceProxy(Generic[_S_co]):
 
     def _exchange(self, client: ServiceClient, request: bytes, *, keep: bool) -> Message:
         keeping = False
+        self._calls += 1
         try:
             with current_session().lifecycle.interrupting(client.hang_up):
                 body = client.call(request)

@@ -15,7 +15,7 @@ from minirospy.errors import (
     MessageException,
     SerializationError,
 )
-from minirospy.idl.protocols import is_message
+from minirospy.idl.protocols import is_message, is_stamped
 from minirospy.times import Duration, Time, TVal
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ __all__ = [
     "check_type",
     "fill_message_args",
     "get_printable_message_args",
+    "number_header",
     "strify_message",
 ]
 
@@ -143,6 +144,17 @@ def _equal(value: object, other: object) -> bool:
     if type(value) is not type(other) and type(value) in _SEQUENCES and type(other) in _SEQUENCES:
         return tuple(cast("Sequence[object]", value)) == tuple(cast("Sequence[object]", other))
     return bool(value == other)
+
+
+def number_header(message: protocols.Message, sequence: int) -> None:
+    """Set ``seq`` of a message that starts with a header, as rospy does before it sends one; ``frame_id`` None is "0".
+
+    A header of a wrong type is left to ``serialize``, which names the field.
+    """
+    if is_stamped(message) and is_message(message.header):
+        message.header.seq = sequence
+        if message.header.frame_id is None:
+            message.header.frame_id = "0"
 
 
 def check_type(field_name: str, field_type: str, field_val: object) -> None:

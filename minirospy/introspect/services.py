@@ -130,9 +130,11 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Return the response to a filled request. Raise NotFoundError, ServiceException with the handler's text."""
     from minirospy.idl.load import service_class
+    from minirospy.idl.message import number_header
     from minirospy.introspect.messages import check, serialize
 
     cls = service_class(type_)
+    number_header(request, 1)
     check(request)
     uri = service_uri(graph, service)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import struct
 import subprocess
 import sys
 import threading
@@ -13,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mavros_msgs.srv import CommandVtolTransition
 
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.wire.tcpros import InterfaceType
 
 from .conftest import own_lines
 
@@ -63,6 +66,19 @@ def test_call_the_workshops_way(robot: Any, command: Any, arguments: list[str]) 
         'success: True\nmessage: "Successfully changed LED state."\n',
         "",
     )
+
+
+def test_header_of_a_request_is_numbered(robot: Any, command: Any) -> None:
+    def answer(body: memoryview, _: object) -> bytes:
+        (sequence,) = struct.unpack_from("<I", body)
+        return struct.pack("<?B", True, sequence)
+
+    type_ = InterfaceType("mavros_msgs/CommandVtolTransition", CommandVtolTransition._md5sum)
+    server = robot.node.make_service(
+        "/vtol", type_, answer, request_type=f"{type_.name}Request", response_type=f"{type_.name}Response"
+    )
+    robot.loop.run(robot.node.serve(server))
+    assert command("rosservice", "call", "/vtol", "header: {seq: 7}").out == "success: True\nresult: 1\n"
 
 
 def test_call_verbosely_and_from_standard_input(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import struct
 from io import BytesIO
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from minirospy.errors import DeserializationError
+from minirospy.idl.message import number_header
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message, Stamped
+    from minirospy.idl.protocols import Message
 
 __all__ = ["deserialize_messages", "serialize_message"]
 
@@ -18,11 +19,7 @@ _LENGTH = struct.Struct("<I")
 
 def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
     """Write ``msg`` with its length to ``b``; a header gets ``seq``, and with frame_id "0" none."""
-    if getattr(msg.__class__, "_has_header", False):
-        header = cast("Stamped", msg).header
-        header.seq = seq
-        if header.frame_id is None:
-            header.frame_id = "0"
+    number_header(msg, seq)
     start = b.tell()
     b.write(b"\0\0\0\0")
     msg.serialize(b)
