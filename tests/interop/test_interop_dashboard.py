@@ -425,8 +425,12 @@ def test_plot_draws_fields_of_a_topic_without_loss(
     page.wait_text(".series[data-label='/odometry/z']", "/odometry/z")
     assert "path=%2Fodometry%2Fz" in page.evaluate("location.href")
     page.wait("return document.querySelector('.chart canvas').width > 300")
-    page.click(".series[data-label='/odometry/y'] button", "left axis")
-    page.wait_text(".series[data-label='/odometry/y'] button", "right axis")
+    left, right = page.evaluate(
+        "['.series .swatch', '.series .num'].map(e => document.querySelector(e).getBoundingClientRect().left)"
+    )
+    assert (
+        left < page.evaluate("document.querySelector('.series .label').getBoundingClientRect().left") < right
+    )
     page.click(".series[data-label='/odometry/z'] button[title^=Remove]")
     page.wait("return !document.querySelector(\".series[data-label='/odometry/z']\")")
 

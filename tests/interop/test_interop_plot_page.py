@@ -203,3 +203,121 @@ def test_series_is_drawn_over_another(serve: Callable[..., Served], browse: Call
     page.wait(f"return !({drawn})")
     page.reload()
     page.wait("return document.querySelector('.series')")
+
+
+HEIGHT_OF = """(() => { const c = document.querySelector('.chart canvas'), wanted = %s, rows = [];
+  const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+  const o = document.querySelector('.u-over').getBoundingClientRect(), at = c.getBoundingClientRect();
+  for (let y = Math.round(o.top - at.top); y < o.bottom - at.top; y++)
+    for (let x = Math.round(o.left - at.left) + 2; x < o.right - at.left; x++)
+      if (wanted.every((v, i) => Math.abs(v - d[4 * (y * c.width + x) + i]) < 40)) rows.push((o.bottom - at.top - y) / o.height);
+  return rows.length ? rows.reduce((a, b) => a + b) / rows.length : null; })()"""
+"""Where the points of a color are, on average: 0 at the lower end of the chart, 1 at the upper one."""
+COLORS = {"x": [0x2F, 0x7E, 0xD8], "y": [0xE4, 0x57, 0x2E], "z": [0x2A, 0x9D, 0x5C]}
+
+
+def middle(page: Page, number: int) -> tuple[float, float]:
+    """Return where the numbers of a y axis are; ``number`` counts the axes that are used, from 0."""
+    x, y = page.evaluate(
+        "(r => [r.x + r.width / 2, r.y + r.height / 2])"
+        f"(document.querySelectorAll('.u-axis.scaled')[{number}].getBoundingClientRect())"
+    )
+    return x, y
+
+
+def press_key(page: Page, key: str) -> None:
+    for kind in ("rawKeyDown", "keyUp"):
+        page.call("Input.dispatchKeyEvent", type=kind, key=key)
+
+
+@needs_chromium
+def test_series_have_axes_of_their_own_that_are_kept_in_the_address(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    moving = publisher(served, "/path", Vector3, latch=True, queue_size=None)
+
+    async def publish() -> None:
+        for number in range(50):
+            await moving.publish(number / 50, 1000.0 + number, -5.0)
+
+    page = browse(address(served, "plot?path=/path/x&path=/path/y&path=/path/z&window=all"))
+    page.wait_text("#state", "connected")
+    served.run(publish())
+    page.wait_text(".series[data-label='/path/z'] .num", "-5")
+    page.wait("return document.querySelectorAll('.u-axis.scaled').length === 1")
+    for field, axis in (("y", "2"), ("z", "5")):
+        page.choose(f"select[aria-label='Axis of /path/{field}']", axis)
+    page.wait("return document.querySelectorAll('.u-axis.scaled').length === 3")
+    page.click("button", "Y axes")
+    page.type("input[aria-label='axis 2, right: label, unit']", "mm")
+    page.type("input[aria-label='axis 5, left: from']", "-10")
+    page.type("input[aria-label='axis 5, left: to']", "0")
+    page.evaluate("document.activeElement.blur()")
+    page.wait("return location.hash.includes('range=5+-10+0') && location.hash.includes('label=2+mm')")
+    page.wait(f"return Math.abs({HEIGHT_OF % COLORS['z']} - 0.5) < 0.05")
+
+    # The same link elsewhere shows the same, and keeps it before a message has come.
+    page.reload()
+    assert "range=5+-10+0" in page.evaluate("location.hash")
+    assert "axis=2+%2Fpath%2Fy" in page.evaluate("location.hash")
+    page.wait("return document.querySelectorAll('.u-axis.scaled').length === 3")
+    page.wait(f"return Math.abs({HEIGHT_OF % COLORS['z']} - 0.5) < 0.05")
+    page.click("button", "Y axes")
+    shown = "document.querySelector(\"[aria-label='%s']\").value"
+    assert page.evaluate(shown % "axis 2, right: label, unit") == "mm"
+    assert page.evaluate(shown % "Axis of /path/y") == "2"
+    page.click("button", "Auto range")
+    page.wait("return !location.hash.includes('range=')")
+
+
+@needs_chromium
+def test_axis_is_zoomed_and_panned_alone_by_the_wheel_and_by_dragging(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    moving = publisher(served, "/path", Vector3, latch=True, queue_size=None)
+
+    async def publish() -> None:
+        for number in range(50):
+            await moving.publish(0.0, 10.0 + number % 2, 0.0)
+
+    words = "plot?path=/path/x&path=/path/y&axis=2+/path/y&range=1+-1+1&range=2+0+21&window=all"
+    page = browse(address(served, words))
+    page.wait_text("#state", "connected")
+    served.run(publish())
+    page.wait(f"return Math.abs({HEIGHT_OF % COLORS['y']} - 0.5) < 0.05")
+    x, y = middle(page, 1)
+    page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-400)
+    page.wait("return /range=2.[1-9]/.test(location.hash)")
+    assert "range=1+-1+1" in page.evaluate("location.hash")
+    for kind, down in (("mouseMoved", 0), ("mousePressed", 0), ("mouseMoved", 60), ("mouseReleased", 60)):
+        page.call(
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y + down, button="left", buttons=1, clickCount=1
+        )
+    # It follows the hand, down; the other axis stays.
+    page.wait(f"return {HEIGHT_OF % COLORS['y']} < 0.4")
+    page.wait(f"return Math.abs({HEIGHT_OF % COLORS['x']} - 0.5) < 0.05")
+    for count in (1, 2):
+        for kind in ("mousePressed", "mouseReleased"):
+            page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=count)
+    page.wait("return !location.hash.includes('range=2') && location.hash.includes('range=1')")
+    page.wait(f"return Math.abs({HEIGHT_OF % COLORS['y']} - 0.5) < 0.1")
+
+
+@needs_chromium
+def test_chart_is_panned_and_zoomed_by_keys(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/path", Vector3, latch=True, queue_size=None).publish(1.0, 2.0, 3.0))
+    page = browse(address(served, "plot?path=/path/x"))
+    page.wait_text(".series[data-label='/path/x']", "1 points")
+    shown = "[...document.querySelectorAll('button')].some(e => e.textContent === 'Follow' && !e.hidden)"
+    assert not page.evaluate(shown)
+    for key in ("-", "ArrowLeft"):
+        page.evaluate("document.querySelector('.chart').focus()")
+        press_key(page, key)
+        page.wait(f"return {shown}")
+        press_key(page, "Escape")
+        page.wait(f"return !{shown}")

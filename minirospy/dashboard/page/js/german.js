@@ -46,7 +46,9 @@ export const GERMAN = {
   "What to plot": "Was gezeichnet wird", "Time shown": "Gezeigte Zeit", "5 s": "5 s", "10 s": "10 s", "30 s": "30 s", "1 min": "1 min", "5 min": "5 min", "Follow": "Folgen",
   "Type a path above, choose “plot” next to a field in Topics, or drag the field here.": "Oben einen Pfad eingeben, in Topics neben einem Feld „Kurve“ wählen oder das Feld hierher ziehen.", "Series": "Kurven", "Show or hide": "Zeigen oder verbergen",
   "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow": "ziehen: zoomen · Rad: zoomen · Umschalt und Rad: schieben · Doppelklick: folgen",
-  "Move to the other axis": "Auf die andere Achse", "left axis": "linke Achse", "right axis": "rechte Achse",
+  "axis {axis}, left": "Achse {axis}, links", "axis {axis}, right": "Achse {axis}, rechts", "Axis of {label}": "Achse von {label}", "Y axes": "Y-Achsen", "from": "von", "to": "bis", "auto": "auto", "{title}: from": "{title}: von", "{title}: to": "{title}: bis", "{title}: label, unit": "{title}: Beschriftung, Einheit", "label, unit": "Beschriftung, Einheit",
+  "Auto range": "Bereich automatisch", "All y axes follow their values again": "Alle y-Achsen folgen wieder ihren Werten", "wheel: zoom · drag: pan · double click: follow the values": "Rad: zoomen · ziehen: schieben · Doppelklick: den Werten folgen",
+  "Chart: left and right pan, plus and minus zoom, Escape follows": "Diagramm: links und rechts schieben, Plus und Minus zoomen, Escape folgt",
   "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",
   // graph
   "Nodes and topics (active)": "Nodes und Topics (aktive)", "Nodes and topics (all)": "Nodes und Topics (alle)", "Nodes only": "Nur Nodes", "What is shown": "Was gezeigt wird", "Filter names": "Namen filtern",

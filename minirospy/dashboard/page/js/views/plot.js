@@ -1,5 +1,6 @@
-// Plots of numbers of messages: paths of fields, two axes, zoom and pan while they stream, CSV and PNG.
+// Plots of numbers of messages: paths of fields, several y axes, zoom and pan while they stream, CSV and PNG.
 
+import { Axes, titleOf } from "../axes.js";
 import { KINDS, derivedOf, pairs, rangeOf } from "../derived.js";
 import { download, fill, h, number, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
@@ -10,6 +11,7 @@ const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], 
 const USUAL_WINDOW = "10";
 const MOST_PAIRS = 5000; // points of one series over another
 const FRAME_MS = 33;
+const QUIET_MS = 300; // without another change, until it is in the address
 const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
 
 export class Plot {
@@ -25,9 +27,15 @@ export class Plot {
     this.pausedAt = null;
     this.chart = null;
     this.isDirty = true;
-    this.ranges = [[0, 1], [0, 1]]; // of the axes, where one series is over another
+    this.ranges = new Map(); // scale -> range of its values, where one series is over another
+    this.axes = new Axes(words, (isBuilt) => {
+      if (isBuilt) this.rebuild();
+      this.isDirty = true;
+      clearTimeout(this.unsaved);
+      this.unsaved = setTimeout(() => this.remember(), QUIET_MS);
+    });
     this.over = words.get("x") ?? ""; // label of the series on the x axis; time where it is empty
-    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse())); // label -> kind, as the address has them
+    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse())); // label -> kind, where it is not as it comes
 
     this.known = h("datalist", { id: uniqueId("paths") });
     this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
@@ -40,16 +48,16 @@ export class Plot {
     this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
       this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"), this.problem);
-    this.area = h("div", { class: "panel chart" });
+    this.area = h("div", { class: "panel chart", tabindex: 0, role: "group", "aria-label": "Chart: left and right pan, plus and minus zoom, Escape follows" });
     this.hint = h("p", { class: "empty" }, "Type a path above, choose “plot” next to a field in Topics, or drag the field here.");
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
     main.append(this.form,
-      h("div", { class: "bar" }, this.pauseButton, this.window, h("label", {}, "x axis", this.axis), this.liveButton,
+      h("div", { class: "bar" }, this.pauseButton, this.window, h("label", {}, "x axis", this.axis), this.axes.button, this.liveButton, this.axes.autoButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
         h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow"))),
-      this.area, this.legend);
+      this.axes.element, this.area, this.legend);
     this.area.append(this.hint);
     for (const element of [this.area, this.form, this.legend]) {
       element.addEventListener("dragover", (event) => { if (event.dataTransfer.types.includes("text/plain")) event.preventDefault(); });
@@ -65,12 +73,14 @@ export class Plot {
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.area);
     this.area.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    this.area.addEventListener("keydown", (event) => this.key(event));
     for (const path of words.getAll("path")) this.add(path);
     this.timer = setInterval(() => this.draw(), FRAME_MS);
   }
 
   close() {
     clearInterval(this.timer);
+    clearTimeout(this.unsaved);
     for (const end of [...this.ending, ...this.ends.values()]) end();
     this.observer.disconnect();
     this.chart?.destroy();
@@ -120,6 +130,8 @@ export class Plot {
     }
     series.row.remove();
     if (this.over === series.label) this.over = "";
+    this.kinds.delete(series.label);
+    this.axes.choose(series.label, 1);
     this.showAxis();
     this.remember();
     this.rebuild();
@@ -129,7 +141,7 @@ export class Plot {
   remember() {
     const span = this.window.value;
     this.place.remember([...[...this.ends.keys()].map((path) => ["path", path]), ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]]),
-      ...(this.over ? [["x", this.over]] : []), ...[...this.series.values()].filter(({ kind }) => kind).map(({ label, kind }) => ["show", `${kind} ${label}`])]);
+      ...(this.over ? [["x", this.over]] : []), ...[...this.kinds].map(([label, kind]) => ["show", `${kind} ${label}`]), ...this.axes.words()]);
   }
 
   /** Offer time and each series for the x axis. */
@@ -199,11 +211,13 @@ export class Plot {
     const used = new Set([...this.series.values()].map((each) => each.color));
     const color = COLORS.find((each) => !used.has(each)) ?? COLORS[this.series.size % COLORS.length];
     const raw = new Samples();
-    const series = { label, path, raw, samples: raw, kind: "", derived: null, color, axis: "y", isHidden: false };
+    const series = { label, path, raw, samples: raw, kind: "", derived: null, color, isHidden: false };
     const known = this.kinds.get(label) ?? "";
     if (KINDS.some(([kind]) => kind === known)) this.setKind(series, known);
     const kinds = h("select", { class: "small", "aria-label": t("How {label} is shown", { label }), onchange: () => {
       this.setKind(series, kinds.value);
+      if (kinds.value) this.kinds.set(label, kinds.value);
+      else this.kinds.delete(label);
       this.remember();
     } }, KINDS.map(([kind, name]) => h("option", { value: kind }, t(name))));
     kinds.value = series.kind;
@@ -215,12 +229,7 @@ export class Plot {
       this.rebuild();
     } });
     swatch.style.background = color;
-    const axis = h("button", { type: "button", class: "small", title: "Move to the other axis", onclick: () => {
-      series.axis = series.axis === "y" ? "y2" : "y";
-      setText(axis, series.axis === "y" ? t("left axis") : t("right axis"));
-      this.rebuild();
-    } }, "left axis");
-    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, kinds, axis,
+    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, kinds, this.axes.choice(series),
       h("button", { type: "button", class: "small", title: t("Remove {name}", { name: label }), onclick: () => this.remove(series) }, "×"));
     series.row.dataset.label = label;
     this.series.set(label, series);
@@ -270,22 +279,23 @@ export class Plot {
     const style = getComputedStyle(document.documentElement);
     const text = style.getPropertyValue("--muted").trim();
     const line = style.getPropertyValue("--line").trim();
-    const axis = (more) => ({ stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui", ...more });
+    const styled = (more) => ({ stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui", ...more });
     if (this.over) {
-      this.chart = this.makeOver(shown, axis);
+      this.chart = this.makeOver(shown, styled);
       return;
     }
-    const hasRight = shown.some((each) => each.axis === "y2");
+    const axes = this.axes.drawn(shown, styled);
+    const scale = ({ label }) => [this.axes.scaleOf(label), { range: (_, low, high) => this.axes.rangeOf(label, low === null ? [0, 1] : globalThis.uPlot.rangeNum(low, high, 0.1, true)) }];
     this.chart = new globalThis.uPlot({
       width: this.area.clientWidth,
       height: this.area.clientHeight,
-      padding: [12, hasRight ? 0 : 14, 0, 0],
+      padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
       legend: { show: false },
       cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.live() }, points: { size: 6 } },
-      scales: { x: { time: false, range: () => this.range().map((each) => each - (this.origin ?? 0)) } },
-      series: [{}, ...shown.map(({ label, color, axis: scale }) => ({ label, stroke: color, width: 1.5, scale, spanGaps: true, points: { show: false } }))],
-      axes: [axis({ values: (_, all) => all.map((each) => `${number(each)} s`) }), axis({ scale: "y", size: 64, show: shown.some((each) => each.axis === "y") }),
-        ...(hasRight ? [axis({ scale: "y2", side: 1, size: 64, grid: { show: false } })] : [])],
+      scales: { x: { time: false, range: () => this.range().map((each) => each - (this.origin ?? 0)) }, ...Object.fromEntries(shown.map(scale)) },
+      series: [{}, ...shown.map((each) => ({ label: each.label, stroke: each.color, width: 1.5, scale: this.axes.scaleOf(each.label), spanGaps: true,
+        points: { size: 6, fill: each.color, show: () => each.samples.count === 1 } }))], // a line has two points
+      axes: [styled({ values: (_, all) => all.map((each) => `${number(each)} s`) }), ...axes],
       hooks: {
         setSelect: [(chart) => {
           const { left, width } = chart.select;
@@ -297,14 +307,16 @@ export class Plot {
         setCursor: [() => this.showValues()],
       },
     }, [[], ...shown.map(() => [])], this.area);
+    this.axes.attach(this.chart);
   }
 
   /** Return a chart of series over another one. */
-  makeOver(shown, axis) {
+  makeOver(shown, styled) {
     const line = (chart, number) => {
       const [xs, ys] = chart.data[number];
+      const scale = this.axes.scaleOf(shown[number - 1].label);
       const path = new Path2D();
-      xs.forEach((x, index) => path[index ? "lineTo" : "moveTo"](chart.valToPos(x, "x", true), chart.valToPos(ys[index], "y", true)));
+      xs.forEach((x, index) => path[index ? "lineTo" : "moveTo"](chart.valToPos(x, "x", true), chart.valToPos(ys[index], scale, true)));
       chart.ctx.save();
       chart.ctx.strokeStyle = shown[number - 1].color;
       chart.ctx.lineWidth = 1.5 * devicePixelRatio;
@@ -314,23 +326,27 @@ export class Plot {
         const last = xs.length - 1;
         chart.ctx.fillStyle = shown[number - 1].color;
         chart.ctx.beginPath();
-        chart.ctx.arc(chart.valToPos(xs[last], "x", true), chart.valToPos(ys[last], "y", true), 4 * devicePixelRatio, 0, 2 * Math.PI);
+        chart.ctx.arc(chart.valToPos(xs[last], "x", true), chart.valToPos(ys[last], scale, true), 4 * devicePixelRatio, 0, 2 * Math.PI);
         chart.ctx.fill();
       }
       chart.ctx.restore();
       return null;
     };
-    return new globalThis.uPlot({
+    const axes = this.axes.drawn(shown, styled);
+    const scale = ({ label }) => [this.axes.scaleOf(label), { range: () => this.axes.rangeOf(label, this.ranges.get(this.axes.scaleOf(label)) ?? [0, 1]) }];
+    const chart = new globalThis.uPlot({
       mode: 2,
       width: this.area.clientWidth,
       height: this.area.clientHeight,
-      padding: [12, 14, 0, 0],
+      padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
       legend: { show: false },
       cursor: { show: false },
-      scales: { x: { time: false, range: () => this.ranges[0] }, y: { range: () => this.ranges[1] } },
-      series: [null, ...shown.map(({ label }) => ({ label, paths: line, facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }] }))],
-      axes: [axis({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), axis({ size: 64 })],
+      scales: { x: { time: false, range: () => this.ranges.get("x") ?? [0, 1] }, ...Object.fromEntries(shown.map(scale)) },
+      series: [null, ...shown.map(({ label }) => ({ label, paths: line, facets: [{ scale: "x", auto: true }, { scale: this.axes.scaleOf(label), auto: true }] }))],
+      axes: [styled({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), ...axes],
     }, [null, ...shown.map(() => [[], []])], this.area);
+    this.axes.attach(chart);
+    return chart;
   }
 
   resize() {
@@ -341,17 +357,32 @@ export class Plot {
   wheel(event) {
     if (!this.chart || this.over || this.origin === null) return;
     event.preventDefault();
-    const [from, to] = this.range();
-    const span = to - from;
     const by = event.deltaX || (event.shiftKey ? event.deltaY : 0);
-    if (by) {
-      this.zoom = { min: from + span * 0.0015 * by, max: to + span * 0.0015 * by };
-    } else {
-      const left = event.clientX - this.chart.over.getBoundingClientRect().left;
-      const at = this.chart.posToVal(Math.max(0, left), "x") + this.origin;
-      const factor = Math.min(10, Math.max(0.1, Math.exp(event.deltaY * 0.002)));
-      this.zoom = { min: at - (at - from) * factor, max: at + (to - at) * factor };
-    }
+    const left = event.clientX - this.chart.over.getBoundingClientRect().left;
+    if (by) this.pan(0.0015 * by);
+    else this.zoomBy(Math.exp(event.deltaY * 0.002), this.chart.posToVal(Math.max(0, left), "x") + this.origin);
+  }
+
+  key(event) {
+    if (event.target !== this.area || event.ctrlKey || event.altKey || event.metaKey || this.origin === null) return;
+    const act = { ArrowLeft: () => this.pan(-0.1), ArrowRight: () => this.pan(0.1), "+": () => this.zoomBy(0.5), "-": () => this.zoomBy(2), Escape: () => this.live() }[event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+
+  /** Show the time later by a share of what is shown. */
+  pan(share) {
+    const [from, to] = this.range();
+    this.zoom = { min: from + (to - from) * share, max: to + (to - from) * share };
+    this.isDirty = true;
+  }
+
+  /** Show more time by a factor, or less; a moment keeps its place, else the newest. */
+  zoomBy(factor, at = this.range()[1]) {
+    const [from, to] = this.range();
+    const by = Math.min(10, Math.max(0.1, factor));
+    this.zoom = { min: at - (at - from) * by, max: at + (to - at) * by };
     this.isDirty = true;
   }
 
@@ -363,8 +394,11 @@ export class Plot {
       const [from, to] = this.range();
       if (this.over) {
         const over = this.series.get(this.over)?.samples ?? new Samples();
-        const data = this.visible().map(({ samples }) => pairs(over, samples, from, to, MOST_PAIRS));
-        this.ranges = [0, 1].map((which) => rangeOf(data.map((each) => each[which])));
+        const shown = this.visible();
+        const data = shown.map(({ samples }) => pairs(over, samples, from, to, MOST_PAIRS));
+        const scales = shown.map(({ label }) => this.axes.scaleOf(label));
+        this.ranges = new Map([["x", rangeOf(data.map(([xs]) => xs))],
+          ...scales.map((scale) => [scale, rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys))])]);
         this.chart.setData([null, ...data]);
         this.showValues();
         return;
@@ -421,12 +455,13 @@ export class Plot {
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(source, 0, 0);
     context.font = `${13 * scale}px system-ui, sans-serif`;
+    const isMany = new Set(rows.map(({ label }) => this.axes.of(label))).size > 1;
     rows.forEach(({ label, color }, row) => {
       const y = source.height + (row * 20 + 16) * scale;
       context.fillStyle = color;
       context.fillRect(16 * scale, y - 9 * scale, 14 * scale, 9 * scale);
       context.fillStyle = style.getPropertyValue("--text");
-      context.fillText(label, 38 * scale, y);
+      context.fillText(isMany ? `${label} (${titleOf(this.axes.of(label))})` : label, 38 * scale, y);
     });
     canvas.toBlob((blob) => download("plot.png", blob));
   }
