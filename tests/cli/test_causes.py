@@ -79,6 +79,8 @@ def test_suspended_node_is_said_to_be_suspended(master: str, command: Any) -> No
             assert process.stdout is not None
             assert process.stdout.readline() == "up\n"
             process.send_signal(signal.SIGSTOP)
+            # Until one thread has seen the signal, the others run on.
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             status, _, err = command("rosnode", "ping", "-c", "1", "/node")
         finally:
             process.send_signal(signal.SIGCONT)

@@ -47,10 +47,17 @@ async def until(node: Node, topic: str, kind: type, is_right: Callable[[object],
 async def driven(
     node: Node, commands: Publisher[Twist], twist: Twist, topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Publish a command until a pose is right: a turtle follows it for a second, and poses may come later."""
+    """Publish a command until a pose is right."""
+    return await commanded(node, lambda: commands.publish(twist), topic, is_right)
+
+
+async def commanded(
+    node: Node, command: Callable[[], Awaitable[None]], topic: str, is_right: Callable[[object], bool]
+) -> object:
+    """Repeat a command until a pose is right: a turtle follows it for a second, and poses may come later."""
     following = asyncio.ensure_future(until(node, topic, Pose, is_right))
     while not following.done():
-        await commands.publish(twist)
+        await command()
         await asyncio.wait({following}, timeout=0.2)
     return following.result()
 
@@ -213,7 +220,11 @@ def test_arrow_keys_drive_a_turtle_that_is_drawn(master: str, tmp_path: Path) ->
                 async for twist in keys:
                     assert (twist.linear.x, twist.angular.z) == (linear, angular)
                     break
-            await until(node, "turtle1/pose", Pose, lambda pose: pose.angular_velocity == -2)
+
+            async def turn() -> None:
+                teleop.type("\x1b[C")
+
+            await commanded(node, turn, "turtle1/pose", lambda pose: pose.angular_velocity == -2)
 
         run(body)
         teleop.type("q")
