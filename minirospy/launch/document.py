@@ -151,13 +151,21 @@ class Tag:
             raise self.error(f"invalid bool value for {key}: {text} (it is 'true' or 'false')")
         return value
 
-    def number(self, key: str, default: float) -> float:
+    def number(self, key: str, default: float, *, may_be_empty: bool = False) -> float:
         """Return an attribute that is a number. Raises LaunchError."""
         text = self.optional(key)
         try:
-            return default if text is None else float(text)
+            return default if text is None or (may_be_empty and not text) else float(text)
         except ValueError:
             raise self.error(f"invalid float value for {key}: {text}") from None
+
+    def integer(self, key: str, default: int) -> int:
+        """Return an attribute that is a whole number; the default where it is empty. Raises LaunchError."""
+        text = self.optional(key)
+        try:
+            return int(text) if text else default
+        except ValueError:
+            raise self.error(f"'{key}' must be a number: [{text}]") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """Return an attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""

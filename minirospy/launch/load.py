@@ -61,12 +61,16 @@ class LaunchSource(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """The settings that a tag inherits from those around it. ``private``: parameters of every node that follows."""
+    """The settings that a tag inherits from those around it. ``private``: parameters of every node that follows.
+
+    ``machine`` is the default one. It alone is passed on to what follows the group or include that declares it, too.
+    """
 
     namespace: str = "/"
     remaps: tuple[tuple[str, str], ...] = ()
     env: tuple[tuple[str, str], ...] = ()
     private: tuple[tuple[str, object], ...] = ()
+    machine: str = ""
 
 
 @dataclass
@@ -278,8 +282,8 @@ class _File:
             "master": self._master,
         }
 
-    def read(self, text: bytes, scope: _Scope) -> None:
-        """Read the file's text. Raises LaunchError."""
+    def read(self, text: bytes, scope: _Scope) -> _Scope:
+        """Read the file's text; return the scope at its end. Raises LaunchError."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
         if path not in self._spec.files:
             self._spec.files.append(path)
@@ -289,6 +293,7 @@ class _File:
             self._spec.warnings.append(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
         for tag in root.children():
             scope = self._read(tag, scope)
+        return scope
 
     def report(self, error: LaunchError) -> None:
         """Raise a fault, or collect it where all are wanted."""
@@ -318,11 +323,8 @@ class _File:
     # --- args, and what structures a file
 
     def _arg(self, tag: Tag, scope: _Scope) -> _Scope:
-        name = tag.required("name")
-        value, default = tag.optional("value"), tag.optional("default")
+        name, value, default = _arg_texts(tag)
         args, values = self._args, self._substitution.args
-        if value is not None and default is not None:
-            raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")
         if name in args.declared:
             raise tag.error(f"arg '{name}' has already been declared")
         args.declared.add(name)
@@ -351,7 +353,7 @@ class _File:
         for child in tag.children():
             inner = self._read(child, inner)
         self._args.declared, self._substitution.args = declared, args
-        return scope
+        return replace(scope, machine=inner.machine)
 
     def _include(self, tag: Tag, scope: _Scope) -> _Scope:
         file = tag.required("file")
@@ -370,12 +372,14 @@ class _File:
                 inner = self._read(child, inner, ("arg", "env"))
             elif child.applies():
                 child.warn_of_attributes(self._spec.warnings.append)
-                name, value = child.required("name"), child.optional("value")
-                value = child.optional("default") if value is None else value
+                name, value, default = _arg_texts(child)
+                if name in given and not hands_on_all:
+                    raise child.error(f"arg '{name}' has already been declared")
+                if value is None:
+                    # The value that is handed on goes before a default.
+                    value = given.get(name, passed.get(name, default))
                 if value is None:
                     raise child.error(f'<arg name="{name}"> of an <include> needs a value')
-                if name in given:
-                    raise child.error(f"arg '{name}' has already been declared")
                 given[name] = value
         self._spec.includes.append((self._file, file))
         try:
@@ -386,11 +390,11 @@ class _File:
 
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)
-        _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
+        inner = _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
         unused = set(given) - args.declared
         if unused and not hands_on_all:
             raise tag.error(f"unused args [{', '.join(sorted(unused))}] for include of [{file}]")
-        return scope
+        return replace(scope, machine=inner.machine)
 
     def _remap(self, tag: Tag, scope: _Scope) -> _Scope:
         pair = (tag.required("from"), tag.required("to"))
@@ -424,7 +428,7 @@ class _File:
             env_loader=tag.optional("env-loader") or "",
             user=tag.optional("user") or "",
             password=tag.optional("password") or "",
-            ssh_port=int(tag.number("ssh-port", 22)),
+            ssh_port=tag.integer("ssh-port", 22),
             timeout=timeout,
             file=self._file,
             line=tag.line,
@@ -435,7 +439,7 @@ class _File:
             where = f"{other.file}:{other.line}"
             raise tag.error(f"machine [{machine.name}] is declared otherwise at {where}")
         if tag.choice("default", ("false", "true", "never")) == "true":
-            self._spec.default_machine = machine.name
+            return replace(scope, machine=machine.name)
         return scope
 
     def _master(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -514,10 +518,10 @@ class _File:
         if "/" in name:
             raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
         node = self._process(tag, scope, name)
-        seconds, retry = tag.number("time-limit", 60), tag.number("retry", 0)
+        seconds = tag.number("time-limit", 60, may_be_empty=True)
         if seconds <= 0:
             raise tag.error("'time-limit' must be a positive number of seconds")
-        self._spec.tests.append(TestSpec(test_name, node, seconds, int(retry)))
+        self._spec.tests.append(TestSpec(test_name, node, seconds, tag.integer("retry", 0)))
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
@@ -552,9 +556,9 @@ class _File:
             respawn=respawn,
             respawn_delay=tag.number("respawn_delay", 0.0),
             required=required,
-            cwd=tag.choice("cwd", ("ROS_HOME", "node")) if tag.has("cwd") else "",
+            cwd=_folder(tag),
             launch_prefix=tag.optional("launch-prefix") or "",
-            machine=tag.optional("machine") or "",
+            machine=tag.optional("machine") or scope.machine,
             remaps=inner.remaps,
             env=inner.env,
             file=self._file,
@@ -575,7 +579,7 @@ class _File:
         namespace = tag.optional("ns")
         if namespace is None:
             return scope
-        if not namespace and tag.name != "include":
+        if not namespace:
             raise tag.error(f"<{tag.name}> tag has an empty 'ns' attribute")
         if names.is_private(namespace):
             raise tag.error(f"cannot turn [{namespace}] into a global name")
@@ -587,3 +591,19 @@ class _File:
         if not tag.has("ns") or inner.namespace.strip("/") == "":
             raise tag.error("'ns' attribute must be set in order to use 'clear_params'")
         self._spec.clear.append(names.canonicalize(inner.namespace))
+
+
+def _folder(tag: Tag) -> str:
+    """Return the ``cwd`` of a node; "" where it is not there. Raises LaunchError."""
+    # ROS knows this one in lower case, too.
+    if not tag.has("cwd") or tag.optional("cwd") == "ros_home":
+        return "ROS_HOME" if tag.has("cwd") else ""
+    return tag.choice("cwd", ("ROS_HOME", "node"))
+
+
+def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
+    """Return the name, value and default of an ``<arg>``. Raises LaunchError."""
+    name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
+    if value is not None and default is not None:
+        raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")
+    return name, value, default

@@ -76,6 +76,8 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
         if not param and not isinstance(value, dict) and not tag.optional("ns"):
             raise tag.error(f"<rosparam> {where}: 'param' attribute must be set for non-dictionary values")
         name = names.join(namespace, param) if param else namespace
+        if not isinstance(value, dict) and not name.strip("/"):
+            raise tag.error(f"<rosparam> {where}: Cannot load non-dictionary types into global namespace '/'")
         check_parameter(value, name)
     except ValueTextError as error:
         why = error.why if len(text) > 60 or file else str(error)

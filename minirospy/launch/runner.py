@@ -180,7 +180,7 @@ class Launcher:
         """Raise LaunchError where a node cannot be run."""
         if elsewhere and self._environment.local:
             node = elsewhere[0]
-            why = f"node [{node.name}] is for machine [{node.machine or self._spec.default_machine}]"
+            why = f"node [{node.name}] is for machine [{node.machine}]"
             raise LaunchError(
                 node.file,
                 node.line,

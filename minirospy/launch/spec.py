@@ -137,7 +137,6 @@ class LaunchSpec:
     includes: list[tuple[str, str]] = field(default_factory=list)
     args: dict[str, ArgDoc] = field(default_factory=dict)
     machines: dict[str, MachineSpec] = field(default_factory=dict)
-    default_machine: str = ""
     warnings: list[LaunchError] = field(default_factory=list)
 
     def runnables(self) -> Iterator[NodeSpec]:
@@ -147,7 +146,7 @@ class LaunchSpec:
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
         """Return the machine that a node is to run on; None is this one. Raises LaunchError."""
-        name = node.machine or self.default_machine
+        name = node.machine
         if name in ("", "localhost"):
             return None
         machine = self.machines.get(name)

@@ -123,9 +123,49 @@ def test_includes_have_args_and_namespaces_of_their_own(packages: Packages, tmp_
     assert spec.files == [str(outer), str(inner)]
 
 
+def test_handed_on_arg_goes_before_a_default_of_the_include(packages: Packages, tmp_path: Path) -> None:
+    inner = tmp_path / "inner.launch"
+    inner.write_text(
+        '<launch><arg name="k" default="d"/><arg name="n" default="e"/><param name="p" value="$(arg k) $(arg n)"/></launch>'
+    )
+    outer = tmp_path / "outer.launch"
+    outer.write_text(
+        '<launch><arg name="k" default="o"/>'
+        '<include file="$(dirname)/inner.launch" ns="one" pass_all_args="true">'
+        '<arg name="k" default="i"/><arg name="n" default="j"/></include>'
+        '<include file="$(dirname)/inner.launch" ns="two" pass_all_args="true"><arg name="k"/></include>'
+        '<include file="$(dirname)/inner.launch" ns="three" pass_all_args="true"><arg name="k" default="i"/>'
+        '<arg name="k" value="v"/></include>'
+        '<include file="$(dirname)/inner.launch" ns="four"><arg name="k" default="i"/></include></launch>'
+    )
+    found = load_files([str(outer)], {}, packages).params
+    assert found == {"/one/p": "o j", "/two/p": "o e", "/three/p": "v e", "/four/p": "i e"}
+
+
 def test_anon_is_the_same_name_in_all_places(packages: Packages) -> None:
     spec = load(packages, '<node name="$(anon n)" pkg="p" type="t"/><param name="x" value="$(anon n)"/>')
     assert spec.nodes[0].base_name == spec.params["/x"]
+
+
+def test_default_machine_is_that_of_the_nodes_that_follow(packages: Packages, tmp_path: Path) -> None:
+    inner = tmp_path / "inner.launch"
+    inner.write_text(
+        '<launch><node name="c" pkg="p" type="t"/><machine name="k" address="10.0.0.2" default="true"/></launch>'
+    )
+    body = (
+        '<node name="a" pkg="p" type="t"/><group><machine name="m" address="10.0.0.1" default="true"/></group>'
+        f'<node name="b" pkg="p" type="t"/><include file="{inner}"/><node name="d" pkg="p" type="t"/>'
+        '<node name="e" pkg="p" type="t" machine="m"/>'
+    )
+    spec = load(packages, body)
+    assert {node.name: node.machine for node in spec.nodes} == {
+        "/a": "",
+        "/b": "m",
+        "/c": "m",
+        "/d": "k",
+        "/e": "m",
+    }
+    assert spec.machine_of(spec.nodes[0]) is None
 
 
 def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
@@ -196,6 +236,9 @@ def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
         ('<group clear_params="true"/>', "'ns' attribute must be set in order to use"),
         ('<remap from="a b" to="c"/>', "not a valid ROS name"),
         ('<env name="" value="1"/>', "empty 'name'"),
+        ('<include file="x" ns=""/>', "<include> tag has an empty 'ns' attribute"),
+        ('<test test-name="x" pkg="p" type="t" retry="1.5"/>', "'retry' must be a number"),
+        ('<rosparam ns="/">[1]</rosparam>', "Cannot load non-dictionary types into global namespace '/'"),
         ('<machine name="m"/>', "missing required attribute: 'address'"),
         ('<machine name="m" address="a" timeout="0"/>', "positive number"),
         ('<machine name="m" address="a" ros-root="/x"/>', "use env-loader"),

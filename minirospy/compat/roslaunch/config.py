@@ -120,7 +120,6 @@ class ROSLaunchConfig:
         """Add the content of launch files."""
         self._spec.commands += spec.commands
         self._spec.warnings += spec.warnings
-        self._spec.default_machine = spec.default_machine or self._spec.default_machine
         for node in spec.nodes:
             self.add_node(Node.of(node))
         self.tests += map(Test.of_test, spec.tests)
@@ -144,7 +143,6 @@ class ROSLaunchConfig:
             commands=self._spec.commands,
             files=self.roslaunch_files,
             machines={name: machine.spec for name, machine in self.machines.items() if name},
-            default_machine=self._spec.default_machine,
             warnings=self._spec.warnings,
         )
 
