@@ -108,7 +108,8 @@ class Echo:
     def _block(self, value: object) -> str:
         from minirospy.idl.message import strify_message
 
-        if isinstance(value, bytes):
+        # ROS shows a field char[] as the bytes that it is, and fails on one of uint8[].
+        if isinstance(value, bytes) and not self._type.startswith("char"):
             value = list(value)
         if not (self._strings and self._arrays):
             value = elided(value, self._type, self._strings, self._arrays)
@@ -127,14 +128,14 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 
 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
-    """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays."""
+    """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays.
+
+    As in ROS, messages in an array are shown whole, and the note of an array of fixed length has its ``[3``.
+    """
     if type_.endswith("]") or isinstance(value, list | tuple):
-        element = type_.partition("[")[0]
         values = cast("Sequence[object]", value)
-        if not arrays or (element == "string" and not strings):
-            return f"<array type: {element}, length: {len(values)}>"
-        if len(values) and is_message(values[0]):
-            return [elided(each, element, strings, arrays) for each in values]
+        if not arrays or (type_.startswith("string[") and not strings):
+            return f"<array type: {type_.rstrip('[]')}, length: {len(values)}>"
         return value
 
     if isinstance(value, str):

@@ -118,23 +118,24 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
-    ``now`` represents the time, ``auto`` a stamped header.
+    ``now`` represents the time, ``auto`` a stamped header, whose ``seq`` is 1, as of the first call of a proxy.
     Raise NotFoundError where the type is not installed, MessageException where the values do not fit.
     """
     from minirospy.idl.load import service_class
+    from minirospy.idl.message import number_header
     from minirospy.introspect.messages import fill, words_of
 
-    return fill(service_class(type_)._request_class(), arguments, words_of(time.time_ns()))
+    request = fill(service_class(type_)._request_class(), arguments, words_of(time.time_ns()))
+    number_header(request, 1)
+    return request
 
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Return the response to a filled request. Raise NotFoundError, ServiceException with the handler's text."""
     from minirospy.idl.load import service_class
-    from minirospy.idl.message import number_header
     from minirospy.introspect.messages import check, serialize
 
     cls = service_class(type_)
-    number_header(request, 1)
     check(request)
     uri = service_uri(graph, service)
     try:

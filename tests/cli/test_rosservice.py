@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gazebo_msgs.srv import SetLightProperties
 from mavros_msgs.srv import CommandVtolTransition
 
+from minirospy.cli.ros.rosservice import main
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.tcpros import InterfaceType
 
@@ -78,7 +80,20 @@ def test_header_of_a_request_is_numbered(robot: Any, command: Any) -> None:
         "/vtol", type_, answer, request_type=f"{type_.name}Request", response_type=f"{type_.name}Response"
     )
     robot.loop.run(robot.node.serve(server))
-    assert command("rosservice", "call", "/vtol", "header: {seq: 7}").out == "success: True\nresult: 1\n"
+    answered = "success: True\nresult: 1\n"
+    assert command("rosservice", "call", "/vtol", "header: {seq: 7}").out == answered
+    out = command("rosservice", "call", "-v", "/vtol", "header: {seq: 7}").out
+    assert out.startswith("header: \n  seq: 1\n")
+    assert out.endswith(f"state: 0\n---\n{answered}")
+
+
+def test_nested_arguments_are_named(robot: Any, capfd: pytest.CaptureFixture[str]) -> None:
+    type_ = InterfaceType("gazebo_msgs/SetLightProperties", SetLightProperties._md5sum)
+    names = {"request_type": f"{type_.name}Request", "response_type": f"{type_.name}Response"}
+    robot.loop.run(robot.node.serve(robot.node.make_service("/light", type_, lambda *_: b"", **names)))
+    assert main(["call", "/light", "light: 1"]) == 2
+    arguments = "light_name cast_shadows diffuse.r diffuse.g diffuse.b diffuse.a"
+    assert f"Service arguments are: [{arguments} " in capfd.readouterr().err
 
 
 def test_call_verbosely_and_from_standard_input(

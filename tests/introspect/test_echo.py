@@ -7,8 +7,10 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Point, Point32, Polygon, PoseStamped
-from sensor_msgs.msg import Image, JointState
+from rosbridge_library import msg as rosbridge
+from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Bool, Empty, String
+from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy.errors import DeserializationError, MessageException, NotFoundError, UsageError
 from minirospy.introspect.echo import Echo, Filter, fill_message
@@ -54,6 +56,18 @@ def test_notes_in_the_place_of_arrays_and_strings() -> None:
     assert 'encoding: "<string length: 4>"\n' in echo(image, strings=False)
     joints = JointState(name=["a", "b"], position=[1.5])
     assert 'name: "<array type: string, length: 2>"\nposition: [1.5]\n' in echo(joints, strings=False)
+
+
+def test_notes_are_as_ros_writes_them() -> None:
+    """Messages in arrays are shown whole; the note of an array of fixed length keeps its bracket."""
+    info = CameraInfo()
+    assert 'K: "<array type: float64[9, length: 9>"\n' in echo(info, arrays=False)
+    markers = MarkerArray([Marker(ns="n", text="t")])
+    assert '    ns: "n"\n' in echo(markers, strings=False)
+
+
+def test_a_field_of_char_is_printed_as_bytes() -> None:
+    assert echo(rosbridge.TestChar(data=b"xy"), "data") == "b'xy'\n---\n"
 
 
 def test_plotting_has_one_header() -> None:

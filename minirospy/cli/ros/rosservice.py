@@ -216,12 +216,16 @@ def _filled_request(type_: str, values: Sequence[object]) -> Message:
     try:
         return services.fill_request(type_, values)
     except MessageException as error:
+        from minirospy.idl.load import service_class
+        from minirospy.idl.message import get_printable_message_args
+
+        expected = get_printable_message_args(service_class(type_)._request_class())
         given = [f" * {value} (type {type(value).__name__})" for value in values]
         lines = [
             f"ERROR: Incompatible arguments to call service:\n{error.__cause__ or error}",
             "Provided arguments are:",
             *given,
-            f"\nService arguments are: [{' '.join(services.service_arguments(type_))}]",
+            f"\nService arguments are: [{expected}]",
         ]
         raise WordedError(error, RosText("\n".join(lines), 2)) from error
 
