@@ -11,7 +11,7 @@ import http
 import logging
 import time
 from collections import deque
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -243,24 +243,15 @@ class Connection:
             self.answer(data)
 
     def _requested(self, request: Request) -> None:
-        self._timer.cancel()
-        headers = {name.lower(): value for name, value in request.headers.raw_items()}
-        credentials = Credentials(
-            headers.get("host", ""),
-            headers.get("origin"),
-            headers.get("authorization", ""),
-            header_items(headers, "sec-websocket-protocol"),
-            request.path,
-        )
-        is_page = headers.get("upgrade", "").lower() != "websocket"
-        grant = self._site.check(credentials, is_page=is_page)
-        if isinstance(grant, Refusal):
-            self._refuse(grant)
+        try:
+            # The target and Origin may be no URLs, with a thousand fields: neither is a reason to leave the client connected.
+            found = self._admitted(request)
+        except ValueError as error:
+            found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
+        if isinstance(found, Refusal):
+            self._refuse(found)
             return
-
-        parts = urlsplit(request.path)
-        query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
-        seen = HttpRequest(unquote(parts.path), query, headers, self.peer)
+        seen, grant, is_page = found
         if is_page:
             self._serve_page(seen, grant)
             return
@@ -273,8 +264,31 @@ class Connection:
         self._protocol.send_response(response)
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
-        self._timer = self._loop.call_later(self._limits.ping_seconds, self._ping)
+        self._watch(self._ping)
         self.session = self._door.open(self.client)
+
+    def _admitted(self, request: Request) -> tuple[HttpRequest, Grant, bool] | Refusal:
+        """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
+        headers = {name.lower(): value for name, value in request.headers.raw_items()}
+        credentials = Credentials(
+            headers.get("host", ""),
+            headers.get("origin"),
+            headers.get("authorization", ""),
+            header_items(headers, "sec-websocket-protocol"),
+            request.path,
+        )
+        is_page = headers.get("upgrade", "").lower() != "websocket"
+        grant = self._site.check(credentials, is_page=is_page)
+        if isinstance(grant, Refusal):
+            return grant
+        parts = urlsplit(request.path)
+        query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
+        return HttpRequest(unquote(parts.path), query, headers, self.peer), grant, is_page
+
+    def _watch(self, check: Callable[[], None]) -> None:
+        """Call ``check`` from now on in place of what watched the connection until now."""
+        self._timer.cancel()
+        self._timer = self._loop.call_later(self._limits.ping_seconds, check)
 
     def _select(self, offered: Sequence[Subprotocol]) -> Subprotocol | None:
         names = [name for name in offered if not name.startswith(TOKEN_PROTOCOL)]
@@ -296,7 +310,7 @@ class Connection:
             return
         self.exchange = Exchange(self, request, grant)
         self._progressed = self._loop.time()
-        self._timer = self._loop.call_later(self._limits.ping_seconds, self._watch_progress)
+        self._watch(self._watch_progress)
         try:
             handler(self.exchange)
         except Exception:  # noqa: BLE001 whatever the page's handler raises
@@ -421,14 +435,14 @@ class Connection:
         if not self._pipe.is_full:
             self._protocol.send_ping(b"minirospy")
             self._answer_protocol()
-        self._timer = self._loop.call_later(self._limits.ping_seconds, self._ping)
+        self._watch(self._ping)
 
     def _watch_progress(self) -> None:
         now = self._loop.time()
         if self._pipe.is_full and now - self._progressed > self._limits.silent_seconds:
             self._abort()
             return
-        self._timer = self._loop.call_later(self._limits.ping_seconds, self._watch_progress)
+        self._watch(self._watch_progress)
 
     def _handshake_late(self) -> None:
         _log.info("%s sent no request in time", self.peer)
