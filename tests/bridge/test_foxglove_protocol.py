@@ -236,6 +236,11 @@ def test_wrong_json_is_refused_with_the_reason(text: str, why: str) -> None:
         parsing.parse_text(text)
 
 
+def test_json_with_a_million_arrays_is_refused() -> None:
+    with pytest.raises(BridgeProtocolError, match="more than 1000000 values"):
+        parsing.parse_text('{"op": "subscribe", "a": [' + "[]," * 1_100_000 + "0]}")
+
+
 @pytest.mark.parametrize(("data", "why"), REFUSED_BINARIES)
 def test_wrong_binary_is_refused_with_the_reason(data: bytes, why: str) -> None:
     with pytest.raises(BridgeProtocolError, match=why):

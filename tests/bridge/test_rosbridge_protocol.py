@@ -6,6 +6,7 @@ import base64
 import contextlib
 import json
 import math
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -198,6 +199,31 @@ def test_wrong_operation_is_refused_with_rosbridges_text(fields: dict[str, Any],
 def test_malformed_message_is_refused(data: str | bytes) -> None:
     with pytest.raises(OperationError, match="Unable to deserialize message from client"):
         protocol.decode(data)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        '{"op": "x", "a": [' + "[]," * 1_100_000 + "0]}",
+        '{"op": "x", "a": [' + "0," * 8_100_000 + "0]}",
+        b"\xa1\x61a\x9f" + b"\x80" * 1_100_000 + b"\xff",
+        cbor2.dumps({"op": "x", "a": re.compile("a")}),
+        cbor2.dumps({"op": "x", "a": 1 << 70}),
+    ],
+)
+def test_values_that_would_fill_the_memory_are_refused(data: str | bytes) -> None:
+    with pytest.raises(OperationError, match="Unable to deserialize message from client"):
+        protocol.decode(data)
+
+
+def test_heads_of_cbor_are_told_from_its_contents() -> None:
+    message = {
+        "text": "\xc9" * 300,
+        "bytes": b"\xd8\x23" * 300,
+        "numbers": [0, -1, 24, 256, 65536, 1 << 32, 1.5, None],
+    }
+    assert protocol.decode(cbor2.dumps(message)) == message
+    assert protocol.decode(b"\xbf\x61a\x5f\x41\xd8\x41\x23\xff\xff") == {"a": b"\xd8\x23"}
 
 
 @given(strategies.dictionaries(strategies.sampled_from(["op", "id", "topic", "num", "total", "data", "level"]),

@@ -5,7 +5,6 @@ Pure. All integers are little-endian. Source: https://github.com/foxglove/ws-pro
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -31,6 +30,7 @@ from minirospy.bridge.foxglove.protocol import (
     UnsubscribeConnectionGraph,
     UnsubscribeParameterUpdates,
 )
+from minirospy.bridge.json_text import load_json
 from minirospy.errors import BridgeProtocolError
 
 __all__ = [
@@ -53,7 +53,7 @@ _CHANNEL_ID = struct.Struct("<BI")
 def parse_text(text: str | bytes) -> Event:
     """Return the event of a JSON message. Raise BridgeProtocolError."""
     try:
-        fields = json.loads(text)
+        fields = load_json(text)
     except (ValueError, RecursionError) as error:
         raise BridgeProtocolError(f"a message that is not JSON: {error}") from None
     if not isinstance(fields, dict):

@@ -42,6 +42,7 @@ from minirospy.aio.node import Node
 from minirospy.aio.raw import service_header
 from minirospy.aio.services import Service, ServiceClass
 from minirospy.bridge.graph import Filters
+from minirospy.bridge.json_text import load_json
 from minirospy.bridge.rosapi.typedefs import TypeDefinition, describe
 from minirospy.bridge.rosbridge.types import message_class, service_class
 from minirospy.errors import BridgeError, RpcRefused, ServiceException
@@ -237,7 +238,7 @@ class Rosapi:
     async def _set_param(self, request: SetParamRequest) -> object:
         if self._filters.parameters(request.name):
             try:
-                value = json.loads(request.value)
+                value = load_json(request.value)
             except (ValueError, RecursionError) as error:
                 raise BridgeError(
                     "Due to the type flexibility of the ROS parameter server, the value argument to set_param must be a "
@@ -250,7 +251,7 @@ class Rosapi:
         default: object = None
         if request.default:
             try:
-                default = json.loads(request.default)
+                default = load_json(request.default)
             except (ValueError, RecursionError):
                 default = request.default
         if not self._filters.parameters(request.name):

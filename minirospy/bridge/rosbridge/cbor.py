@@ -29,6 +29,9 @@ TYPED_ARRAYS = {
 }
 """Tag and format character of an array of each type."""
 
+_MOST_VALUES = 1_000_000
+"""Of a client's message; an array with a tag is one."""
+
 _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 
 
@@ -41,6 +44,7 @@ def encode_cbor(value: object) -> bytes:
 def decode_cbor(data: bytes) -> object:
     """Return the value of CBOR; typed arrays become lists. Raises ValueError, BridgeProtocolError without cbor2."""
     library = _library()
+    _check_heads(data)
     stream = BytesIO(data)
     try:
         value: object = library.load(stream, tag_hook=_from_tag)
@@ -51,6 +55,27 @@ def decode_cbor(data: bytes) -> object:
     if stream.tell() != len(data):
         raise ValueError(f"{len(data) - stream.tell()} bytes follow the value")
     return value
+
+
+def _check_heads(data: bytes) -> None:
+    """Raise ValueError for too many values, and for tags that no message has: cbor2 would compile regular expressions."""
+    at = count = 0
+    while at < len(data):
+        major, argument = data[at] >> 5, data[at] & 31
+        at += 1
+        if 24 <= argument <= 27:
+            size = 1 << (argument - 24)
+            argument = int.from_bytes(data[at : at + size], "big")
+            at += size
+        elif argument == 31:
+            argument = 0  # of indefinite length: its parts follow
+        if major in (2, 3):
+            at += argument
+        elif major == 6 and argument not in _FORMATS:
+            raise ValueError(f"CBOR tag {argument} is not one of a message's")
+        count += 1
+        if count > _MOST_VALUES:
+            raise ValueError(f"more than {_MOST_VALUES} values")
 
 
 def typed_array(type_: str, values: Sequence[float]) -> object:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
+from minirospy.bridge.json_text import load_json
 from minirospy.bridge.rosbridge import png
 from minirospy.bridge.rosbridge.cbor import decode_cbor, encode_cbor
 from minirospy.errors import BridgeProtocolError
@@ -187,7 +188,7 @@ Fields = Mapping[str, Any]
 def decode(data: str | bytes) -> Fields:
     """Return the object that a message is: JSON as text, CBOR as bytes. Raises OperationError."""
     try:
-        found = json.loads(data) if isinstance(data, str) else decode_cbor(data)
+        found = load_json(data) if isinstance(data, str) else decode_cbor(data)
     except (ValueError, RecursionError) as error:
         shown = data[:_SHOWN] if isinstance(data, str) else f"{len(data)} bytes of CBOR ({error})"
         raise OperationError(f"Unable to deserialize message from client: {shown}") from error
