@@ -38,12 +38,12 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type that a full text defines; None where it does not parse."""
-    from minirospy.idl.load import class_from_text
+    """Return the type that a full text defines; None where it does not parse. No class is made: that takes a second."""
+    from minirospy.idl.load import checked_text
 
     try:
-        return InterfaceType.of(class_from_text(name, text))
-    except MinirospyError:
+        return InterfaceType(name, checked_text(name, text)[1], text)
+    except (MinirospyError, UnicodeEncodeError):
         return None
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Catalogue",
+    "checked_text",
     "class_from_text",
     "classes_from_text",
     "compile_package",
@@ -299,6 +300,24 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     return specs
 
 
+def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
+    """Return the specs of a full text that the message needs, each after those that it needs, and the message's md5sum.
+
+    No class is made of them. Raise DefinitionError.
+    """
+    from minirospy.idl.digest import message_md5
+
+    specs = specs_of_text(full_name, text)
+
+    def lookup(name: str) -> MessageSpec:
+        if name not in specs:
+            raise DefinitionError(full_name, 1, f"the full text lacks [{name}]")
+        return specs[name]
+
+    needed = {name: specs[name] for name in check_types(specs[full_name], lookup)}
+    return needed, message_md5(specs[full_name], lookup)
+
+
 def class_from_text(full_name: str, text: str) -> type[Message]:
     """Return a message class from a full text, as a publisher sends it, for a type that is not installed.
 
@@ -312,16 +331,10 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
     """Return the class of a full text and those of all types that it needs, by name. Raise DefinitionError."""
     from minirospy.idl.emit import emit_class
 
-    specs = specs_of_text(full_name, text)
-
-    def lookup(name: str) -> MessageSpec:
-        if name not in specs:
-            raise DefinitionError(full_name, 1, f"the full text lacks [{name}]")
-        return specs[name]
-
+    specs, _ = checked_text(full_name, text)
     made: dict[str, type[Message]] = {}
-    for name in check_types(specs[full_name], lookup):
-        made[name] = _run(emit_class(specs[name], lookup), name, made)
+    for name, spec in specs.items():
+        made[name] = _run(emit_class(spec, specs.__getitem__), name, made)
     # Sent on as it came, even where ours would be written otherwise.
     made[full_name]._full_text = text
     return types.MappingProxyType(made)

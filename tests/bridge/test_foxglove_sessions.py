@@ -19,7 +19,9 @@ from minirospy.aio.raw import raw_class
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.graph import Filters
+from minirospy.bridge.types import type_of_text
 from minirospy.errors import BridgeError
+from minirospy.idl.load import class_from_text, classes_from_text
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.times import Time
 from minirospy.wire.tcpros import InterfaceType
@@ -345,6 +347,41 @@ def test_assets_are_read_from_known_packages_alone(
         frame = client.next_binary(4)
         assert struct.unpack_from("<BIB", frame) == (4, number, 1), uri
         assert b"secret\n" not in frame
+
+
+def test_asset_larger_than_what_may_wait_is_sent(
+    run_bridge: Callable[..., Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_files(tmp_path / "arm", {"package.xml": "<package><name>arm</name></package>"})
+    with (tmp_path / "arm" / "a.stl").open("wb") as file:
+        file.truncate(70_000_000)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    client = run_bridge().client()
+    client.send(op="fetchAsset", uri="package://arm/a.stl", requestId=1)
+    assert len(client.next_binary(4)) == 10 + 70_000_000
+
+
+def test_subscriptions_of_a_client_are_limited(bridge: Running) -> None:
+    bridge.publisher(bridge.node("talker"), "/chatter", String)
+    client = bridge.client()
+    channel = client.channel("/chatter")
+    client.send(op="subscribe", subscriptions=[{"id": id_, "channelId": channel} for id_ in range(1100)])
+    assert client.next("status")["message"] == "a client may have 1000 subscriptions"
+    names = [f"/p{number}" for number in range(6000)]
+    client.send(op="subscribeParameterUpdates", parameterNames=names)
+    client.send(op="subscribeParameterUpdates", parameterNames=[f"{name}/x" for name in names])
+    assert "may subscribe to 10000 parameters" in client.next("status")["message"]
+
+
+def test_type_of_a_client_is_known_without_a_class_of_it() -> None:
+    text = "other_msgs/B b\nstd_msgs/String s\n" + "=" * 80 + "\nMSG: other_msgs/B\nint32 C=3\nfloat64[3] x\n"
+    text += "=" * 80 + "\nMSG: std_msgs/String\nstring data\n"
+    made = class_from_text("some_msgs/A", text)
+    classes_from_text.cache_clear()
+    assert type_of_text("some_msgs/A", text) == InterfaceType("some_msgs/A", made._md5sum, text)
+    assert classes_from_text.cache_info().currsize == 0
+    for wrong in ("other_msgs/B b", "int32 a b", "some_msgs/A a", "string S=\ud800\n"):
+        assert type_of_text("some_msgs/A", wrong) is None, wrong
 
 
 def test_asset_over_the_bound_is_refused(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from functools import partial
 from http.client import HTTPConnection, HTTPSConnection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import pytest
 from std_msgs.msg import String, UInt8MultiArray
@@ -22,8 +23,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Opcode
 from websockets.typing import Subprotocol
 
-from minirospy.bridge.access import Access
-from minirospy.bridge.web.connection import Limits
+from minirospy.bridge.access import Access, Grant
+from minirospy.bridge.web.connection import Connection, Limits
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.errors import BridgeError
 from tests.waiting import wait_until
@@ -345,6 +346,61 @@ def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[...,
     assert sorted(answers, key=int) == [str(number) for number in range(120)]
     (state,) = [each for each in bridge.bridge.status()["clients"] if each["received"] >= 120]  # type: ignore[attr-defined]
     assert state["held_back"] >= 1
+
+
+class Turns:
+    """A loop whose iterations are the test's."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.soon: list[Callable[[], None]] = []
+
+    def time(self) -> float:
+        return self.now
+
+    def call_soon(self, function: Callable[[], None]) -> None:
+        self.soon.append(function)
+
+    def call_later(self, delay: float, function: Callable[[], None]) -> Mock:
+        return Mock()
+
+    def iterate(self) -> None:
+        ready, self.soon = self.soon, []
+        for function in ready:
+            function()
+
+
+def test_messages_that_take_long_are_handled_in_turns() -> None:
+    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False)
+    site.check.return_value = Grant.READ
+    handled: list[str] = []
+
+    def handle(text: str) -> None:
+        handled.append(text)
+        loop.now += 0.004
+
+    door = Mock()
+    door.select.return_value = "foxglove.sdk.v1"
+    door.open.return_value.received_text = handle
+    site.doors = [door]
+    connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
+    connection.received(HANDSHAKE.encode())
+    texts = [str(number) for number in range(100)]
+    frames = b"".join(bytes((0x81, 0x80 | len(text), 0, 0, 0, 0)) + text.encode() for text in texts)
+
+    connection.received(frames[:500])
+    assert 1 <= len(handled) <= 3
+    pipe.pause.assert_called()
+    # What was on its way comes behind what waits.
+    connection.received(frames[500:])
+    assert len(handled) <= 3
+    while len(handled) < len(texts):
+        before = len(handled)
+        loop.iterate()
+        assert before < len(handled) <= before + 3
+    assert handled == texts
+    loop.iterate()
+    pipe.resume.assert_called_once()
 
 
 def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callable[..., Running]) -> None:

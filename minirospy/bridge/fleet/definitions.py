@@ -10,10 +10,8 @@ from minirospy.bridge.fleet.keys import definition_key
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
 from minirospy.bridge.types import TypeTexts
 from minirospy.errors import DefinitionError, MinirospyError
-from minirospy.idl.digest import message_md5
-from minirospy.idl.load import specs_of_text
+from minirospy.idl.load import checked_text
 from minirospy.idl.spec import MessageSpec
-from minirospy.idl.validate import check_types
 from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
@@ -28,15 +26,7 @@ _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
     """Return the specs in a full text. Raise DefinitionError where it is not that of the md5sum, or not one at all."""
-    specs = specs_of_text(name, text)
-
-    def lookup(inner: str) -> MessageSpec:
-        if inner not in specs:
-            raise DefinitionError(name, 1, f"the full text lacks [{inner}]")
-        return specs[inner]
-
-    check_types(specs[name], lookup)
-    found = message_md5(specs[name], lookup)
+    specs, found = checked_text(name, text)
     if found != md5sum:
         raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
     return specs

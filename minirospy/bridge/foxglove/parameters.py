@@ -75,6 +75,10 @@ class Parameters:
             self._graph.node.parameters.listeners.append(self._changed)
             self._graph.spawn(self._graph.node.parameters.add(_ROOT))
 
+    def count(self, listener: ParameterListener) -> int:
+        """Return the number of names that a client subscribes to."""
+        return len(self._wanted.get(listener) or ())
+
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
         """Report them no more, none where ``names`` is empty."""
         before = self._wanted.get(listener, set())

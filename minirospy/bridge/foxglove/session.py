@@ -32,7 +32,10 @@ _MOST_CALLS = 200
 """Calls and requests of one client that may be under way."""
 
 _MOST_CHANNELS = 1000
-"""Topics that one client may publish."""
+"""Topics that one client may publish, and its subscriptions: each of them gets each message."""
+
+_MOST_PARAMETERS = 10_000
+"""Names of parameters whose changes one client may subscribe to."""
 
 _TIME = "time"
 """The key under which the time waits for a slow client."""
@@ -173,6 +176,8 @@ class FoxgloveSession:
                     StatusLevel.WARNING,
                     f"Channel {channel_id} is not available; ignoring subscription {subscription_id}",
                 )
+            elif len(self._subscriptions) >= _MOST_CHANNELS:
+                raise BridgeError(f"a client may have {_MOST_CHANNELS} subscriptions")
             else:
                 listener = partial(
                     self._arrived, subscription_id, channel, self._door.channels.type_of(channel_id).md5sum
@@ -283,6 +288,10 @@ class FoxgloveSession:
 
     def _subscribe_parameters(self, event: protocol.SubscribeParameterUpdates) -> None:
         self._require("parametersSubscribe", "subscribing to parameters")
+        if self._door.parameters.count(self) + len(event.names) > _MOST_PARAMETERS:
+            raise BridgeError(
+                f"a client may subscribe to {_MOST_PARAMETERS} parameters, or to all without names"
+            )
         self._door.parameters.subscribe(self, event.names)
 
     def _unsubscribe_parameters(self, event: protocol.UnsubscribeParameterUpdates) -> None:

@@ -60,6 +60,8 @@ _log = logging.getLogger(__name__)
 _HEAD_END = b"\r\n\r\n"
 _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
+_TURN_SECONDS = 0.01
+"""After this a client's further messages wait for the loop's next iteration."""
 
 
 @dataclass
@@ -172,11 +174,12 @@ class Connection:
         """Send what is never dropped."""
         if self._is_closing:
             return
-        self.queue.put_answer(pieces)
+        # Looked at before: a single answer, such as a mesh, may be larger than what may wait.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
             return
+        self.queue.put_answer(pieces)
         self._schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
@@ -228,11 +231,19 @@ class Connection:
         self._handle_frames()
 
     def _handle_frames(self) -> None:
-        """Handle what was received, as much of it as the client may send in a second."""
+        """Handle what was received, as much of it as the client may send in a second; other clients have their turns."""
+        if self._is_waiting:
+            return
+        end = self._loop.time() + _TURN_SECONDS
         while self._frames and not self._is_closing:
             if self._is_held_back():
                 return
             self._framed(self._frames.popleft())
+            if self._frames and self._loop.time() >= end:
+                self._is_waiting = True
+                self._pipe.pause()
+                self._loop.call_soon(self._go_on)
+                return
         self._answer_protocol()
         if self._protocol.state in (State.CLOSING, State.CLOSED) and self.client:
             self.close_when_sent()
@@ -383,11 +394,10 @@ class Connection:
             self._second, self._in_second = now, 0
         if self._in_second < self._limits.messages_a_second:
             return False
-        if not self._is_waiting:
-            self._is_waiting = True
-            self.traffic.held_back += 1
-            self._pipe.pause()
-            self._loop.call_later(self._second + 1.0 - now, self._go_on)
+        self._is_waiting = True
+        self.traffic.held_back += 1
+        self._pipe.pause()
+        self._loop.call_later(self._second + 1.0 - now, self._go_on)
         return True
 
     def _go_on(self) -> None:
