@@ -5,20 +5,25 @@ The programs in smach_programs/ ran under the real packages (2.5.2); the text fi
 
 from __future__ import annotations
 
+import base64
 import pickle
 import subprocess
 import sys
 import threading
+from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import genpy
 import pytest
 import rospy
 import smach
 from geometry_msgs.msg import Point
 from smach.util import CBInterface
+from std_msgs.msg import String
+from std_srvs.srv import SetBoolRequest, SetBoolResponse
 
 from minirospy.compat.smach_ros.pickled import pickle_userdata, unpickle_userdata
 
@@ -184,14 +189,42 @@ def test_userdata_with_values_is_pickled() -> None:
     text, left_out = pickle_userdata({**data, "lock": threading.Lock()})
     assert left_out == ["lock"]
     assert unpickle_userdata(text) == data
+    others: dict[str, list[object]] = {
+        "plain": [bytearray(b"x"), bytearray(), b"", frozenset({1}), range(3), slice(1, 2), 1j, set()],
+        "collections": [OrderedDict(a=1), defaultdict(None, a=[1]), deque([1, 2], 3)],
+        "messages": [SetBoolRequest(True), SetBoolResponse(True, "x"), genpy.Time(1, 2), genpy.Duration(3)],
+    }
+    text, left_out = pickle_userdata(others)
+    again: dict[str, Any] = unpickle_userdata(text)
+    assert (again, left_out) == (others, [])
+    assert list(map(type, again["messages"])) == list(map(type, others["messages"]))
 
 
 def test_arrays_are_pickled() -> None:
     numpy = pytest.importorskip("numpy")
     text, _ = pickle_userdata({"array": numpy.arange(3), "number": numpy.float64(1.5)})
-    found = unpickle_userdata(text)
+    found: dict[str, Any] = unpickle_userdata(text)
     assert found["array"].tolist() == [0, 1, 2]
     assert found["number"] == 1.5
+    for array in (
+        numpy.array([[1.5, 2], [3, 4]], ">f4", order="F"),
+        numpy.array(["ab", "c"]),
+        numpy.array([b"ab"]),
+        numpy.array([True, False]),
+        numpy.zeros((0, 3), "c16"),
+        numpy.array(["a", None], object),
+    ):
+        for protocol in (2, 5):
+            data = pickle.dumps({"a": array}, protocol)
+            text = base64.b64encode(data).decode()
+            if array.dtype == object:
+                with pytest.raises(ValueError, match="not userdata: an array of"):
+                    unpickle_userdata(text)
+                continue
+            copied: Any = unpickle_userdata(text)["a"]
+            expected = pickle.loads(data)["a"]
+            assert (type(copied), copied.dtype) == (type(expected), expected.dtype)
+            assert copied.tolist() == array.tolist()
 
 
 class Runs:
@@ -210,6 +243,41 @@ def test_userdata_of_other_nodes_runs_no_code(
     with pytest.raises(ValueError, match=f"{name} is not a plain value or a message"):
         unpickle_userdata(text)
     assert capsys.readouterr().out == ""
+
+
+HOSTILE = {
+    "a module that is not one of messages": b"cthis.msg._x\nX\n",
+    "the state of a class": b"cstd_msgs.msg._String\nString\nN}(U\x07_md5sumU\x01xu\x86b",
+    "a size instead of a content": b"c__builtin__\nbytearray\nJ\x00\x00\x00\x70\x85R",
+    "a range without end": b"c__builtin__\nset\nc__builtin__\nrange\nJ\xff\xff\xff\x7f\x85R\x85R",
+    "another codec": b"c_codecs\nencode\nU\x01aU\x04idna\x86R",
+    "an object on a set": b"ccopy_reg\n_reconstructor\n(c__builtin__\nobject\nc__builtin__\nset\nNtR",
+    "an array of objects": b"cnumpy\ndtype\n(U\x02O8\x89\x88tR",
+    "an array without a size": b"cnumpy\nndarray\nJ\xff\xff\xff\x7f\x85R",
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_userdata_makes_plain_values_alone(what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = base64.b64encode(b"\x80\x02}U\x01a" + HOSTILE[what] + b"s.").decode()
+    with pytest.raises(ValueError, match="not userdata"):
+        unpickle_userdata(text)
+    assert (capsys.readouterr().out, String._md5sum) == ("", "992ce8a1687cec8c8bd883ec73ca41d1")
+
+
+def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
+    numpy = pytest.importorskip("numpy")
+    # The state takes the flag of objects away: numpy would follow what the bytes of the array point to.
+    state = (3, "|", None, ("a",), {"a": (numpy.dtype("O"), 0)}, 8, 1, 0)
+    dtype = b"cnumpy\ndtype\n(U\x02V8\x89\x88tR" + pickle.dumps(state, 2)[2:-1] + b"b"
+    array = b"cnumpy.core.numeric\n_frombuffer\n(U\x08AAAAAAAA" + dtype + b"K\x01\x85U\x01CtR"
+    with pytest.raises(ValueError, match="not userdata: an array of"):
+        unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + array + b"s.").decode())
+    # Nor may a state make the elements of an array larger than its memory.
+    larger = (3, "|", None, None, None, 800, 1, 0)
+    dtype = b"cnumpy\ndtype\n(U\x02S8\x89\x88tR" + pickle.dumps(larger, 2)[2:-1] + b"b"
+    with pytest.raises(ValueError, match="not userdata: an array of"):
+        unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + dtype + b"s.").decode())
 
 
 @pytest.mark.parametrize("text", ["", "?", "AAAA", "gAJLBS4="])

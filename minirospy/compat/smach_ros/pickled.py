@@ -9,26 +9,23 @@ import base64
 import io
 import pickle
 import re
-from collections.abc import Mapping
+from collections import OrderedDict, defaultdict, deque
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from minirospy.client.time import Duration as RosDuration
+from minirospy.client.time import Time as RosTime
+from minirospy.idl.load import get_message_class, get_service_class
+from minirospy.times import Duration, Time
 
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
-_PLAIN = {
-    "builtins": {"bytearray", "bytes", "complex", "frozenset", "object", "range", "set", "slice"},
-    "collections": {"OrderedDict", "defaultdict", "deque"},
-    "copyreg": {"_reconstructor"},
-    "_codecs": {"encode"},
-    "genpy.rostime": {"Duration", "Time"},
-    "rospy.rostime": {"Duration", "Time"},
-    "numpy": {"dtype", "ndarray"},
-    "numpy.core.multiarray": {"_reconstruct", "scalar"},
-    "numpy._core.multiarray": {"_reconstruct", "scalar"},
-    "numpy._core.numeric": {"_frombuffer"},
-    "numpy.core.numeric": {"_frombuffer"},
-}
-_RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg"}
-"""Python 2's names of modules, which this protocol has."""
-_MESSAGE = re.compile(r"\w+\.(?:msg|srv)\._\w+")
+_RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
+"""Python 2's and older numpy's names of modules."""
+_MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
+_SIMPLE = "biufcSU"
+"""Kinds of numpy's types: numbers and texts. Others may have pointers in their bytes."""
+_DTYPE_STATE = 8
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
@@ -63,13 +60,135 @@ def _encoded(data: dict[str, object]) -> str:
     return base64.b64encode(pickle.dumps(data, 2)).decode("ascii")
 
 
-class _Unpickler(pickle.Unpickler):
+_set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
+
+
+class _Unpickler(pickle._Unpickler):
+    """Python's own in Python: what it does to an object can be looked at before."""
+
+    stack: list[Any]
+
     def find_class(self, module: str, name: str) -> object:
-        module = _RENAMED.get(module, module)
-        if name in _PLAIN.get(module, ()):
-            return super().find_class(module, name)
-        if _MESSAGE.fullmatch(module):
-            found = super().find_class(module, name)
-            if isinstance(found, type) and hasattr(found, "_md5sum"):
-                return found
+        for old, new in _RENAMED.items():
+            if module == old or module.startswith(f"{old}."):
+                module = new + module[len(old) :]
+        if made := _MAKERS.get(f"{module}.{name}"):
+            return made
+        if match := _MESSAGE.fullmatch(module):
+            # By the name of its type: to import any module that a text names would be to execute it.
+            for found in _classes(f"{match[1]}/{match[3]}", match[2]):
+                if found.__name__ == name:
+                    return found
         raise pickle.UnpicklingError(f"{module}.{name} is not a plain value or a message")
+
+    def load_build(self) -> None:
+        """Set an object's state; of a class, which belongs to all, or of numpy's types it would be theirs to change memory."""
+        target, state = self.stack[-2:]
+        if callable(target):
+            raise pickle.UnpicklingError("the state of a class")
+        if type(target).__module__.partition(".")[0] == "numpy" and hasattr(target, "fields"):
+            _check_dtype(target, state)
+        _set_state(self)  # type: ignore[arg-type]
+
+    dispatch: ClassVar[dict[int, Any]] = {**pickle._Unpickler.dispatch, pickle.BUILD[0]: load_build}
+
+
+def _classes(name: str, kind: str) -> tuple[Any, ...]:
+    if kind == "msg":
+        found = get_message_class(name)
+        return () if found is None else (found,)
+    service = get_service_class(name)
+    return () if service is None else (service, service._request_class, service._response_class)
+
+
+def _check_dtype(target: Any, state: Any) -> None:
+    """Raise UnpicklingError unless a state leaves the size, the fields and the flags of a type of numpy as they are."""
+    size, alignment, flags = (-1, target.itemsize), (-1, target.alignment), target.flags
+    if (
+        target.kind not in _SIMPLE
+        or len(state) != _DTYPE_STATE
+        or state[2:5] != (None, None, None)
+        or state[5] not in size
+        or state[6] not in alignment
+        or state[7] != flags
+    ):
+        raise pickle.UnpicklingError(f"an array of {target}")
+
+
+def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
+    """Return what makes a value out of these: not of a number, which would be its size, nor of a range."""
+
+    def made(content: object = (), *more: object) -> object:
+        if type(content) not in (*kinds, tuple):
+            raise pickle.UnpicklingError(f"{make.__name__} of {type(content).__name__}")
+        return make(content, *more)
+
+    return made
+
+
+def _bytes_of(text: str, encoding: str) -> bytes:
+    if encoding not in ("latin1", "latin-1"):
+        raise pickle.UnpicklingError(f"bytes in {encoding}")
+    return text.encode(encoding)
+
+
+def _reconstructed(cls: type, base: type, state: object) -> object:
+    if base is not object or not isinstance(cls, type):
+        raise pickle.UnpicklingError(f"an object on {base}")
+    return object.__new__(cls)
+
+
+def _simple_dtype(name: object, *_: object) -> Any:
+    import numpy as np
+
+    found = np.dtype(name if isinstance(name, str) else "O")
+    if found.kind not in _SIMPLE:
+        raise pickle.UnpicklingError(f"an array of {name}")
+    # A copy: its state follows, and that of numpy's own is not changed.
+    return np.dtype(found.str, copy=True)
+
+
+def _empty_array(*_: object) -> object:
+    import numpy as np
+
+    return np.empty(0)
+
+
+def _array(data: Any, dtype: Any, shape: Any, order: Any) -> object:
+    import numpy as np
+
+    return np.frombuffer(data, dtype).reshape(shape, order=order)
+
+
+def _scalar(dtype: Any, data: Any) -> object:
+    import numpy as np
+
+    return np.frombuffer(data, dtype, 1)[0]
+
+
+_MAKERS: Mapping[str, Callable[..., object]] = {
+    "builtins.bytearray": _plain(bytearray, str, bytes),
+    "builtins.bytes": _plain(bytes, list),
+    "builtins.complex": complex,
+    "builtins.frozenset": _plain(frozenset, list),
+    "builtins.object": object,
+    "builtins.range": range,
+    "builtins.xrange": range,
+    "builtins.set": _plain(set, list),
+    "builtins.slice": slice,
+    "collections.OrderedDict": _plain(OrderedDict, list),
+    "collections.defaultdict": defaultdict,
+    "collections.deque": _plain(deque, list),
+    "copyreg._reconstructor": _reconstructed,
+    "_codecs.encode": _bytes_of,
+    "genpy.rostime.Duration": Duration,
+    "genpy.rostime.Time": Time,
+    "rospy.rostime.Duration": RosDuration,
+    "rospy.rostime.Time": RosTime,
+    "numpy.dtype": _simple_dtype,
+    "numpy.ndarray": object,
+    "numpy._core.multiarray._reconstruct": _empty_array,
+    "numpy._core.multiarray.scalar": _scalar,
+    "numpy._core.numeric._frombuffer": _array,
+}
+"""What makes a value of each class that a text may name."""
