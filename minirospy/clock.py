@@ -6,6 +6,7 @@ nanoseconds since the epoch.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 import sys
 import threading
@@ -28,17 +29,53 @@ _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not interrupt a wait, and
 elsewhere one that arrives just before the wait starts is noticed only after it."""
 
+_POLL_SECONDS = 0.1
+
 
 class SignalSafeEvent(threading.Event):
-    """An event that a signal handler may set, whichever code it interrupts.
+    """An event that a signal handler may set or wait for, whichever code it interrupts.
 
-    That thread may be on its way into wait() or set() of the same event, with the event's lock taken; where that is
-    not reentrant, as threading has it, the handler waits for itself, and the process never exits.
+    The thread that it interrupts may be inside wait() or set() of the same event. threading's takes a lock there, which the
+    handler would wait for; and a handler that waits for another thread, which needs that lock, would never get to an end.
+    This event has no lock: the steps on its list are atomic.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._cond = threading.Condition(threading.RLock())
+        self._is_set = False
+        self._waiting: list[threading.Lock] = []
+        """A lock for each thread that waits, which is acquired until the event is set."""
+
+    def is_set(self) -> bool:
+        """Return whether it is set."""
+        return self._is_set
+
+    def set(self) -> None:
+        """Set it, and wake the threads that wait for it."""
+        # First the flag: a thread enters itself in the list, and then looks at the flag.
+        self._is_set = True
+        for lock in self._waiting.copy():
+            # Another thread, or a handler in this one, has released it.
+            with contextlib.suppress(RuntimeError):
+                lock.release()
+
+    def clear(self) -> None:
+        """Clear it."""
+        self._is_set = False
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Return whether it is set, now or within ``timeout`` seconds."""
+        if self._is_set:
+            return True
+        lock = threading.Lock()
+        lock.acquire()
+        self._waiting.append(lock)
+        try:
+            if self._is_set:
+                return True
+            return lock.acquire(timeout=-1 if timeout is None else max(0.0, timeout)) or self._is_set
+        finally:
+            self._waiting.remove(lock)
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
@@ -91,6 +128,8 @@ class SimulatedClock:
         """Notify ``changed`` each time that the clock is set."""
         self._now = now
         self._changed = changed or threading.Condition()
+        # Not the condition: a signal's handler may wait for a thread that sets the clock, or sleeps, too.
+        self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
         """Return what was set last; 0 until then."""
@@ -101,6 +140,8 @@ class SimulatedClock:
         with self._changed:
             self._now = now
             self._changed.notify_all()
+        for sleeper in self._sleepers.copy():
+            sleeper.set()
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
         """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
@@ -108,15 +149,23 @@ class SimulatedClock:
         While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
         Raises ROSTimeMovedBackwardsException.
         """
-        with self._changed:
-            while self._now == 0 and not stop.is_set():
-                self._changed.wait(0.1)
-            before = self._now
+        sleeper = SignalSafeEvent()
+        self._sleepers.append(sleeper)
+        try:
+            while (before := self._now) == 0 and not stop.is_set():
+                self._wait(sleeper)
             end = before + nanoseconds
-            while self._now < end and not stop.is_set():
-                # Setting stop does not notify: poll it.
-                self._changed.wait(0.1)
-                if self._now < before:
-                    raise ROSTimeMovedBackwardsException((before - self._now) / 1e9)
-                before = self._now
+            while (now := self._now) < end and not stop.is_set():
+                if now < before:
+                    raise ROSTimeMovedBackwardsException((before - now) / 1e9)
+                before = now
+                self._wait(sleeper)
             return not stop.is_set()
+        finally:
+            self._sleepers.remove(sleeper)
+
+    @staticmethod
+    def _wait(sleeper: SignalSafeEvent) -> None:
+        """Wait until the clock is set. Setting what stops a sleep does not end that: it is polled."""
+        sleeper.wait(_POLL_SECONDS)
+        sleeper.clear()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
 import pytest
 
+from minirospy import clock as clock_module
 from minirospy.clock import SignalSafeEvent, SimulatedClock, WallClock, time_of_clock_message, wait_for_event
 from minirospy.errors import ROSTimeMovedBackwardsException
 
@@ -26,13 +28,13 @@ class Sleeping(threading.Thread):
         self.stop = threading.Event()
         self.waits = threading.Semaphore(0)
         self.outcome: object = None
-        waited = clock._changed.wait
 
-        def wait(timeout: float | None = None) -> bool:
+        def wait(sleeper: SignalSafeEvent) -> None:
             self.waits.release()
-            return waited(5)
+            sleeper.wait(5)
+            sleeper.clear()
 
-        clock._changed.wait = wait  # type: ignore[method-assign]
+        clock._wait = wait  # type: ignore[method-assign]
         self.start()
         assert self.waits.acquire(timeout=30)
 
@@ -53,18 +55,19 @@ class Sleeping(threading.Thread):
         return self.outcome
 
 
-def lines_until_set(step: int, is_set: bool) -> int:
-    """Set or wait for an event, which is set from within, too, before that thread's line number ``step``."""
+def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], object]) -> int:
+    """Set or wait for an event; before that thread's line number ``step`` a handler runs in it. Return its lines."""
     event = SignalSafeEvent()
     lines = 0
 
     def trace(frame: FrameType, kind: str, _: Any) -> Any:
         nonlocal lines
-        if kind == "line" and frame.f_globals.get("__name__") == "threading":
-            lines += 1
-            if lines == step:
-                event.set()
-        return trace
+        if frame.f_code.co_filename in (clock_module.__file__, threading.__file__):
+            lines += kind == "line"
+            if kind == "line" and lines == step:
+                handle(event)
+            return trace
+        return None
 
     def work() -> None:
         sys.settrace(trace)
@@ -74,18 +77,43 @@ def lines_until_set(step: int, is_set: bool) -> int:
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     thread.join(30)
-    assert not thread.is_alive(), f"the handler waits for itself, line {step} of what runs"
-    assert event.is_set() or lines < step
+    assert not thread.is_alive(), f"the handler never ends, line {step} of what it interrupts"
     return lines
 
 
+def wait_elsewhere(event: SignalSafeEvent) -> None:
+    """Join a thread that waits for the event, as a hook joins one that sleeps."""
+    thread = threading.Thread(target=event.wait, args=(0.001,), daemon=True)
+    thread.start()
+    thread.join()
+
+
 @pytest.mark.parametrize("is_set", [False, True], ids=["wait", "set"])
-def test_signal_handler_may_set_an_event_at_any_moment(is_set: bool) -> None:
-    """Its handler runs in the thread that it interrupts, between any two lines of what that calls."""
+@pytest.mark.parametrize("handle", [SignalSafeEvent.set, wait_elsewhere], ids=["sets", "joins"])
+def test_signal_handler_may_use_an_event_at_any_moment(
+    is_set: bool, handle: Callable[[SignalSafeEvent], object]
+) -> None:
+    """It runs in the thread that it interrupts, between any two lines of what that calls."""
     step = 1
-    while lines_until_set(step, is_set) >= step:
+    while lines_until(step, is_set, handle) >= step:
         step += 1
-    assert step > 5
+    assert step > 2
+
+
+def test_event_wakes_every_thread_that_waits() -> None:
+    event = SignalSafeEvent()
+    woken: list[bool] = []
+    threads = [threading.Thread(target=lambda: woken.append(event.wait(30)), daemon=True) for _ in range(5)]
+    for thread in threads:
+        thread.start()
+    event.set()
+    for thread in threads:
+        thread.join(30)
+    assert woken == [True] * 5
+    event.clear()
+    assert not event.is_set()
+    assert not event.wait(0)
+    assert not event.wait(-1)
 
 
 def test_wall_clock_returns_the_time() -> None:
