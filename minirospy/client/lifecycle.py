@@ -9,7 +9,7 @@ import contextlib
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from minirospy import errors
 from minirospy.client.deferral import Deferral, is_main_thread
@@ -108,14 +108,12 @@ class Lifecycle:
             self.machine.runs_in_main = is_main_thread()
             self.machine.phase = Phase.HOOKS
             try:
-                self._run(self.hooks)
-                self._run(self.late_hooks)
+                self._run_hooks()
             finally:
-                with self._lock:
-                    # A hook that is added from now on is called immediately.
-                    self.shutting_down.set()
+                self.shutting_down.set()
                 self.machine.phase = Phase.DOWN
-                self._run(list(self.interrupts))
+                for interrupt in list(self.interrupts):
+                    self._run(interrupt)
 
                 self.machine.phase = Phase.LEAVING
                 try:
@@ -185,14 +183,23 @@ class Lifecycle:
             return True
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
-    def _run(self, hooks: Iterable[Callable[[], object]]) -> None:
-        # A hook may add another: it runs last.
-        for hook in hooks:
-            try:
-                with self.deferral.lifted():
-                    hook()
-            except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-                # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
-                if type(error) is not KeyboardInterrupt:
-                    with contextlib.suppress(OSError, ValueError):
-                        traceback.print_exc()
+    def _run_hooks(self) -> None:
+        """Run the hooks until none is left, also of those that a hook, or meanwhile another thread, adds; then be shut down."""
+        while not self.shutting_down.is_set():
+            for hooks in (self.hooks, self.late_hooks):
+                while hooks:
+                    self._run(hooks.pop(0))
+            with self._lock:
+                if not self.hooks and not self.late_hooks:
+                    # A hook that is added from now on is called immediately.
+                    self.shutting_down.set()
+
+    def _run(self, hook: Callable[[], object]) -> None:
+        try:
+            with self.deferral.lifted():
+                hook()
+        except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
+            # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
+            if type(error) is not KeyboardInterrupt:
+                with contextlib.suppress(OSError, ValueError):
+                    traceback.print_exc()

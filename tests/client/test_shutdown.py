@@ -294,6 +294,27 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     assert lifecycle.left.is_set()
 
 
+def test_hook_that_another_thread_adds_while_the_last_hooks_run_is_called(lifecycle: Lifecycle) -> None:
+    ran: list[str] = []
+
+    def late() -> None:
+        ran.append("late")
+        for name, hooks in (("client", lifecycle.hooks), ("later", lifecycle.late_hooks)):
+            thread = threading.Thread(
+                target=lifecycle.add_hook, args=(functools.partial(ran.append, name), hooks), daemon=True
+            )
+            thread.start()
+            thread.join(30)
+
+    lifecycle.add_hook(late, lifecycle.late_hooks)
+    lifecycle.add_hook(lambda: ran.append("first"))
+    lifecycle.signal_shutdown("test")
+    assert sorted(ran[2:]) == ["client", "later"]
+    assert ran[:2] == ["first", "late"]
+    lifecycle.add_hook(lambda: ran.append("after"))
+    assert ran[4:] == ["after"]
+
+
 def test_a_signal_at_any_step_of_adding_a_hook_runs_that_hook(
     lifecycle: Lifecycle, watchdog: SignalWatchdog
 ) -> None:
