@@ -18,7 +18,7 @@ from minirospy.launch.document import Tag, parse_document
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
 from minirospy.launch.substitution import Substitution
-from minirospy.workspace.packages import Packages
+from minirospy.workspace.packages import Packages, package_name
 
 __all__ = [
     "STDIN",
@@ -210,8 +210,7 @@ def _near_files(file: str) -> str:
     with suppress(OSError, ValueError):
         if wanted.exists():
             return ""
-        folder = wanted.parent
-        package = next((each for each in wanted.parents if (each / "package.xml").is_file()), None)
+        folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
             # Without their endings, in which all are alike.
             known: dict[str, Path] = {}
@@ -223,6 +222,19 @@ def _near_files(file: str) -> str:
                 shown = (path.name if path.parent == folder else str(path) for path in near)
                 return f"; did you mean {' or '.join(shown)}?"
     return ""
+
+
+def _hidden_hint(file: str, packages: Packages) -> str:
+    """Return the hint for a file that is missing in a package, where another one of its name has it."""
+    with suppress(OSError, ValueError):
+        folder = _package_of(Path(file))
+        if folder:
+            return packages.hidden_hint(package_name(folder) or folder.name, Path(file).name, folder)
+    return ""
+
+
+def _package_of(file: Path) -> Path | None:
+    return next((each for each in file.parents if (each / "package.xml").is_file()), None)
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
@@ -386,7 +398,8 @@ class _File:
             text = Path(file).read_bytes()
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            raise tag.error(f"cannot include [{file}]: {why}{_near_files(file)}") from None
+            hint = _near_files(file) + _hidden_hint(file, self._substitution.packages)
+            raise tag.error(f"cannot include [{file}]: {why}{hint}") from None
 
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)

@@ -137,7 +137,7 @@ class Packages:
             raise NotExecutableError(candidates[0])
         known = self.executables(package)
         has = ", ".join(known[:_SHOWN]) + (" ..." if known[_SHOWN:] else "") if known else "no programs"
-        hidden = self._hidden(package, name, folder)
+        hidden = self.hidden_hint(package, name, folder)
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
@@ -150,10 +150,10 @@ class Packages:
                 return path
         kinds = {Path(name).suffix} - {""} or {".launch", ".test"}
         same_kind = [path.name for path in _files(folder) if path.suffix in kinds]
-        hint = f"package [{package}] is in {folder}{self._hidden(package, name, folder)}"
+        hint = f"package [{package}] is in {folder}{self.hidden_hint(package, name, folder)}"
         raise NotFoundError("file", name, same_kind, hint)
 
-    def _hidden(self, package: str, name: str, found: Path) -> str:
+    def hidden_hint(self, package: str, name: str, found: Path) -> str:
         """Return a hint where another package of the same name, which the found one hides, has the file; else nothing."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):

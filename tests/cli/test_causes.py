@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from minirospy.environment import Environment, wrong_address
-from minirospy.errors import NotFoundError
+from minirospy.errors import LaunchError, NotFoundError
+from minirospy.launch.load import load_text
 from minirospy.workspace.packages import Packages
 
 NODE = """
@@ -115,6 +116,10 @@ def test_package_that_hides_another_says_so(tmp_path: Path) -> None:
         packages.find_resource("bringup", "solution.py.launch")
     assert hint in str(program_error.value)
     assert hint in str(file_error.value)
+    include = '<launch><include file="$(find bringup)/launch/solution.py.launch"/></launch>'
+    with pytest.raises(LaunchError) as include_error:
+        load_text(include, {}, packages, {})
+    assert hint in str(include_error.value)
     with pytest.raises(NotFoundError) as unknown:
         packages.find_executable("bringup", "nobody.py")
     assert "this one hides" not in str(unknown.value)
