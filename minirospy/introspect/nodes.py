@@ -37,6 +37,7 @@ __all__ = [
     "find_node",
     "forget_node",
     "has_exited",
+    "is_timeout",
     "is_unknown_host",
     "kill_node",
     "list_nodes",
@@ -184,6 +185,11 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
     """Return whether a node did not answer because the name of its host cannot be resolved."""
     return isinstance(getattr(error.__cause__, "__cause__", None), socket.gaierror)
+
+
+def is_timeout(error: NodeUnreachableError) -> bool:
+    """Return whether a node did not answer in time."""
+    return isinstance(getattr(error.__cause__, "__cause__", None), TimeoutError)
 
 
 def unreachable_nodes(

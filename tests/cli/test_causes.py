@@ -83,11 +83,18 @@ def test_suspended_node_is_said_to_be_suspended(master: str, command: Any) -> No
             # Until one thread has seen the signal, the others run on.
             os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             status, _, err = command("rosnode", "ping", "-c", "1", "/node")
+            echo = [str(Path(sys.executable).parent / "rostopic"), "echo", "/rosout"]
+            with subprocess.Popen(echo, stderr=subprocess.PIPE, text=True) as reader:
+                assert reader.stderr is not None
+                warning = reader.stderr.readline()
+                reader.terminate()
         finally:
             process.send_signal(signal.SIGCONT)
             process.terminate()
     assert status == 1
     assert "suspended: after Ctrl-Z, `fg` in its terminal continues it" in err
+    assert "cannot connect to the publisher" in warning
+    assert "suspended: after Ctrl-Z, `fg` in its terminal continues it" in warning
 
 
 def test_wrong_type_in_publish_is_one_traceback(master: str) -> None:

@@ -19,6 +19,7 @@ from minirospy.introspect.nodes import (
     NodeDetail,
     find_node,
     forget_node,
+    is_timeout,
     is_unknown_host,
     kill_node,
     list_nodes,
@@ -138,6 +139,8 @@ def _no_answer(error: NodeUnreachableError) -> str:
     """Return ROS's text about a node that does not answer."""
     if is_unknown_host(error):
         return f"ERROR: Unknown host [{node_host(error.uri)}] for node [{error.name}]"
+    if is_timeout(error):
+        return f"connection to [{error.name}] timed out"
     return f"ERROR: connection refused to [{error.uri}]"
 
 

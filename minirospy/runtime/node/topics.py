@@ -17,7 +17,15 @@ from functools import partial
 from itertools import islice
 
 from minirospy.environment import split_uri
-from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadLimitError, WireError
+from minirospy.errors import (
+    SUSPENDED,
+    HandshakeRefused,
+    RpcError,
+    RpcLate,
+    RpcUnreachable,
+    ThreadLimitError,
+    WireError,
+)
 from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
@@ -543,6 +551,8 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
     """Return whose address is wrong, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
+    if isinstance(error, RpcLate):
+        return SUSPENDED[0].upper() + SUSPENDED[1:]
     try:
         host = split_uri(uri)[0]
     except ValueError:

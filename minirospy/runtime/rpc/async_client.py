@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
+from minirospy.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
 from minirospy.runtime.rpc.client import parse_http_uri
 from minirospy.runtime.transport import local, tcp
 from minirospy.runtime.transport.deadlines import Deadlines
@@ -281,11 +281,12 @@ class Call:
 
     def fail(self, error: Exception) -> None:
         """Give up, and say why. Idempotent."""
-        if isinstance(error, TimeoutError | asyncio.TimeoutError):
-            why = f"timed out after {self._timeout:g} s"
+        if not isinstance(error, TimeoutError | asyncio.TimeoutError):
+            unreachable = RpcUnreachable(self._uri, explain(error) or "the connection was closed")
+        elif self._connection and not self._left:
+            unreachable = RpcLate(self._uri, self._timeout)
         else:
-            why = explain(error) or "the connection was closed"
-        unreachable = RpcUnreachable(self._uri, why)
+            unreachable = RpcUnreachable(self._uri, f"timed out after {self._timeout:g} s")
         unreachable.__cause__ = error
         self._finish(error if isinstance(error, RpcError) else unreachable)
 
