@@ -3,11 +3,12 @@
 import { h } from "./dom.js";
 
 const EXTRA = 6; // rows above and below what is seen
+const USUAL_HEIGHT = 26; // pixels, until a row is there
 
 export class VirtualList {
-  /** make() returns an element for a row, show(element, index) fills it. */
-  constructor(rowHeight, make, show) {
-    this.rowHeight = rowHeight;
+  /** make() returns an element for a row, show(element, index) fills it. The style sets the height of rows, by the width of the view. */
+  constructor(make, show) {
+    this.rowHeight = USUAL_HEIGHT;
     this.make = make;
     this.showRow = show;
     this.count = 0;
@@ -15,7 +16,7 @@ export class VirtualList {
     this.pool = [];
     this.space = h("div", { class: "space" });
     this.element = h("div", { class: "virtual", tabindex: "0", onscroll: () => this.scrolled() }, this.space);
-    this.observer = new ResizeObserver(() => this.draw());
+    this.observer = new ResizeObserver(() => this.measure());
     this.observer.observe(this.element);
   }
 
@@ -53,7 +54,15 @@ export class VirtualList {
     this.draw();
   }
 
+  /** Draw rows of the height that the style gives them in this width. */
+  measure() {
+    const height = this.pool.find((row) => !row.hidden)?.offsetHeight;
+    if (height) this.rowHeight = height;
+    this.update(this.count);
+  }
+
   draw() {
+    const isFirst = !this.pool.length;
     const { scrollTop, clientHeight } = this.element;
     const first = Math.max(0, Math.floor(scrollTop / this.rowHeight) - EXTRA);
     const last = Math.min(this.count, Math.ceil((scrollTop + clientHeight) / this.rowHeight) + EXTRA);
@@ -69,5 +78,6 @@ export class VirtualList {
       row.style.transform = `translateY(${index * this.rowHeight}px)`;
       this.showRow(row, index);
     });
+    if (isFirst && this.pool.length && this.pool[0].offsetHeight !== this.rowHeight) this.measure();
   }
 }

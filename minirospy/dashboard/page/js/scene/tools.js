@@ -17,7 +17,7 @@ const TURN = Math.PI / 12; // its deviation in radians
 
 /** Name -> {title, key, hint, class in files, topic, type}. */
 export const TOOLS = {
-  move: { title: "Move camera", key: "m", hint: "drag: turn · shift or middle button: move · wheel or right button: zoom" },
+  move: { title: "Move camera", key: "m", hint: globalThis.matchMedia?.("(pointer: coarse)").matches ? "one finger: turn · two fingers: move, zoom" : "drag: turn · shift or middle button: move · wheel or right button: zoom" },
   focus: { title: "Focus", key: "c", hint: "click what the view is to turn around" },
   measure: { title: "Measure", key: "n", hint: "click two points" },
   pose: { title: "2D Pose Estimate", key: "p", hint: "press where the robot is, and drag to where it looks", tool: "SetInitialPose", topic: "/initialpose", type: "geometry_msgs/PoseWithCovarianceStamped" },

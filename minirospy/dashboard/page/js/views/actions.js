@@ -72,7 +72,7 @@ export class Actions {
     const names = servers.map(({ name }) => name);
     if (names.join(" ") !== this.names || !this.choice.options.length) {
       this.names = names.join(" ");
-      fill(this.choice, h("option", { value: "" }, names.length ? t("choose one of {count} action servers", { count: names.length }) : t("no action servers")),
+      fill(this.choice, h("option", { value: "" }, names.length ? t("choose an action server ({count})", { count: names.length }) : t("no action servers")),
         names.map((name) => h("option", { value: name }, name)));
     }
     const server = servers.find(({ name }) => name === this.name);

@@ -7,7 +7,6 @@ import { t } from "../texts.js";
 
 const MOST_LINES = 50_000;
 const MOST_BYTES = 100_000_000; // of a log file
-const ROW = 26; // pixels, as .line in style.css
 
 // The lines outlive the view: they are collected from the first visit on.
 const lines = [];
@@ -62,15 +61,15 @@ export class Console {
     this.loggersButton = h("button", { type: "button", onclick: () => this.toggleLoggers() }, "Logger levels");
     this.count = h("span", { class: "muted" });
     this.problem = h("span", { class: "error" });
-    this.list = new VirtualList(ROW, () => this.makeRow(), (row, index) => this.showRow(row, this.shown[index]));
+    this.list = new VirtualList(() => this.makeRow(), (row, index) => this.showRow(row, this.shown[index]));
     this.list.element.addEventListener("scroll", () => this.showCount());
-    this.list.element.setAttribute("aria-label", "Log lines");
+    this.list.element.setAttribute("aria-label", t("Log lines"));
     this.details = h("div", { class: "panel details", hidden: true });
     this.loggers = h("div", { class: "panel details loggers", hidden: true });
     main.append(
       h("div", { class: "bar" }, [...this.buttons.values()], this.node, this.text,
         h("label", {}, this.isRegex, t("regex")), h("label", {}, this.isExcluded, t("exclude")),
-        h("label", { title: "Show all lines, and mark those that fit" }, this.isMarked, "highlight"), this.problem),
+        h("label", { title: "Show all lines, and mark those that fit" }, this.isMarked, t("highlight")), this.problem),
       h("div", { class: "bar" }, this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),

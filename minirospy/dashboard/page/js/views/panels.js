@@ -312,6 +312,7 @@ class Panel {
         this.send(input.value);
       }, SEND_MS);
     } });
+    input.value = spec.min; // before the limits were set, it was 50
     this.show = (value) => {
       const found = numberOf(value);
       if (found === null || this.timer || document.activeElement === input) return;

@@ -104,7 +104,7 @@ export class Reconfigure {
       row.setAttribute("aria-pressed", String(this.panels.has(name)));
     }
     setText(this.empty, this.panels.size || this.link.state !== "open" ? ""
-      : this.rows.size ? "Choose a server on the left." : "No node offers dynamic_reconfigure. Start one: it appears here.");
+      : this.rows.size ? t("Choose a server on the left.") : t("No node offers dynamic_reconfigure. Start one: it appears here."));
   }
 }
 

@@ -27,7 +27,7 @@ export class Services {
 
   update() {
     const names = [...this.link.services.keys()];
-    fill(this.choice, h("option", { value: "" }, names.length ? t("choose one of {count} services", { count: names.length }) : t("no services")), names.map((name) => h("option", { value: name }, name)));
+    fill(this.choice, h("option", { value: "" }, names.length ? t("choose a service ({count})", { count: names.length }) : t("no services")), names.map((name) => h("option", { value: name }, name)));
     this.choice.value = this.link.services.has(this.name) ? this.name : "";
     const service = this.link.services.get(this.name);
     if (service && service.type !== this.type) this.show(service);
