@@ -131,6 +131,10 @@ class GraphStage:
         if self._clock:
             self._post(lambda: self._send_clock(time))
 
+    def waiting_bytes(self) -> int:
+        """See :meth:`Stage.waiting_bytes`: they are taken when the playing has ended, too."""
+        return 0
+
     def say(self, text: str, end: str = "\n") -> None:
         """See :meth:`Stage.say`: there is no terminal."""
 

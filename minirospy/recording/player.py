@@ -24,6 +24,9 @@ _SECOND = 10**9
 _TICK = _SECOND // 10
 """The status line is printed so often, and a shutdown noticed."""
 
+_STALLED_SECONDS = 5.0
+"""A subscriber that takes nothing for so long at the end is not waited for."""
+
 _LEAD = _SECOND // 500
 """The first message is due so much later: the threads that start meanwhile do not delay it."""
 
@@ -99,6 +102,7 @@ class Player:
         with contextlib.closing(messages):
             self._wait_before(latched)
             self._play_precisely(messages, selection, (first[1].time, last))
+        self._wait_for_slow_subscribers()
         return 0
 
     def state(self) -> PlayerState:
@@ -261,6 +265,17 @@ class Player:
                 else:
                     self._schedule = Schedule(self._options, *span, time.perf_counter_ns() + _LEAD)
             self.on_change()
+
+    def _wait_for_slow_subscribers(self) -> None:
+        """Wait while subscribers take what is left: it ends with this process."""
+        left, end = 0, 0.0
+        while not self._ended and (waiting := self._stage.waiting_bytes()):
+            now = time.monotonic()
+            if waiting != left:
+                left, end = waiting, now + _STALLED_SECONDS
+            elif now > end:
+                return
+            self._sleep(_TICK // 10)
 
     def _wait_at_end(self) -> None:
         """Wait for a seek; the keys and the clock work as ever."""

@@ -71,6 +71,9 @@ class Stage(Protocol):
     def publish_clock(self, time: int) -> None:
         """Publish the bag's time."""
 
+    def waiting_bytes(self) -> int:
+        """Return how many bytes subscribers have not taken yet."""
+
     def say(self, text: str, end: str = "\n") -> None:
         """Print a line for a person."""
 
@@ -176,6 +179,11 @@ class NodeStage:
             message = self._clock.data_class()
             message._buff = CLOCK.pack(*divmod(time, _SECOND))
             self._clock.publish(message)
+
+    def waiting_bytes(self) -> int:
+        """See :meth:`Stage.waiting_bytes`."""
+        topics = [publisher.impl for publisher, _ in self._publishers.values()]
+        return sum(link.waiting_bytes for topic in topics if topic for link in topic.publication.links)
 
     def say(self, text: str, end: str = "\n") -> None:
         """See :meth:`Stage.say`."""

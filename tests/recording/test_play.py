@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +17,8 @@ import pytest
 from minirospy.bag.writer import BagWriter
 from minirospy.environment import Environment
 from minirospy.introspect.streams import ToolNode
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 from tests.recording.conftest import GUARD, STRING, Start, Talker, connected, read_until, said
 from tests.waiting import wait_until
@@ -292,6 +295,42 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
     assert output.endswith(
         "Bag Time:   5900.000000   Duration: 4900.000000 / 4900.000000               \nDone.\n"
     )
+
+
+def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_path: Path) -> None:
+    body = "x" * 1_000_000
+    name = make_bag(tmp_path / "b.bag", [("/a", i, body) for i in range(30)])
+    goes_on = threading.Event()
+    heard: list[int] = []
+
+    def deliver(frame: Frame, _: Header) -> None:
+        goes_on.wait(GUARD)
+        heard.append(len(frame))
+
+    ear.node.listen("/a", deliver)
+    process = play(start, name, "-i", "-q")
+    read_until(process, "Done.")
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(2.0)
+    goes_on.set()
+    assert process.wait(GUARD) == 0
+    wait_until(lambda: len(heard) >= 30)
+    assert heard == [4 + len(body)] * 30
+
+
+def test_ctrl_c_ends_the_wait_for_a_slow_subscriber(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", i, "x" * 1_000_000) for i in range(30)])
+    goes_on = threading.Event()
+
+    def deliver(_: Frame, __: Header) -> None:
+        goes_on.wait(GUARD)
+
+    ear.node.listen("/a", deliver)
+    process = play(start, name, "-i", "-q")
+    read_until(process, "Done.")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(GUARD) == 0
+    goes_on.set()
 
 
 @pytest.mark.parametrize(

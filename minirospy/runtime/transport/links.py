@@ -92,6 +92,14 @@ class OutLink:
         return len(self._outbox)
 
     @property
+    def waiting_bytes(self) -> int:
+        """Return the number of bytes that wait for the socket to take them."""
+        with self._lock:
+            return sum(
+                len(frame) if isinstance(frame, bytes) else sum(map(len, frame)) for frame in self._outbox
+            )
+
+    @property
     def is_sending(self) -> bool:
         """Return whether a thread is inside :meth:`send`: a signal's handler in that very thread would wait for itself."""
         return self._lock.locked()
