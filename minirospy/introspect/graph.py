@@ -27,6 +27,9 @@ __all__ = [
     "why_illegal",
 ]
 
+_LONGEST_NAME = 4096
+"""As the master has it."""
+
 
 class NodeAddress(NamedTuple):
     """A node's name and the URI of its Slave API; None where the master does not know it."""
@@ -110,7 +113,9 @@ def why_illegal(name: str) -> str:
 
     rospy takes such names all the same, roscpp does not. The path of a field may follow a topic's: /points[0]/x.
     """
-    legal = name != "/" and names.is_legal_name(re.sub(r"\[.*?\]", "", name))
+    if len(name) > _LONGEST_NAME:
+        return f"a name has {_LONGEST_NAME} characters at most"
+    legal = name != "/" and names.is_legal_name(re.sub(r"\[[^\[\]]*\]", "", name))
     return "" if legal else "that is not a legal name: letters, digits, _ and /"
 
 

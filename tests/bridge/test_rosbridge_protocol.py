@@ -8,6 +8,7 @@ import json
 import math
 import re
 import struct
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from std_srvs.srv import SetBool
 from minirospy.aio.handle import serialized
 from minirospy.bridge.rosbridge import conversion, png, protocol
 from minirospy.bridge.rosbridge.protocol import OperationError, StatusLevel, Subscribe
-from minirospy.bridge.rosbridge.subscription import Fragments, Merged, Pacer, merge
+from minirospy.bridge.rosbridge.subscription import Fragments, Merged, Pacer, Room, merge
 from minirospy.errors import BridgeProtocolError
 from minirospy.times import Time
 from tests.bridge.rosbridge_messages import MESSAGES
@@ -187,6 +188,7 @@ def test_server_messages_are_those_of_the_document() -> None:
             "set_level: Invalid status level loud; must be one of info, warning",
         ),
         ({"op": ["x"]}, "Unknown operation: ['x']"),
+        ({"op": "subscribe", "topic": "/x", "id": "i" * 1001}, "an id has 1000 characters at most"),
     ],
 )
 def test_wrong_operation_is_refused_with_rosbridges_text(fields: dict[str, Any], text: str) -> None:
@@ -377,7 +379,7 @@ def test_subscriptions_merge_to_what_satisfies_all() -> None:
 
 
 def test_throttled_messages_are_dropped_without_a_queue() -> None:
-    pacer: Pacer[int] = Pacer()
+    pacer: Pacer[int] = Pacer(Room(), lambda _: 1)
     pacer.set(0.5, 0)
     assert [pacer.arrived(number, number * 0.2) for number in range(6)] == [
         True,
@@ -391,11 +393,30 @@ def test_throttled_messages_are_dropped_without_a_queue() -> None:
 
 
 def test_throttled_messages_wait_in_a_queue_of_the_newest() -> None:
-    pacer: Pacer[int] = Pacer()
+    pacer: Pacer[int] = Pacer(Room(), lambda _: 1)
     pacer.set(1.0, 2)
     assert [pacer.arrived(number, 0.0) for number in range(4)] == [True, False, False, False]
     assert (pacer.due, pacer.next(0.5), pacer.dropped) == (1.0, None, 1)
     assert [pacer.next(1.0), pacer.next(1.0), pacer.next(2.0), pacer.due] == [2, None, 3, None]
+
+
+def test_messages_that_wait_share_the_room_of_their_client() -> None:
+    room = Room(10_000)
+    one, other = (Pacer[bytes](room, len) for _ in range(2))
+    for pacer in (one, other):
+        pacer.set(1000.0, 1_000_000)
+        assert pacer.arrived(b"", 0.0)
+    for _ in range(5):
+        assert not one.arrived(bytes(3000), 0.1)
+    assert (one.dropped, other.dropped) == (3, 0)
+    assert not other.arrived(bytes(6000), 0.1)
+    # The newest of a topic waits in any case.
+    assert other.dropped == 0
+    assert not other.arrived(bytes(1), 0.1)
+    assert (other.dropped, room.taken <= 10_000) == (1, True)
+    one.clear()
+    assert one.due is None
+    assert (other.next(1000.0), room.taken) == (bytes(1), 0)
 
 
 # --- fragments
@@ -426,6 +447,15 @@ def test_fragments_that_wait_are_bounded() -> None:
         assert waiting.add(piece, 30.0) is None
     with pytest.raises(OperationError, match="too many"):
         waiting.add(protocol.Fragment("big", "x" * 10_000_000, 6, 9), 30.0)
+    # Also those without a text.
+    with pytest.raises(OperationError, match="too many"):
+        deque((waiting.add(protocol.Fragment(number, "", 0, 2), 40.0) for number in range(100_000)), 0)
+
+
+def test_fragments_of_one_character_are_not_a_message_for_each() -> None:
+    pieces = protocol.fragments("x" * 1_000_000, 1, None)
+    assert len(pieces) == 10_000
+    assert "".join(json.loads(piece)["data"] for piece in pieces) == "x" * 1_000_000
 
 
 # --- what the real server sends

@@ -87,6 +87,20 @@ def test_first_published_message_reaches_a_known_subscriber(bridge: Running) -> 
     assert first.header.stamp.secs > 0
 
 
+def test_operations_of_a_client_on_one_topic_are_limited(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    for number in range(101):
+        client.send(op="advertise", topic="/t", type="std_msgs/String", id=f"a{number}")
+        client.send(op="subscribe", topic="/t", type="std_msgs/String", id=f"s{number}")
+    assert client.next("status", id="a100")["msg"] == "advertise: a client may advertise a topic 100 times"
+    assert client.next("status", id="s100")["msg"] == "subscribe: a client may subscribe to a topic 100 times"
+    for number in range(201):
+        client.send(op="advertise_service", service=f"/s{number}", type="std_srvs/Empty", id=f"v{number}")
+    assert client.next("status", id="v200")["msg"] == "advertise_service: a client may offer 200 services"
+    client.send(op="subscribe", topic="/" + "[" * 900_000, type="std_msgs/String", id="long")
+    assert "4096 characters at most" in client.next("status", id="long")["msg"]
+
+
 def test_publish_without_advertise_uses_the_topics_type(bridge: Running) -> None:
     node = bridge.node("listener")
     messages = received(bridge, node, "/known", String)

@@ -48,6 +48,10 @@ Id = str | int | float | None
 Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
+_MOST_FRAGMENTS = 10_000
+"""Of a message to a client: it may want fragments of one character, each of which is a message."""
+
+_LONGEST_ID = 1000
 _SHOWN = 200
 """Characters of a client's message that an error repeats."""
 
@@ -235,7 +239,12 @@ def _without_op(fields: Fields, id_: Id) -> OperationError:
 
 def _id(fields: Fields) -> Id:
     found = fields.get("id")
-    return found if isinstance(found, str | int | float) or found is None else str(found)
+    if found is None or isinstance(found, bool | int | float):
+        return found
+    text = str(found)
+    if len(text) > _LONGEST_ID:
+        raise OperationError(f"an id has {_LONGEST_ID} characters at most")
+    return text
 
 
 def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
@@ -413,7 +422,11 @@ def encode(fields: Fields, compression: Compression = "none") -> str | bytes:
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:
-    """Return the messages that carry a text in pieces of ``size`` characters; the text itself where it is not longer."""
+    """Return the messages that carry a text in pieces of ``size`` characters; the text itself where it is not longer.
+
+    They are longer where there would be too many.
+    """
+    size = max(size, -(-len(text) // _MOST_FRAGMENTS))
     if len(text) <= size:
         return [text]
     total = -(-len(text) // size)

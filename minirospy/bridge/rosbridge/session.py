@@ -17,8 +17,8 @@ from minirospy.bridge.rosbridge import conversion, protocol
 from minirospy.bridge.rosbridge.authentication import authenticate
 from minirospy.bridge.rosbridge.protocol import Event, OperationError, StatusLevel
 from minirospy.bridge.rosbridge.services import ClientService, call
-from minirospy.bridge.rosbridge.subscription import Fragments
-from minirospy.bridge.rosbridge.topic import ClientTopic
+from minirospy.bridge.rosbridge.subscription import Fragments, Room
+from minirospy.bridge.rosbridge.topic import MOST_IDS, ClientTopic
 from minirospy.bridge.rosbridge.types import message_class
 from minirospy.bridge.tasks import Faults
 from minirospy.errors import (
@@ -42,8 +42,9 @@ _log = logging.getLogger(__name__)
 
 _MOST_CALLS = 200
 _MOST_TOPICS = 1000
+_MOST_SERVICES = 200
 _MOST_WAITING = 64_000_000
-"""Calls under way, topics published or subscribed, and bytes of messages that wait for an earlier one: of one client."""
+"""Calls under way, topics published or subscribed, services offered, bytes that wait for an earlier message: of a client."""
 
 _POLICY = 1008
 _FAILED = 1011
@@ -81,6 +82,8 @@ class RosbridgeSession:
     def __init__(self, door: RosbridgeDoor, client: WebClient) -> None:
         self.client = client
         self.connected = door.graph.node.now()
+        self.room = Room()
+        """For messages of topics whose rate the client limits."""
         self._door = door
         self._graph = door.graph
         self._level = StatusLevel.ERROR
@@ -242,6 +245,8 @@ class RosbridgeSession:
         published = self._published.get(event.topic) or self._open(event.topic, event.type, event.latch)
         if published.message_class is not message_class(event.type):
             raise _conflict(event.topic, event.type, published.message_class._type)
+        if event.id not in published.ids and len(published.ids) >= MOST_IDS:
+            raise BridgeError(f"a client may advertise a topic {MOST_IDS} times")
         published.ids.add(event.id)
 
     def _unadvertise(self, event: protocol.Unadvertise) -> None:
@@ -398,6 +403,8 @@ class RosbridgeSession:
             return None
         self._require_write("offering services")
         _check_name("service", event.service)
+        if sum(each.session is self for each in self._door.services.values()) >= _MOST_SERVICES:
+            raise BridgeError(f"a client may offer {_MOST_SERVICES} services")
         return self._offer(event)
 
     async def _offer(self, event: protocol.AdvertiseService) -> None:

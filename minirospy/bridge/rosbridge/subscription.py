@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Hashable, Iterable, Sequence
+from collections import OrderedDict, deque
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 from minirospy.bridge.rosbridge.protocol import Fragment, OperationError, Subscribe
+from minirospy.bridge.web.queue import DEFAULT_LIMIT, ENTRY_BYTES
 
-__all__ = ["Fragments", "Merged", "Pacer", "merge"]
+__all__ = ["Fragments", "Merged", "Pacer", "Room", "merge"]
 
 _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
 MOST_FRAGMENT_BYTES = 64_000_000
-"""Of the incomplete messages of one client."""
+"""Of the incomplete messages of one client, and of what keeps them."""
 _MOST_FRAGMENTS = 100_000
+_FRAGMENT_BYTES = 200
+_MESSAGE_BYTES = 1000
+"""Memory that a fragment takes besides its text, and an incomplete message besides its fragments."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,22 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
     )
 
 
+@dataclass
+class Room:
+    """The bytes of messages that wait for their time, of all topics of a client, and how many may."""
+
+    most: int = DEFAULT_LIMIT
+    taken: int = 0
+
+
 class Pacer(Generic[_T]):
     """The messages of a topic in time: one in ``throttle`` seconds; the newest ``queue_length`` wait, others are dropped."""
 
-    def __init__(self) -> None:
+    def __init__(self, room: Room, size_of: Callable[[_T], int]) -> None:
+        """``room`` may be that of other topics, too; ``size_of`` returns the bytes of a message."""
         self.throttle = 0.0
+        self._room = room
+        self._size_of = size_of
         self.dropped = 0
         self._last = float("-inf")
         self._length = 0
@@ -63,6 +78,7 @@ class Pacer(Generic[_T]):
             return True
         if self._length:
             self._waiting.append(message)
+            self._room.taken += self._size_of(message) + ENTRY_BYTES
             self._trim()
         else:
             self.dropped += 1
@@ -78,11 +94,23 @@ class Pacer(Generic[_T]):
         if not self._waiting or now < self._last + self.throttle:
             return None
         self._last = now
-        return self._waiting.popleft()
+        return self._popped()
+
+    def clear(self) -> None:
+        """Drop what waits."""
+        while self._waiting:
+            self._popped()
+
+    def _popped(self) -> _T:
+        message = self._waiting.popleft()
+        self._room.taken -= self._size_of(message) + ENTRY_BYTES
+        return message
 
     def _trim(self) -> None:
-        while len(self._waiting) > self._length:
-            self._waiting.popleft()
+        while (count := len(self._waiting)) > self._length or (
+            count > 1 and self._room.taken > self._room.most
+        ):
+            self._popped()
             self.dropped += 1
 
 
@@ -91,6 +119,10 @@ class _Parts(NamedTuple):
     parts: dict[int, str]
     since: list[float]
 
+    @property
+    def size(self) -> int:
+        return _MESSAGE_BYTES + sum(len(part) + _FRAGMENT_BYTES for part in self.parts.values())
+
 
 class Fragments:
     """The fragments of one client that wait for others of their message."""
@@ -98,18 +130,23 @@ class Fragments:
     def __init__(self, timeout: float = 600.0) -> None:
         """``timeout``: seconds after which an incomplete message is forgotten."""
         self._timeout = timeout
-        self._messages: dict[Hashable, _Parts] = {}
+        # The one that got a fragment longest ago is first.
+        self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
         self._size = 0
 
     def add(self, fragment: Fragment, now: float) -> str | None:
         """Return the message that a fragment completes. Raises OperationError."""
         self._forget_old(now)
-        known = self._messages.setdefault(fragment.id, _Parts(fragment.total, {}, [now]))
+        known = self._messages.get(fragment.id)
+        if known is None:
+            known = self._messages[fragment.id] = _Parts(fragment.total, {}, [now])
+            self._size += known.size
         if fragment.total != known.total or fragment.number in known.parts:
             raise OperationError(f"error while trying to append fragment {fragment.number}", fragment.id)
-        self._size += len(fragment.data)
+        self._size += len(fragment.data) + _FRAGMENT_BYTES
         known.parts[fragment.number] = fragment.data
         known.since[0] = now
+        self._messages.move_to_end(fragment.id)
         if self._size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
             self._forget(fragment.id)
             raise OperationError(
@@ -125,12 +162,11 @@ class Fragments:
         return text
 
     def _forget_old(self, now: float) -> None:
-        old: Sequence[Hashable] = [
-            id_ for id_, known in self._messages.items() if now - known.since[0] > self._timeout
-        ]
-        for id_ in old:
+        while self._messages:
+            id_, oldest = next(iter(self._messages.items()))
+            if now - oldest.since[0] <= self._timeout:
+                return
             self._forget(id_)
 
     def _forget(self, id_: Hashable) -> None:
-        known = self._messages.pop(id_)
-        self._size -= sum(map(len, known.parts.values()))
+        self._size -= self._messages.pop(id_).size

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from minirospy.bridge.rosbridge.door import RosbridgeDoor
     from minirospy.bridge.rosbridge.session import RosbridgeSession
 
-__all__ = ["ClientTopic"]
+__all__ = ["MOST_IDS", "ClientTopic"]
+
+MOST_IDS = 100
+"""Subscriptions of one client to one topic, and its advertisements of one."""
 
 
 class ClientTopic:
@@ -28,7 +31,7 @@ class ClientTopic:
         self._topic = door.graph.node.resolve(name)
         self._subscriptions: dict[object, protocol.Subscribe] = {}
         self._merged: Merged | None = None
-        self._pacer: Pacer[Arrival] = Pacer()
+        self._pacer: Pacer[Arrival] = Pacer(session.room, lambda arrival: len(arrival.body))
         self._timer: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
 
@@ -40,6 +43,8 @@ class ClientTopic:
     def add(self, event: protocol.Subscribe) -> None:
         """Add a subscription; one with an id that is known is replaced."""
         is_first = not self._subscriptions
+        if event.id not in self._subscriptions and len(self._subscriptions) >= MOST_IDS:
+            raise BridgeError(f"a client may subscribe to a topic {MOST_IDS} times")
         self._subscriptions[event.id] = event
         self._update()
         self._door.graph.subscribe(self._topic, self._arrived)
@@ -61,6 +66,7 @@ class ClientTopic:
         self._door.graph.unsubscribe(self._topic, self._arrived)
         self._door.forget_topic(self.name)
         self._session.client.discard(self.name)
+        self._pacer.clear()
         if self._timer:
             self._timer.cancel()
 
