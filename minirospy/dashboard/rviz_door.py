@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
 from minirospy.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
 from minirospy.errors import BridgeError, RvizFileError
+from minirospy.private_files import create_file
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient
@@ -49,7 +51,9 @@ def _write_file(path: Path, text: str) -> None:
     file = path.resolve()
     part = file.with_name(f".{file.name}.part")
     try:
-        part.write_text(text, encoding="utf-8")
+        # Its name is known to others who may write there: what they have put is not written through.
+        with os.fdopen(create_file(part, 0o666), "w", encoding="utf-8") as stream:
+            stream.write(text)
         with contextlib.suppress(FileNotFoundError):
             shutil.copymode(file, part)
         part.replace(file)

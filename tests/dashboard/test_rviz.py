@@ -211,6 +211,18 @@ def test_saved_file_stays_a_link_with_its_mode(
     assert stat.S_IMODE(target.stat().st_mode) == 0o600
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_link_that_waits_where_a_file_is_written_is_not_followed(
+    opened: Callable[..., Callable[[object], Any]], tmp_path: Path
+) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("precious", encoding="utf-8")
+    (tmp_path / ".my.rviz.part").symlink_to(victim)
+    assert opened(tmp_path / "my.rviz")({"save": parse_rviz(FILE)}) == {"name": "my.rviz"}
+    assert victim.read_text(encoding="utf-8") == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my.rviz", "victim"]
+
+
 def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> None:
     configs = [{"Visualization Manager": {"Displays": [str(number)] * 10_000}} for number in range(4)]
     file = tmp_path / "my.rviz"
