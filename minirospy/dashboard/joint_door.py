@@ -168,9 +168,10 @@ class JointDoor(JsonDoor["JointSession"]):
             self.parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
-            description = self.parameters.description
-            self.joints = read_joints(description, self.parameters.options, self.warnings.append)
-            self.robot, self.kinds = _kinds(description)
+            # A large description takes seconds.
+            loop = asyncio.get_running_loop()
+            found = await loop.run_in_executor(None, _described, self.parameters, self.warnings.append)
+            self.joints, self.robot, self.kinds = found
             self.why = ""
         except (JointError, UrdfError) as error:
             self.joints = self.parameters = None
@@ -340,6 +341,14 @@ def _positions(fields: Fields) -> dict[str, float]:
     if not isinstance(positions, dict):
         raise TypeError("positions is an object")
     return {name: number(value) for name, value in positions.items()}
+
+
+def _described(
+    parameters: JointParameters, warn: Callable[[str], None]
+) -> tuple[JointStates, str, dict[str, str]]:
+    """Return the joints of the description, the robot's name and the kinds of joints. Raise UrdfError, JointError."""
+    joints = read_joints(parameters.description, parameters.options, warn)
+    return (joints, *_kinds(parameters.description))
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.dashboard.joint_door import SUBPROTOCOL, JointDoor
 from minirospy.introspect.snapshot import fetch
+from minirospy.robots.joints import read_joints
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.dashboard.robot import ROBOT
@@ -98,6 +100,27 @@ def test_joints_are_those_of_the_description(
     assert rows["lift"] == ("prismatic", [0.1, 0.3, pytest.approx(0.2)])
     assert rows["finger"] == ("revolute", None)
     assert "bolt" not in rows
+
+
+def test_description_is_read_beside_the_loop(
+    serve: Callable[..., Served], client: Callable[..., Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = []
+
+    def read(*args: Any) -> Any:
+        threads.append(threading.get_ident())
+        return read_joints(*args)
+
+    monkeypatch.setattr("minirospy.dashboard.joint_door.read_joints", read)
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    assert client(served).next("joints")["robot"] == "crane"
+
+    async def loops() -> int:
+        return threading.get_ident()
+
+    assert threads
+    assert served.run(loops()) not in threads
 
 
 def test_positions_are_published_only_where_wanted(
