@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 from tf2_web_republisher.msg import TFSubscriptionAction, TFSubscriptionGoal
 
-from minirospy.actionlib.aio import ActionClient
+from minirospy.actionlib.aio import ActionClient, GoalError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import describe
@@ -177,6 +177,19 @@ def test_transforms_are_sent_by_action_and_by_topic(run_bridge: Callable[..., Ru
     (found,) = client.next("publish")["msg"]["transforms"]
     assert (found["header"]["frame_id"], found["child_frame_id"]) == ("world", "camera")
     assert found["transform"]["translation"]["x"] == 1.5
+
+    many = {**wanted, "source_frames": ["/camera"] * 1001}
+    assert "1000 frames at most" in client.call("/republish_tfs", many)["values"]
+
+    async def refused() -> str:
+        async with ActionClient(node, "/tf2_web_republisher", TFSubscriptionAction) as action:
+            await action.wait_for_server(30)
+            async with action.send(TFSubscriptionGoal(**many)) as goal:  # type: ignore[arg-type]
+                with pytest.raises(GoalError) as caught:
+                    await goal
+                return str(caught.value)
+
+    assert "1000 frames at most" in bridge.run(asyncio.wait_for(refused(), 30))
 
     async def follow() -> float:
         async with ActionClient(node, "/tf2_web_republisher", TFSubscriptionAction) as action:

@@ -109,6 +109,11 @@ def test_picture_is_resized_and_inverted() -> None:
     assert opened(RED, Picture("jpeg", width=3, height=2)).size == (3, 2)
 
 
+def test_picture_is_not_resized_to_any_size() -> None:
+    with pytest.raises(BridgeError, match="10000x10000 pixels is too large"):
+        opened(RED, Picture("png", width=10_000, height=10_000))
+
+
 def test_compressed_image_passes_as_it_came() -> None:
     data = encoded(RED._type, serialized(RED), Picture())[0]
     message = CompressedImage(format="jpeg", data=data)
@@ -141,9 +146,11 @@ class Browser:
     def __init__(self, bridge: Running) -> None:
         self._port = bridge.bridge.listeners["video"].port
 
-    def get(self, path: str) -> http.client.HTTPResponse:
+    def get(self, path: str, **headers: str) -> http.client.HTTPResponse:
         connection = http.client.HTTPConnection("127.0.0.1", self._port, timeout=30)
-        connection.request("GET", path)
+        connection.request(
+            "GET", path, headers={name.replace("_", "-"): each for name, each in headers.items()}
+        )
         return connection.getresponse()
 
 
@@ -182,6 +189,33 @@ def test_snapshot_is_one_image(camera: Running) -> None:
     for query, format_ in (("", "JPEG"), ("&type=png", "PNG")):
         answer = Browser(camera).get(f"/snapshot?topic=/camera/image{query}")
         assert (answer.status, Pillow.open(BytesIO(answer.read())).format) == (200, format_)
+
+
+def test_encodings_at_a_time_are_limited(camera: Running) -> None:
+    streams = [Browser(camera).get(f"/stream?topic=/camera/image&quality={each}") for each in range(1, 33)]
+    assert {stream.status for stream in streams} == {200}
+    assert Browser(camera).get("/stream?topic=/camera/image&quality=50").status == 503
+    assert Browser(camera).get("/stream?topic=/camera/image&quality=5").status == 200
+
+
+def test_page_of_another_site_embeds_no_image(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(
+        video_port=0, access=Access(origins=("https://robot.example",), write_token="write-token")
+    )
+    publisher = bridge.publisher(bridge.node("camera"), "/camera/image", Image, latch=True)
+    bridge.run(publisher.publish(RED))
+    path = "/snapshot?topic=/camera/image"
+    embedded = {"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Dest": "image"}
+    for headers, status in (
+        (embedded, 403),
+        ({**embedded, "Referer": "https://evil.example/x"}, 403),
+        ({**embedded, "Referer": "https://robot.example/x"}, 200),
+        ({**embedded, "Sec_Fetch_Dest": "iframe"}, 403),
+        ({**embedded, "Sec_Fetch_Dest": "document"}, 200),
+        ({**embedded, "Sec_Fetch_Site": "same-site"}, 200),
+    ):
+        assert Browser(bridge).get(path, **headers).status == status, headers
+    assert Browser(bridge).get(f"{path}&token=write-token", **embedded).status == 200
 
 
 def test_topics_with_images_are_listed(camera: Running) -> None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from minirospy.errors import BridgeError
+
 if TYPE_CHECKING:
     from geometry_msgs.msg import Quaternion, Transform, Vector3
     from tf2_web_republisher.msg import TFSubscriptionGoal
     from tf2_web_republisher.srv import RepublishTFsRequest
 
 __all__ = ["FramePair", "pairs_of"]
+
+_MOST_FRAMES = 1000
 
 
 class FramePair:
@@ -41,7 +45,9 @@ class FramePair:
 
 
 def pairs_of(request: TFSubscriptionGoal | RepublishTFsRequest) -> list[FramePair]:
-    """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres."""
+    """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres. Raise BridgeError."""
+    if len(request.source_frames) > _MOST_FRAMES:
+        raise BridgeError(f"a request has {_MOST_FRAMES} frames at most")
     target = request.target_frame.removeprefix("/")
     return [
         FramePair(source.removeprefix("/"), target, request.angular_thres, request.trans_thres)

@@ -16,11 +16,11 @@ from tf2_web_republisher.msg import (
 )
 from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
-from minirospy.actionlib.aio import ActionServer, ServerGoal
+from minirospy.actionlib.aio import ActionServer, GoalError, ServerGoal
 from minirospy.aio.node import Node
 from minirospy.bridge.tasks import Faults
 from minirospy.bridge.tf_republisher.pairs import FramePair, pairs_of
-from minirospy.errors import ServiceException, TransformException
+from minirospy.errors import BridgeError, ServiceException, TransformException
 from minirospy.frames.aio import Buffer
 
 __all__ = ["NAME", "Republisher"]
@@ -30,6 +30,8 @@ NAME = "/tf2_web_republisher"
 _DEFAULT_RATE = 10.0
 _MOST_RATE = 1000.0
 _MOST_REQUESTS = 1000
+_A_TURN = 50
+"""Frames after which others have their turn."""
 
 
 class _Closing(Protocol):
@@ -73,7 +75,10 @@ class Republisher:
         self, goal: ServerGoal[TFSubscriptionGoal, TFSubscriptionFeedback]
     ) -> TFSubscriptionResult:
         """Send transforms as feedback until the client cancels the goal."""
-        pairs, period = pairs_of(goal.request), _period(goal.request.rate)
+        try:
+            pairs, period = pairs_of(goal.request), _period(goal.request.rate)
+        except BridgeError as error:
+            raise GoalError(str(error)) from error
         while True:
             transforms = await self._changed(pairs)
             if transforms:
@@ -84,16 +89,20 @@ class Republisher:
         """Publish transforms on a topic of the request's own until nobody subscribed to it for ``timeout``."""
         if len(self._requests) >= _MOST_REQUESTS:
             raise ServiceException(f"{_MOST_REQUESTS} requests are served: no more")
+        try:
+            pairs = pairs_of(request)
+        except BridgeError as error:
+            raise ServiceException(str(error)) from error
         topic = f"{self._name}/tf_repub_{next(self._ids)}"
-        task = asyncio.ensure_future(self._serve(request, topic))
+        task = asyncio.ensure_future(self._serve(request, pairs, topic))
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._faults.of_task)
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
 
-    async def _serve(self, request: RepublishTFsRequest, topic: str) -> None:
-        pairs, period = pairs_of(request), _period(request.rate)
+    async def _serve(self, request: RepublishTFsRequest, pairs: list[FramePair], topic: str) -> None:
+        period = _period(request.rate)
         timeout = request.timeout.to_sec()
         loop = asyncio.get_running_loop()
         async with self.node.advertise(topic, TFArray, queue_size=10, latch=True) as publisher:
@@ -114,7 +123,9 @@ class Republisher:
     async def _changed(self, pairs: list[FramePair]) -> list[TransformStamped]:
         """Return the transforms that have to be sent."""
         found = []
-        for pair in pairs:
+        for number, pair in enumerate(pairs, 1):
+            if not number % _A_TURN:
+                await asyncio.sleep(0)
             try:
                 transform = await self._buffer.lookup(pair.target, pair.source)
             except TransformException as error:

@@ -19,6 +19,8 @@ from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 __all__ = ["VideoPages"]
 
 _SNAPSHOT_SECONDS = 10.0
+_MOST_FEEDS = 32
+"""Topics and encodings at a time: each image is encoded for each of them."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -194,6 +196,8 @@ class VideoPages:
             _refuse(
                 exchange, 400, f"topic [{topic}] is of type [{type_}]: {IMAGE} and {COMPRESSED} are images"
             )
+        elif request not in self._feeds and len(self._feeds) >= _MOST_FEEDS:
+            _refuse(exchange, 503, f"{_MOST_FEEDS} encodings of images are in use: no more")
         else:
             start()
 

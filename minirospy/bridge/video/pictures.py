@@ -19,6 +19,8 @@ IMAGE = "sensor_msgs/Image"
 COMPRESSED = "sensor_msgs/CompressedImage"
 
 _FASTEST_PNG = 1
+_MOST_PIXELS = 16_000_000
+"""Of an image that is made larger."""
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
@@ -117,6 +119,10 @@ def _changed(image: Pixels, picture: Picture) -> Pixels:
         image = image[::-1, ::-1]
     height, width = image.shape[:2]
     wanted = (picture.width or width, picture.height or height)
+    if wanted[0] * wanted[1] > max(_MOST_PIXELS, width * height):
+        raise BridgeError(
+            f"an image of {wanted[0]}x{wanted[1]} pixels is too large: {_MOST_PIXELS} are allowed"
+        )
     return image if wanted == (width, height) else _resized(image, wanted)
 
 

@@ -11,7 +11,7 @@ import http
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -283,7 +283,7 @@ class Connection:
         headers = {name.lower(): value for name, value in request.headers.raw_items()}
         credentials = Credentials(
             headers.get("host", ""),
-            headers.get("origin"),
+            _origin(headers),
             headers.get("authorization", ""),
             header_items(headers, "sec-websocket-protocol"),
             request.path,
@@ -461,6 +461,22 @@ class Connection:
     def _abort(self) -> None:
         self._is_closing = True
         self._pipe.close(flush=False)
+
+
+def _origin(headers: Mapping[str, str]) -> str | None:
+    """Return the site of the page that sends a request; None where it is not one.
+
+    A browser names it in Origin, but not for an image or a frame: there it says that the page is of another site, and
+    may name that in Referer. Source: https://www.w3.org/TR/fetch-metadata/.
+    """
+    origin = headers.get("origin")
+    is_embedded = (
+        headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-dest") != "document"
+    )
+    if origin is None and is_embedded:
+        page = urlsplit(headers.get("referer", ""))
+        return f"{page.scheme}://{page.netloc}" if page.netloc else "null"
+    return origin
 
 
 def _cut(reason: str) -> str:
