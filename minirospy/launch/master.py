@@ -64,6 +64,8 @@ class LaunchMaster:
     def start(self, arguments: tuple[str, ...]) -> Process:
         """Start a master on this machine. Raises MasterUnreachableError where it belongs on another, MinirospyError."""
         if not self._environment.master_is_local:
+            # Its error names what is wrong: a name without an address, a master that is suspended.
+            self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.say("auto-starting new master")
         port = str(self._environment.master_address[1])

@@ -37,13 +37,20 @@ publisher.publish(twist)
 """
 
 
-def test_name_of_a_master_that_has_no_address(monkeypatch: pytest.MonkeyPatch, command: Any) -> None:
+def test_name_of_a_master_that_has_no_address(
+    monkeypatch: pytest.MonkeyPatch, command: Any, tmp_path: Path
+) -> None:
     def unknown(*_: object, **__: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
     monkeypatch.setenv("ROS_MASTER_URI", "http://robot.invalid:11311")
     status, _, err = command("rostopic", "list")
+    assert status == 1
+    assert "the name [robot.invalid] has no address here: set ROS_MASTER_URI to its IP address" in err
+
+    (tmp_path / "a.launch").write_text('<launch><node name="n" pkg="p" type="t"/></launch>')
+    status, _, err = command("roslaunch", str(tmp_path / "a.launch"))
     assert status == 1
     assert "the name [robot.invalid] has no address here: set ROS_MASTER_URI to its IP address" in err
 
