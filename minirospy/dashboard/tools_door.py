@@ -106,6 +106,11 @@ class ToolsDoor(JsonDoor["ToolsSession"]):
             # Nodes that answer slowly are not queried without a pause.
             await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
+    def topic_types(self) -> Mapping[str, str]:
+        """Return the types of topics that the master knows; ``*`` where a subscriber takes any."""
+        with self.graph() as graph:
+            return graph.master.get_topic_types()
+
     def _survey(self) -> Survey:
         with self.graph() as graph:
             return survey(graph, self._processes)
@@ -222,12 +227,21 @@ class ToolsSession(JsonSession):
         return await self.in_thread(clean)
 
     async def _type(self, fields: Fields) -> Fields:
-        """Return the full definition of the message type ``name``, of the packages that are installed here."""
-        name = text_of(fields, "name")
+        """Return the full definition of the message type ``name``, of the packages that are installed here.
+
+        With ``topic`` instead, of the type that the master knows of it, also where it is only subscribed.
+        """
+        if "topic" in fields:
+            topic = text_of(fields, "topic")
+            name = (await self.in_thread(self._door.topic_types)).get(topic, "")
+            if "/" not in name:
+                raise NotFoundError("topic", topic, ())
+        else:
+            name = text_of(fields, "name")
         found = await self.in_thread(partial(installed_type, name))
         if found is None:
             raise NotFoundError("message type", name, ())
-        return {"definition": found.definition}
+        return {"name": name, "definition": found.definition}
 
     def _require_writing(self, what: str) -> None:
         if not self.client.may_write:

@@ -190,6 +190,24 @@ def test_definition_of_a_type_is_that_of_the_packages(serve: Callable[..., Serve
         assert "no_such/Type" in tools.request(do="type", name="no_such/Type")["error"]
 
 
+def test_type_of_a_topic_that_is_only_subscribed_is_known(serve: Callable[..., Served]) -> None:
+    from geometry_msgs.msg import Twist
+
+    served = serve()
+    robot = served.node("robot")
+
+    async def listen() -> object:
+        return await robot.subscribe("/cmd_vel", Twist)
+
+    subscription = served.run(listen())
+    with Tools(served) as tools:
+        found = tools.request(do="type", topic="/cmd_vel")["result"]
+        assert found["name"] == "geometry_msgs/Twist"
+        assert "Vector3" in found["definition"]
+        assert "topic [/nobody] not found" in tools.request(do="type", topic="/nobody")["error"]
+    assert subscription
+
+
 @pytest.mark.parametrize(
     "error",
     [OSError("no space"), RecursionError("too deep"), OverflowError("too large"), ZeroDivisionError("by 0")],

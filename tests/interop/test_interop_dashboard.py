@@ -588,6 +588,42 @@ def test_message_is_published_by_its_form(serve: Callable[..., Served], browse: 
 
 
 @needs_chromium
+def test_topic_that_nobody_publishes_is_published(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    robot = served.node("robot")
+
+    async def listen(topic: str, cls: type) -> Any:
+        return await robot.subscribe(topic, cls)
+
+    turning = served.run(listen("/turtle1/cmd_vel", Twist))
+    page = browse(address(served, "publish"))
+    # Its subscriber names the type.
+    page.choose("select[aria-label=Topic]", "/turtle1/cmd_vel")
+    page.wait_text(".form", "angular")
+    page.type("input[name=x]", "2")
+    page.click("button", "Publish once")
+    assert served.run(turning.next(PATIENCE)).linear.x == 2.0
+    page.wait_text("p[role=status]", "1 published")
+    assert page.evaluate("document.querySelector('input[name=x]').value") == "2"
+
+    # A name and a type that nobody has said yet.
+    page.choose("select[aria-label=Topic]", "new")
+    page.type("input[aria-label='Name of the new topic']", "greeting")
+    page.type("input[aria-label='Its type']", "std_msgs/Strin")
+    page.evaluate("document.activeElement.blur()")
+    page.wait_text("p.error", "message type [std_msgs/Strin] not found")
+    page.type("input[aria-label='Its type']", "std_msgs/String")
+    page.evaluate("document.activeElement.blur()")
+    page.type("input[name=data]", "hello")
+    page.click("button", "Repeat")
+    heard = served.run(listen("/greeting", String))
+    assert served.run(heard.next(PATIENCE)).data == "hello"
+    page.click("button", "Stop")
+
+
+@needs_chromium
 def test_parameters_are_shown_set_and_deleted(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:

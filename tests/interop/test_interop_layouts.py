@@ -227,6 +227,11 @@ def test_workshop_shows_the_pressed_button_in_its_plot(
         page.release(".push[data-pin='11']")
         assert next(edges).level == 0
     assert page.evaluate("document.querySelectorAll('.pane').length") == 4
+    # What is between panes is the divider alone.
+    upper, lower = page.evaluate(
+        "[...document.querySelectorAll('.box.column > .pane')].slice(0, 2).map(e => e.getBoundingClientRect().toJSON())"
+    )
+    assert lower["top"] - upper["bottom"] < 12
     # The address names the preset until something is changed.
     assert page.evaluate("location.hash") == "#/layout?preset=workshop"
 

@@ -306,7 +306,7 @@ def test_axis_is_zoomed_and_panned_alone_by_the_wheel_and_by_dragging(
 
 
 @needs_chromium
-def test_chart_is_panned_and_zoomed_by_keys(
+def test_chart_is_panned_and_zoomed_by_keys_and_fingers(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()
@@ -320,4 +320,15 @@ def test_chart_is_panned_and_zoomed_by_keys(
         press_key(page, key)
         page.wait(f"return {shown}")
         press_key(page, "Escape")
+        page.wait(f"return !{shown}")
+    # Fingers: one pans, two zoom.
+    x, y = page.evaluate(
+        "(r => [r.x + r.width / 2, r.y + 50])(document.querySelector('.u-over').getBoundingClientRect())"
+    )
+    for start, end in (([(x, y)], [(x - 90, y)]), ([(x - 20, y), (x + 20, y)], [(x - 120, y), (x + 120, y)])):
+        for kind, points in (("touchStart", start), ("touchMove", end), ("touchEnd", [])):
+            at = [{"x": each, "y": down, "id": number} for number, (each, down) in enumerate(points)]
+            page.call("Input.dispatchTouchEvent", type=kind, touchPoints=at)
+        page.wait(f"return {shown}")
+        page.click("button", "Follow")
         page.wait(f"return !{shown}")

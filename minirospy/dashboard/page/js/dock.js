@@ -7,6 +7,7 @@ import { t } from "./texts.js";
 
 const DRAG_PIXELS = 6; // less is a click
 const EDGE_PIXELS = 18; // of the whole layout, where a pane is docked beside all others
+const LEAST_REM = 12; // height of a pane, so that it shows something: with many of them the page scrolls
 const ICONS = {
   right: "M2 3h12v10H2zM8 3v10",
   bottom: "M2 3h12v10H2zM2 8h12",
@@ -14,6 +15,9 @@ const ICONS = {
   close: "M4 4l8 8M12 4l-8 8",
 };
 const STEP = 0.05; // of a divider that is moved by keys
+
+/** Return how many panes are one below another. */
+const rowsOf = (node) => (node.kind === "pane" ? 1 : node.parts.map(rowsOf).reduce((a, b) => (node.kind === "row" ? Math.max(a, b) : a + b)));
 
 export class Dock {
   /** views: name -> [title, class]; changed() is called when the layout or a view's settings have changed. */
@@ -148,6 +152,7 @@ export class Dock {
   }
 
   showActive() {
+    this.element.style.minHeight = this.layout.root && this.largest === null ? `${LEAST_REM * rowsOf(this.layout.root)}rem` : "";
     for (const [id, { element, largest }] of this.panes) {
       element.classList.toggle("active", id === this.active);
       element.classList.toggle("largest", id === this.largest);

@@ -85,7 +85,8 @@ export const GERMAN = {
   "there is no service {name}": "es gibt keinen Service {name}", "Value": "Wert", "Lamp": "Lampe", "Gauge": "Zeiger", "Switch": "Schalter", "Slider": "Regler", "Button": "Taster",
   // publish, services, parameters
   "Publish once": "Einmal senden", "Repeat": "Wiederholen", "Times a second": "Mal pro Sekunde", "times a second": "mal pro Sekunde",
-  "Choose a topic that is published: its type becomes a form.": "Ein Topic wählen, das gesendet wird: sein Typ wird ein Formular.",
+  "Choose a topic: its type becomes a form.": "Ein Topic wählen: sein Typ wird ein Formular.", "another topic …": "ein anderes Topic …", "Name of the new topic": "Name des neuen Topics",
+  "its type, as geometry_msgs/Twist": "sein Typ, wie geometry_msgs/Twist", "Its type": "Sein Typ",
   "This token is read-only: it publishes nothing.": "Dieses Token darf nur lesen: es sendet nichts.", "{count} published": "{count} gesendet", "It has no fields.": "Es hat keine Felder.",
   "Call": "Aufrufen", "choose a service ({count})": "Service wählen ({count})", "no services": "keine Services", "Choose a service: its request becomes a form.": "Einen Service wählen: seine Anfrage wird ein Formular.",
   "This token is read-only: it calls no services.": "Dieses Token darf nur lesen: es ruft keine Services auf.", "waiting for the answer …": "wartet auf die Antwort …",

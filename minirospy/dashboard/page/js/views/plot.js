@@ -308,6 +308,7 @@ export class Plot {
       },
     }, [[], ...shown.map(() => [])], this.area);
     this.axes.attach(this.chart);
+    this.listenToFingers(this.chart.over);
   }
 
   /** Return a chart of series over another one. */
@@ -369,6 +370,22 @@ export class Plot {
     if (!act) return;
     event.preventDefault();
     act();
+  }
+
+  /** Let one finger pan the time, and two zoom it. */
+  listenToFingers(over) {
+    const fingers = new Map(); // pointer -> x
+    over.addEventListener("pointerdown", ({ pointerType, pointerId, clientX }) => { if (pointerType === "touch") fingers.set(pointerId, clientX); });
+    over.addEventListener("pointermove", ({ pointerId, clientX }) => {
+      if (!fingers.has(pointerId) || this.origin === null) return;
+      const before = [...fingers.values()];
+      const after = [...fingers.set(pointerId, clientX).values()];
+      const { left, width } = over.getBoundingClientRect();
+      const [from, to] = this.range();
+      if (after.length === 1) this.pan((before[0] - after[0]) / width);
+      if (after.length === 2) this.zoomBy(Math.abs(before[0] - before[1]) / Math.max(1, Math.abs(after[0] - after[1])), from + (to - from) * ((after[0] + after[1]) / 2 - left) / width);
+    });
+    for (const name of ["pointerup", "pointercancel"]) over.addEventListener(name, ({ pointerId }) => fingers.delete(pointerId));
   }
 
   /** Show the time later by a share of what is shown. */

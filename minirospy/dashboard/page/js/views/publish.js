@@ -5,6 +5,7 @@ import { MessageForm } from "../form.js";
 import { t } from "../texts.js";
 
 const LEAST_MS = 10;
+const NEW = "new"; // of the choice; names of topics have a slash
 
 export class Publish {
   constructor(link, words, main, place) {
@@ -18,13 +19,17 @@ export class Publish {
     this.isSending = false;
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
     this.about = h("span", { class: "muted" });
+    this.isNew = false;
+    this.name = h("input", { class: "grow", placeholder: "/name", "aria-label": "Name of the new topic", autocomplete: "off", onchange: () => this.choose(this.name.value.trim()) });
+    this.typeName = h("input", { class: "grow", placeholder: "its type, as geometry_msgs/Twist", "aria-label": "Its type", autocomplete: "off", onchange: () => this.describe(this.typeName.value.trim()) });
+    this.fresh = h("div", { class: "bar", hidden: true }, this.name, this.typeName);
     this.fields = h("div", {});
     this.once = h("button", { type: "submit", class: "primary" }, "Publish once");
     this.repeat = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.toggle() }, "Repeat");
     this.rate = h("input", { type: "number", min: 0.1, max: 100, step: "any", value: "10", "aria-label": "Times a second" });
     this.buttons = h("div", { class: "bar", hidden: true }, this.once, this.repeat, h("label", {}, this.rate, "times a second"));
     this.result = h("p", { role: "status" });
-    main.append(h("div", { class: "bar" }, this.choice, this.about),
+    main.append(h("div", { class: "bar" }, this.choice, this.about), this.fresh,
       h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.send(); } }, this.fields, this.buttons), this.result);
     this.ending = link.watch(["channels", "state", "graph"], () => this.update());
   }
@@ -36,19 +41,30 @@ export class Publish {
   }
 
   update() {
-    const names = [...this.link.channels.keys()];
+    const names = [...new Set([...this.link.channels.keys(), ...this.link.graph.subscribed.keys()])].sort();
     if (names.join(" ") !== this.names) {
       this.names = names.join(" ");
-      fill(this.choice, h("option", { value: "" }, "choose a topic"), names.map((name) => h("option", { value: name }, name)));
+      fill(this.choice, h("option", { value: "" }, "choose a topic"), names.map((name) => h("option", { value: name }, name)), h("option", { value: NEW }, "another topic …"));
     }
-    this.choice.value = this.link.channels.has(this.topic) ? this.topic : "";
+    this.choice.value = names.includes(this.topic) ? this.topic : this.isNew || this.topic ? NEW : "";
     const channel = this.link.channels.get(this.topic);
     if (this.link.state !== "open") this.stop();
-    if (channel && channel.schema !== this.schema) this.show(channel);
-    else if (!this.schema) fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" || this.link.mayWrite ? "Choose a topic that is published: its type becomes a form." : "This token is read-only: it publishes nothing."));
+    const isOpen = this.link.state === "open" && this.link.mayWrite;
+    this.fresh.hidden = !isOpen || Boolean(channel) || !(this.isNew || this.topic);
+    this.name.hidden = this.choice.value !== NEW;
+    if (isOpen && this.topic && !channel && this.asked !== this.topic) this.describe("");
+    // A form that is in use stays: the channel may be that of its own messages.
+    if (channel && channel.schema !== this.schema && !this.sent) this.show(channel);
+    else if (!this.schema) fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" || this.link.mayWrite ? "Choose a topic: its type becomes a form." : "This token is read-only: it publishes nothing."));
   }
 
   choose(topic) {
+    this.isNew = topic === NEW;
+    if (this.isNew) topic = "";
+    else if (topic && !topic.startsWith("/")) topic = `/${topic}`;
+    this.asked = null;
+    this.typeName.value = "";
+    this.name.value = topic;
     this.stop();
     if (this.sent) this.link.unpublish(this.topic);
     this.topic = topic;
@@ -59,6 +75,26 @@ export class Publish {
     setText(this.about, "");
     this.place.remember({ topic });
     this.update();
+    if (this.isNew) this.name.focus();
+  }
+
+  /** Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have. */
+  async describe(type) {
+    const { topic } = this;
+    this.asked = topic;
+    setText(this.result, "");
+    this.result.classList.remove("error");
+    try {
+      const { name, definition } = await this.link.tools.request({ do: "type", ...(type ? { name: type } : { topic }) });
+      if (topic !== this.topic || this.link.channels.has(topic)) return;
+      this.typeName.value = name;
+      this.show({ type: name, schema: definition });
+    } catch (error) {
+      // What nobody knows, a person types.
+      if (!type || topic !== this.topic) return;
+      this.result.classList.add("error");
+      setText(this.result, error.message);
+    }
   }
 
   show(channel) {
