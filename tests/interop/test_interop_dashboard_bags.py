@@ -155,7 +155,9 @@ def test_topics_are_recorded_and_the_recording_is_opened(
     with Bags([str(folder / "walk.bag")]) as bags:
         assert {each.topic for each in bags.readers[0].connections.values()} == {"/robot/words"}
     assert os.listdir(folder) == ["walk.bag"]
-    # The name is in use now.
+    # The bag has the place of the form, whose name is in use now.
+    page.wait("return !document.querySelector('.recorder').checkVisibility()")
+    page.click("button", "Record …")
     page.type("input[aria-label='Name of the recording']", "walk")
     page.click(".recorder button", "Record")
     page.wait_text("p.error", "walk.bag exists already")

@@ -441,6 +441,11 @@ def test_classroom_shows_the_boards_side_by_side(
         page = browse(address(served, "layout?preset=classroom"), width=1400, height=900)
         page.wait_text("select.pane-view", "Teleop")
         page.wait_text(".pane-about", "/red/cmd_vel")
+        # A board fits its pane.
+        page.wait(
+            "return [...document.querySelectorAll('.pane-body svg.board')].every(e =>"
+            " e.getBoundingClientRect().bottom <= e.closest('.pane').getBoundingClientRect().bottom)"
+        )
         for board in boards:
             board.set(7, 1)
             page.wait(

@@ -56,7 +56,7 @@ export const GERMAN = {
   "Publishes": "Sendet", "Subscribes to": "Empfängt", "its type is not known yet": "sein Typ ist noch nicht bekannt", "live values": "Werte live", "Publishers": "Sender", "Subscribers": "Empfänger",
   "Nobody publishes this topic.": "Niemand sendet dieses Topic.",
   // image
-  "actual size": "Originalgröße", "no topic has images": "kein Topic hat Bilder", "no markers": "keine Marker", "Markers over the image": "Marker über dem Bild", "Waiting for {topic} …": "Wartet auf {topic} …", "Start a camera, or play a bag with images.": "Eine Kamera starten, oder ein Bag mit Bildern abspielen.",
+  "actual size": "Originalgröße", "Choose a topic above.": "Oben ein Topic wählen.", "no topic has images": "kein Topic hat Bilder", "no markers": "keine Marker", "Markers over the image": "Marker über dem Bild", "Waiting for {topic} …": "Wartet auf {topic} …", "Start a camera, or play a bag with images.": "Eine Kamera starten, oder ein Bag mit Bildern abspielen.",
   "a compressed image of format \"{format}\" cannot be shown by this browser": "dieser Browser kann ein komprimiertes Bild im Format „{format}“ nicht zeigen",
   // board
   "The board": "Das Board", "The scanner's fields and a person": "Die Felder des Scanners und eine Person",

@@ -5,7 +5,7 @@ import { Door } from "../door.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { decode } from "../ros1.js";
-import { t } from "../texts.js";
+import { language, t } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
@@ -77,7 +77,7 @@ export class Bag {
   showFiles(files, folder, given) {
     this.files.title = t("Bags in {folder} and below", { folder });
     fill(this.files, h("option", { value: "" }, files.length ? t("choose a bag") : t("no bag in {folder}", { folder })),
-      files.map(([name, size, modified]) => h("option", { value: name }, `${name}  ·  ${sizeText(size)}  ·  ${new Date(modified * 1000).toLocaleString()}`)));
+      files.map(([name, size, modified]) => h("option", { value: name }, `${name}  ·  ${sizeText(size)}  ·  ${new Date(modified * 1000).toLocaleString(language)}`)));
     if (!this.name && given.length && !this.player.bag) this.choose(given[0]);
     this.files.value = this.name;
     if (!this.player.bag) setText(this.empty, this.writes === false ? "" : files.length ? t("Choose a bag to look into it, or record one.") : t("There is no bag in {folder} yet: record one.", { folder }));
@@ -88,6 +88,7 @@ export class Bag {
     this.place.remember(name ? { file: name } : {});
     this.say("");
     this.player.leave();
+    if (name && !this.recorder.element.hidden && !this.recorder.isRecording) this.recorder.toggle(this.recordButton);
     this.door.send(name ? { op: "open", name } : { op: "close" });
   }
 }
@@ -296,7 +297,7 @@ class Player {
       top += height;
     }
     this.height = top;
-    fill(this.labels, h("div", { class: "bag-corner muted" }, `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString()}`), this.rows.map((row) => this.label(row)));
+    fill(this.labels, h("div", { class: "bag-corner muted" }, `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`), this.rows.map((row) => this.label(row)));
     fill(this.moments);
     const order = [...this.rows].sort((one, other) => IMAGES.has(other.type) - IMAGES.has(one.type) || other.count - one.count);
     for (const row of order.slice(0, MOST_SHOWN_FIRST)) this.setShown(row, true);
@@ -421,7 +422,7 @@ class Player {
     this.head.style.transform = `translateX(${x.toFixed(1)}px)`;
     this.head.style.height = `${this.height}px`;
     setText(this.now, `${clockText(time)} / ${clockText(this.bag.length)}`);
-    setText(this.date, new Date((this.bag.start + time) * 1000).toLocaleTimeString());
+    setText(this.date, new Date((this.bag.start + time) * 1000).toLocaleTimeString(language));
     this.canvas.setAttribute("aria-valuenow", time.toFixed(3));
     this.canvas.setAttribute("aria-valuetext", clockText(time));
   }

@@ -63,7 +63,7 @@ export class Image {
     this.choice.value = this.topic;
     if (this.topic && !this.end) this.subscribe();
     this.updateMarkers();
-    setText(this.empty, this.pixels ? "" : this.topic ? t("Waiting for {topic} …", { topic: this.topic }) : t("Start a camera, or play a bag with images."));
+    setText(this.empty, this.pixels ? "" : this.topic ? t("Waiting for {topic} …", { topic: this.topic }) : topics.length ? t("Choose a topic above.") : t("Start a camera, or play a bag with images."));
   }
 
   choose(topic) {

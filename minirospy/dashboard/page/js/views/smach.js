@@ -4,7 +4,7 @@ import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
 import { fill, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { userdataOf } from "../pickle.js";
 import { layoutContainer, roots } from "../smach_layout.js";
-import { t } from "../texts.js";
+import { language, t } from "../texts.js";
 
 const STRUCTURE = "smach_msgs/SmachContainerStructure";
 const STATUS = "smach_msgs/SmachContainerStatus";
@@ -229,7 +229,7 @@ export class Smach {
     const state = this.selected?.state ?? null;
     refill(this.details, h("h2", {}, state === null ? path : `${path}/${state}`), this.facts(structure, status, state),
       h("h3", {}, t("Userdata of {path}", { path })), this.userdata(status),
-      h("h3", {}, "Last changes"), this.events.length ? h("ul", { class: "smach-events" }, this.events.slice(0, 30).map((event) => h("li", {}, h("span", { class: "muted num" }, new Date(event.seconds * 1000).toLocaleTimeString()), " ",
+      h("h3", {}, "Last changes"), this.events.length ? h("ul", { class: "smach-events" }, this.events.slice(0, 30).map((event) => h("li", {}, h("span", { class: "muted num" }, new Date(event.seconds * 1000).toLocaleTimeString(language)), " ",
         h("span", { class: "muted" }, event.path), " → ", event.active.join(", ") || t("ended")))) : h("p", { class: "muted" }, t("none yet")));
   }
 
