@@ -27,7 +27,6 @@ COMPILED_AHEAD = frozenset(
         "std_srvs",
         "tf",
         "tf2_msgs",
-        "topic_tools",
         "visualization_msgs",
     ]
 )
