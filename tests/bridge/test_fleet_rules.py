@@ -144,15 +144,15 @@ def test_exports_are_what_others_have() -> None:
             "/a b": "a/B",
         },
     )
-    found = exported_topics(snapshot, "/gw", lambda _: True, ["robot2"])
+    found = exported_topics(snapshot, {"/gw"}, lambda _: True, ["robot2"])
     assert {name: (each.publishers, each.subscribers) for name, each in found.items()} == {
         "/scan": (("/laser",), ()),
         "/cmd_vel": ((), ("/base",)),
     }
-    assert exported_topics(snapshot, "/gw", lambda name: name == "/scan").keys() == {"/scan"}
+    assert exported_topics(snapshot, {"/gw"}, lambda name: name == "/scan").keys() == {"/scan"}
     every = NameFilter()
-    assert exported_services(snapshot, "/gw", every, ["robot2"]) == {"/lamp": ("/x",)}
-    assert exported_services(snapshot, "/gw", NameFilter.of(["/x/*"])).keys() == {"/x/get_loggers"}
+    assert exported_services(snapshot, {"/gw"}, every, ["robot2"]) == {"/lamp": ("/x",)}
+    assert exported_services(snapshot, {"/gw"}, NameFilter.of(["/x/*"])).keys() == {"/x/get_loggers"}
 
 
 def test_rates_and_lanes_go_by_the_first_pattern() -> None:

@@ -151,9 +151,9 @@ class Gateway:
         }
         if self.exporter:
             exporter = self.exporter
-            found["master"] = exporter.is_master_reached
-            found["topics"] = len(exporter.topics)
-            found["services"] = len(exporter.services)
+            found["master"] = exporter.graph.is_master_reached
+            found["topics"] = len(exporter.graph.topics)
+            found["services"] = len(exporter.graph.services)
             found["duplicates"] = len(exporter.duplicates)
             found["sent"] = [
                 {"topic": topic, **_outflow(each.outflow)} for topic, each in exporter.outbound.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from fnmatch import fnmatchcase
@@ -82,7 +82,7 @@ class GatewayRules:
 
 @dataclass(frozen=True)
 class Export:
-    """A topic with ends other than the gateway's own."""
+    """A topic with ends that are not gateways."""
 
     topic: str
     type: str
@@ -143,11 +143,11 @@ def parse_lanes(words: Iterable[str]) -> list[tuple[str, Lane]]:
 
 
 def exported_topics(
-    snapshot: Snapshot, own_name: str, allows: Callable[[str], bool], hidden: Iterable[str] = ()
+    snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
 ) -> dict[str, Export]:
-    """Return the topics that a robot shows to others: those with an end other than the gateway's own, of a known type.
+    """Return the topics that a robot shows to others: those with an end that is not a gateway's, of a known type.
 
-    ``hidden``: namespaces of what came from other robots, which is not shown again.
+    ``own``: the nodes of gateways. ``hidden``: namespaces of what came from other robots, which is not shown again.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     found = {}
@@ -155,15 +155,15 @@ def exported_topics(
         type_ = snapshot.types.get(topic)
         if type_ is None or not _is_shown(topic, starts) or not allows(topic):
             continue
-        publishers = _others(snapshot.publishers.get(topic, ()), own_name)
-        subscribers = _others(snapshot.subscribers.get(topic, ()), own_name)
+        publishers = _others(snapshot.publishers.get(topic, ()), own)
+        subscribers = _others(snapshot.subscribers.get(topic, ()), own)
         if publishers or subscribers:
             found[topic] = Export(topic, type_, publishers, subscribers)
     return found
 
 
 def exported_services(
-    snapshot: Snapshot, own_name: str, allows: NameFilter, hidden: Iterable[str] = ()
+    snapshot: Snapshot, own: Collection[str], allows: NameFilter, hidden: Iterable[str] = ()
 ) -> dict[str, tuple[str, ...]]:
     """Return the services that a robot shows to others, with their nodes.
 
@@ -173,7 +173,7 @@ def exported_services(
     every = allows == NameFilter()
     found = {}
     for service, nodes in sorted(snapshot.services.items()):
-        others = _others(nodes, own_name)
+        others = _others(nodes, own)
         if not others or not _is_shown(service, starts) or not allows(service):
             continue
         if not (every and service.endswith(_LOGGER_SERVICES)):
@@ -214,5 +214,5 @@ def _is_shown(name: str, hidden: tuple[str, ...]) -> bool:
     )
 
 
-def _others(nodes: Sequence[str], own_name: str) -> tuple[str, ...]:
-    return tuple(node for node in nodes if node != own_name)
+def _others(nodes: Sequence[str], own: Collection[str]) -> tuple[str, ...]:
+    return tuple(node for node in nodes if node not in own)

@@ -1,0 +1,173 @@
+"""The graph of a gateway's own master: topics and services with ends other than gateways, and their types."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Collection
+from typing import TYPE_CHECKING, TypeVar
+
+from minirospy.aio.raw import service_header
+from minirospy.bridge.fleet.definitions import Definitions
+from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken, TopicToken, is_md5
+from minirospy.bridge.fleet.rules import Export, GatewayRules, exported_services, exported_topics
+from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ServiceException
+from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.wire.header import Header
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["RobotGraph"]
+
+_log = logging.getLogger(__name__)
+_FASTEST_LOOK, _SLOWEST_LOOK = 0.25, 2.0
+_PROBE_SECONDS, _AGAIN_SECONDS = 3.0, 10.0
+_PROBES = 8
+
+_Key = TypeVar("_Key", bound=tuple[str, object])
+
+
+class RobotGraph:
+    """What a gateway announces of its master's graph. All on the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        definitions: Definitions,
+        claim: Claim,
+        rules: GatewayRules,
+        hidden: Callable[[], Collection[str]],
+        gateways: Callable[[Snapshot], Collection[str]] | None = None,
+    ) -> None:
+        """``hidden``: names of robots whose topics are here as their copies. ``gateways``: nodes that count as this one."""
+        self.is_master_reached = True
+        self.topics: dict[str, TopicToken] = {}
+        self.services: dict[str, ServiceToken] = {}
+        self._node = node
+        self._definitions = definitions
+        self._claim = claim
+        self._rules = rules
+        self._hidden = hidden
+        self._gateways = gateways
+        self._headers: dict[tuple[str, str], Header] = {}
+        self._service_types: dict[tuple[str, tuple[str, ...]], tuple[str, str]] = {}
+        self._not_before: dict[tuple[str, object], float] = {}
+        self._probing = asyncio.Semaphore(_PROBES)
+
+    async def look(self) -> bool:
+        """Read the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
+        snapshot = await fetch(self._node._node.master)
+        hidden, own = self._hidden(), {self._node.name}
+        if self._gateways:
+            own.update(self._gateways(snapshot))
+        exports = exported_topics(snapshot, own, self._rules.topics, hidden)
+        services = exported_services(snapshot, own, self._rules.services, hidden)
+        await self._look_at_publishers(exports)
+        await self._look_at_services(services)
+
+        topics = {}
+        for export in exports.values():
+            token = await self._topic_token(export)
+            if token:
+                topics[export.topic] = token
+        found = {
+            name: ServiceToken(self._claim.name, self._claim.gateway, name, *self._service_types[name, nodes])
+            for name, nodes in services.items()
+            if (name, nodes) in self._service_types
+        }
+        changed = topics != self.topics or found != self.services
+        self.topics, self.services = topics, found
+        return changed
+
+    async def watch(self, look: Callable[[], Awaitable[bool]]) -> None:
+        """Call ``look`` again and again: often while it returns that something has changed."""
+        pause = _FASTEST_LOOK
+        while True:
+            await asyncio.sleep(pause)
+            changed = False
+            started = time.monotonic()
+            try:
+                changed = await look()
+                if not self.is_master_reached:
+                    _log.info("the master answers again")
+                self.is_master_reached = True
+            except (MasterUnreachableError, RpcError) as error:
+                if self.is_master_reached:
+                    _log.warning("the graph cannot be read: %s. Will keep trying.", error)
+                self.is_master_reached = False
+            slowest = max(_SLOWEST_LOOK, 20 * (time.monotonic() - started))
+            pause = _FASTEST_LOOK if changed else min(pause * 1.5, slowest)
+
+    async def _topic_token(self, export: Export) -> TopicToken | None:
+        headers = [
+            header
+            for publisher in export.publishers
+            if (header := self._headers.get((export.topic, publisher))) is not None
+        ]
+        type_, md5sum = export.type, UNKNOWN_MD5
+        if headers:
+            type_, md5sum = headers[0].get("type", ""), headers[0].get("md5sum", "")
+            if not is_md5(md5sum):
+                return None
+        elif export.subscribers:
+            md5sum = await self._definitions.md5sum(type_) or UNKNOWN_MD5
+        else:
+            return None
+        rewriter = await self._definitions.rewriter(type_, md5sum) if self._rules.has_frames else None
+
+        return TopicToken(
+            self._claim.name,
+            self._claim.gateway,
+            export.topic,
+            type_,
+            md5sum,
+            bool(headers),
+            bool(export.subscribers),
+            any(header.get("latching") == "1" for header in headers),
+            rewriter is not None,
+        )
+
+    async def _look_at_publishers(self, exports: dict[str, Export]) -> None:
+        """Learn from each new publisher its type, and whether it latches: the master knows neither."""
+        present = {(each.topic, node) for each in exports.values() for node in each.publishers}
+        self._headers = {key: header for key, header in self._headers.items() if key in present}
+
+        async def probe(topic: str, node: str) -> None:
+            async with self._probing:
+                try:
+                    header = await asyncio.wait_for(
+                        self._definitions.texts._header_of(topic, node), _PROBE_SECONDS
+                    )
+                except (MinirospyError, OSError, asyncio.TimeoutError, ValueError):
+                    self._not_before[topic, node] = time.monotonic() + _AGAIN_SECONDS
+                else:
+                    self._headers[topic, node] = header
+                    self._definitions.learn(
+                        header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")
+                    )
+
+        await asyncio.gather(*(probe(*key) for key in self._due(present - self._headers.keys())))
+
+    async def _look_at_services(self, services: dict[str, tuple[str, ...]]) -> None:
+        """Learn the types of new services: their nodes alone know them."""
+        present = set(services.items())
+        self._service_types = {key: found for key, found in self._service_types.items() if key in present}
+
+        async def probe(name: str, nodes: tuple[str, ...]) -> None:
+            async with self._probing:
+                try:
+                    header = await asyncio.wait_for(service_header(self._node, name), _PROBE_SECONDS)
+                except (ServiceException, asyncio.TimeoutError):
+                    self._not_before[name, nodes] = time.monotonic() + _AGAIN_SECONDS
+                    return
+            if is_md5(header.get("md5sum", "")) and "/" in header.get("type", ""):
+                self._service_types[name, nodes] = header["type"], header["md5sum"]
+
+        await asyncio.gather(*(probe(*key) for key in self._due(present - self._service_types.keys())))
+
+    def _due(self, keys: set[_Key]) -> list[_Key]:
+        now = time.monotonic()
+        self._not_before = {key: until for key, until in self._not_before.items() if until > now}
+        return [key for key in keys if key not in self._not_before]
