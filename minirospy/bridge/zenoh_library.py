@@ -16,8 +16,8 @@ from minirospy.errors import BridgeError
 from minirospy.escape import escaped, has_controls
 
 __all__ = [
-    "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "NetworkOptions", "Outlet", "Query", "Reply", "Sample",
-    "Session", "configured", "is_loopback_endpoint", "one_line", "require_zenoh", "to_endpoint",
+    "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "Matching", "NetworkOptions", "Outlet", "Query", "Reply",
+    "Sample", "Session", "configured", "is_loopback_endpoint", "one_line", "require_zenoh", "to_endpoint",
 ]  # fmt: skip
 
 DEFAULT_PORT = 7447
@@ -81,10 +81,20 @@ class Declared(Protocol):
     def undeclare(self) -> None: ...
 
 
+class Matching(Protocol):
+    """Whether others subscribe to what a publisher sends."""
+
+    matching: bool
+
+
 class Outlet(Protocol):
     """A publisher of Zenoh. ``put`` may block."""
 
-    def put(self, payload: bytes, *, attachment: bytes) -> None: ...
+    matching_status: Matching
+
+    def put(self, payload: bytes, *, attachment: bytes = ...) -> None: ...
+
+    def declare_matching_listener(self, handler: object) -> Declared: ...
 
     def undeclare(self) -> None: ...
 
@@ -116,7 +126,9 @@ class Session(Protocol):
 
     def declare_publisher(self, key: str, **options: object) -> Outlet: ...
 
-    def declare_queryable(self, key: str, handler: object, *, complete: bool) -> Declared: ...
+    def declare_queryable(
+        self, key: str, handler: object, *, complete: bool, **options: object
+    ) -> Declared: ...
 
     def get(self, key: str, handler: object, **options: object) -> None: ...
 

@@ -69,9 +69,9 @@ class Definitions:
         return self._known.get((name, md5sum), "")
 
     async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
-        """Return a type, with its text where it is known here or to a gateway; without it messages pass, too."""
+        """Return a type, with its text where it is known here or to a gateway ("": none); without it messages pass, too."""
         text = await self.text(name, md5sum)
-        if not text and md5sum != _NO_FIELDS:
+        if not text and gateway and md5sum != _NO_FIELDS:
             key = name, md5sum
             if key not in self._finding:
                 task = self._finding[key] = asyncio.ensure_future(self._from_peer(name, md5sum, gateway))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import logging
 from collections.abc import Callable, Collection, Coroutine, Mapping
 from typing import TYPE_CHECKING
 
-from minirospy.aio.raw import call_raw
 from minirospy.bridge.fleet.definitions import Definitions
-from minirospy.bridge.fleet.inbound import InboundTopic
+from minirospy.bridge.fleet.inbound import InboundTopic, call_service, run_on_loop
 from minirospy.bridge.fleet.keys import (
     ROOT,
     Claim,
@@ -21,6 +19,7 @@ from minirospy.bridge.fleet.keys import (
     parse_in,
     parse_offer,
     parse_want,
+    replay_key,
     service_key,
     topic_key,
 )
@@ -30,7 +29,6 @@ from minirospy.bridge.fleet.robot_graph import RobotGraph
 from minirospy.bridge.fleet.rules import GatewayRules, holder
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.errors import ServiceException
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -142,7 +140,8 @@ class Exporter:
             readers.add(want.reader)
             outbound = self.outbound.get(want.topic)
             if outbound:
-                outbound.replay(want.reader)
+                ends = outbound.token.robot, outbound.token.gateway, outbound.token.md5sum
+                outbound.replay(replay_key(*ends, want.topic, want.reader))
         else:
             readers.discard(want.reader)
         if not readers:
@@ -235,12 +234,7 @@ class Exporter:
         """Publish a message. In the intake's thread."""
         inbound = self.inbound.get(topic)
         if inbound is None or not inbound.publish(md5sum, body):
-            loop = self._node._loop
-            assert loop
-            # Waits: messages that come faster than the loop takes them stay in the intake's queue.
-            done = asyncio.run_coroutine_threadsafe(self._hold(topic, md5sum, writer, body), loop)
-            with contextlib.suppress(Exception):
-                done.result(10.0)
+            run_on_loop(self._node, self._hold(topic, md5sum, writer, body))
 
     async def _hold(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
         inbound = self._inbound_of(topic)
@@ -254,10 +248,7 @@ class Exporter:
             raise QueryFailed("the robot has no such service")
         if token.md5sum != parsed[1]:
             raise QueryFailed(f"the service has the md5sum {token.md5sum}, not {parsed[1]}")
-        try:
-            return await call_raw(self._node, token.service, token.md5sum, request)
-        except ServiceException as error:
-            raise QueryFailed(str(error)) from error
+        return await call_service(self._node, token, request)
 
     async def _parameter(self, _: str, request: bytes) -> bytes:
         name = request.decode(errors="replace") or "/"

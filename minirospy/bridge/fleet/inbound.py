@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from typing import TYPE_CHECKING
 
-from minirospy.aio.raw import raw_class
+from minirospy.aio.raw import call_raw, raw_class
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.frames import FrameRewriter, stripped
-from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, TopicToken
-from minirospy.errors import DeserializationError, ROSException
+from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, ServiceToken, TopicToken
+from minirospy.bridge.fleet.network import QueryFailed
+from minirospy.errors import DeserializationError, ROSException, ServiceException
 from minirospy.idl.protocols import Message
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
 
-__all__ = ["InboundTopic"]
+__all__ = ["InboundTopic", "call_service", "run_on_loop"]
 
 _log = logging.getLogger(__name__)
 _IDLE_SECONDS = 10.0
 _QUEUE = 100
 _MOST_HELD, _MOST_HELD_BYTES = 100, 16 << 20
 _MOST_OFFERS = 100
+
+
+async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes:
+    """Return the answer of a service of this master to another's request. Raise QueryFailed."""
+    try:
+        return await call_raw(node, token.service, token.md5sum, request)
+    except ServiceException as error:
+        raise QueryFailed(str(error)) from error
+
+
+def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
+    """Run a coroutine on a node's loop, and wait: messages that come faster than the loop takes them stay in the intake."""
+    assert node._loop
+    done = asyncio.run_coroutine_threadsafe(work, node._loop)
+    with contextlib.suppress(Exception):
+        done.result(10.0)
 
 
 class InboundTopic:
@@ -38,13 +57,19 @@ class InboundTopic:
         token: TopicToken,
         spawn: Callable[[Coroutine[object, object, None]], object],
         strips_frames: bool,
+        *,
+        headers: Mapping[str, str] | None = None,
+        on_change: Callable[[], object] | None = None,
     ) -> None:
+        """``headers``: fields for the connection header; ``on_change``: of :meth:`Node.advertise`."""
         self.token = token
         self.passed = 0
         self._node = node
         self._definitions = definitions
         self._spawn = spawn
         self._strips_frames = strips_frames
+        self._headers = headers
+        self._on_change = on_change
         self._change = stripped(token.robot)
         self._offers: set[Offer] = set()
         self._last = time.monotonic()
@@ -59,6 +84,12 @@ class InboundTopic:
     def is_idle(self) -> bool:
         """Return whether no writer offers the topic, nor has sent anything for a while."""
         return not self._offers and time.monotonic() - self._last > _IDLE_SECONDS
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Return whether nodes other than this one are connected to the topic."""
+        own = self._node.name
+        return self._publisher is not None and any(peer != own for peer in self._publisher.subscribers)
 
     def offer_changed(self, offer: Offer, is_there: bool) -> None:
         """Publish the topic while a writer offers it."""
@@ -93,6 +124,8 @@ class InboundTopic:
         self._is_ready = False
         self._is_closed = True
         if publisher:
+            if self._on_change is not None and self._on_change in publisher.on_change:
+                publisher.on_change.remove(self._on_change)
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
@@ -112,7 +145,12 @@ class InboundTopic:
 
         try:
             publisher = self._node.advertise(
-                self.token.topic, raw_class(interface), queue_size=_QUEUE, latch=is_latched
+                self.token.topic,
+                raw_class(interface),
+                queue_size=_QUEUE,
+                latch=is_latched,
+                headers=self._headers,
+                on_change=self._on_change,
             )
         except ValueError as error:
             _log.warning("%s", error)

@@ -41,6 +41,7 @@ __all__ = [
     "claim_key",
     "definition_key",
     "in_key",
+    "is_global_name",
     "is_md5",
     "is_robot_name",
     "mangled",
@@ -159,9 +160,18 @@ def mangled(name: str) -> str:
 def unmangled(chunk: str) -> str | None:
     """Return the global graph resource name of a chunk; None where it is not a legal one."""
     name = chunk.replace("%", "/")
-    if len(name) > _MOST_NAME or not name.startswith("/") or name.endswith("/") or not is_legal_name(name):
-        return None
-    return name
+    return name if is_global_name(name) else None
+
+
+def is_global_name(name: str) -> bool:
+    """Return whether a text is a global graph resource name, not too long."""
+    return (
+        len(name) <= _MOST_NAME
+        and name.startswith("/")
+        and not name.endswith("/")
+        and "//" not in name
+        and is_legal_name(name)
+    )
 
 
 # --- tokens

@@ -40,6 +40,7 @@ from minirospy.escape import escaped
 __all__ = [
     "DEFAULT_ENDPOINT",
     "DEFAULT_PORT",
+    "Beacon",
     "Declared",
     "FleetNetwork",
     "NetworkOptions",
@@ -129,6 +130,13 @@ class FleetNetwork:
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
 
+    def require_localities(self) -> None:
+        """Raise BridgeError where this version of Zenoh's library cannot leave out what the session itself sends."""
+        if not hasattr(self._zenoh, "Locality"):
+            raise BridgeError(
+                "--ros1-keys needs a newer eclipse-zenoh: python -m pip install --upgrade 'minirospy[fleet]'"
+            )
+
     # --- tokens
 
     def declare_token(self, key: str) -> Later:
@@ -163,8 +171,14 @@ class FleetNetwork:
 
     # --- messages
 
-    def subscribe(self, key: str, deliver: Callable[[str, bytes, bytes], object]) -> Later:
-        """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block."""
+    def subscribe(
+        self, key: str, deliver: Callable[[str, bytes, bytes], object], *, from_others: bool = False
+    ) -> Later:
+        """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block.
+
+        ``from_others``: not with those of this session.
+        """
+        options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
 
         def arrived(sample: Sample) -> None:
             attachment = sample.attachment
@@ -177,10 +191,47 @@ class FleetNetwork:
             except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
                 _log.exception("a message of the fleet could not be taken")
 
-        return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived)))
+        return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
-    def outlet(self, key: str, lane: Lane) -> Outlet:
-        """Return a publisher; may block, as its ``put``: for a lane's thread."""
+    def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Later:
+        """Call ``changed(is_there)`` when another session subscribes to a key, and when none does any more."""
+
+        def declare() -> Declared:
+            publisher = self._session.declare_publisher(key, **self._to_others)
+            listener = publisher.declare_matching_listener(
+                self._direct(lambda status: self._soon(changed, status.matching))
+            )
+            if publisher.matching_status.matching:
+                self._soon(changed, True)
+            return _Together(listener, publisher)
+
+        return self._declare(declare)
+
+    def beacon(self, key: str) -> Beacon:
+        """Return what puts an empty message under a key to other sessions, that gives way to everything else."""
+        zenoh = self._zenoh
+        return Beacon(
+            self._caller,
+            lambda: self._session.declare_publisher(
+                key,
+                priority=zenoh.Priority.BACKGROUND,
+                congestion_control=zenoh.CongestionControl.DROP,
+                reliability=zenoh.Reliability.BEST_EFFORT,
+                **self._to_others,
+            ),
+            zenoh.ZError,
+        )
+
+    @property
+    def _to_others(self) -> dict[str, object]:
+        return {"allowed_destination": self._zenoh.Locality.REMOTE}
+
+    def outlet_to_others(self, key: str, lane: Lane) -> Outlet:
+        """Return the same that does not send to this session itself."""
+        return self.outlet(key, lane, **self._to_others)
+
+    def outlet(self, key: str, lane: Lane, **options: object) -> Outlet:
+        """Return a publisher, with more ``options`` of Zenoh's; may block, as its ``put``: for a lane's thread."""
         zenoh = self._zenoh
         priorities = {
             Lane.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
@@ -192,29 +243,42 @@ class FleetNetwork:
             priority=priorities[lane],
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=lane is Lane.TELEOP,
+            **options,
         )
 
     # --- queries
 
     def answer(
-        self, pattern: str, handler: Callable[[str, bytes], Awaitable[bytes]], *, is_control: bool = False
+        self,
+        pattern: str,
+        handler: Callable[[str, bytes], Awaitable[bytes]],
+        *,
+        is_control: bool = False,
+        from_others: bool = False,
     ) -> Later:
         """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
 
-        ``is_control``: of the fleet itself: its handler waits for no node of a user.
+        ``is_control``: of the fleet itself: its handler waits for no node of a user. ``from_others``: not those of this session.
         """
+        options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
 
         def arrived(query: Query) -> None:
             self._soon(self._start_answer, query, handler, share)
 
         return self._declare(
-            lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True)
+            lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True, **options)
         )
 
-    async def query(self, key: str, request: bytes = b"", *, seconds: float) -> bytes:
-        """Return the first answer. Raise QueryFailed without any, or where it says why there is none."""
-        found = await self.queries(key, request, seconds=seconds)
+    async def query(
+        self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
+    ) -> bytes:
+        """Return the first answer. Raise QueryFailed without any, or where it says why there is none.
+
+        ``of_others``: of one that another session has, where several could answer.
+        """
+        options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
+        found = await self.queries(key, request, seconds=seconds, **options)
         if not found:
             raise QueryFailed(f"no answer within {seconds:g} s")
         answer = next(iter(found.values()))
@@ -223,19 +287,20 @@ class FleetNetwork:
         return answer
 
     async def queries(
-        self, pattern: str, request: bytes = b"", *, seconds: float
+        self, pattern: str, request: bytes = b"", *, seconds: float, **options: object
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return all answers by their keys."""
+        """Return all answers by their keys; ``options`` of Zenoh's go before ours."""
         found: dict[str, bytes | QueryFailed] = {}
 
         def arrived(reply: Reply) -> None:
             if reply.ok is not None:
                 is_short = len(reply.ok.payload) <= MOST_TEXT
-                found[str(reply.ok.key_expr)] = (
+                answer = (
                     reply.ok.payload.to_bytes()
                     if is_short
                     else QueryFailed(f"the answer has more than {MOST_TEXT} bytes")
                 )
+                found.setdefault(str(reply.ok.key_expr), answer)
             elif reply.err is not None:
                 text = reply.err.payload.to_bytes()[:2000].decode(errors="replace")
                 found.setdefault("", QueryFailed(escaped(text)))
@@ -247,9 +312,12 @@ class FleetNetwork:
                 handler,
                 payload=request,
                 timeout=seconds,
-                target=zenoh.QueryTarget.ALL,
-                priority=zenoh.Priority.DATA_HIGH,
-                congestion_control=zenoh.CongestionControl.BLOCK,
+                **{
+                    "target": zenoh.QueryTarget.ALL,
+                    "priority": zenoh.Priority.DATA_HIGH,
+                    "congestion_control": zenoh.CongestionControl.BLOCK,
+                    **options,
+                },
             ),
             arrived,
         )
@@ -353,3 +421,50 @@ class Later:
         if declared is not None:
             with contextlib.suppress(self._fault):
                 declared.undeclare()
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Two things that are undeclared together."""
+
+    first: Declared
+    second: Declared
+
+    def undeclare(self) -> None:
+        self.first.undeclare()
+        self.second.undeclare()
+
+
+class Beacon:
+    """A publisher of empty messages; made by :meth:`FleetNetwork.beacon`."""
+
+    def __init__(
+        self, caller: concurrent.futures.Executor, declare: Callable[[], Outlet], fault: type[Exception]
+    ) -> None:
+        self._outlet: Outlet | None = None
+        self._caller = caller
+        self._fault = fault
+        self._is_waiting = False
+
+        def opened() -> Declared:
+            self._outlet = declare()
+            return self._outlet
+
+        self._declared = Later(caller, opened, fault)
+
+    def put(self) -> None:
+        """Put one, in the background; none while the one before waits."""
+        if not self._is_waiting:
+            self._is_waiting = True
+            with contextlib.suppress(RuntimeError):
+                self._caller.submit(self._put)
+
+    def undeclare(self) -> None:
+        """Undeclare it, in the background. Idempotent."""
+        self._declared.undeclare()
+
+    def _put(self) -> None:
+        self._is_waiting = False
+        if self._outlet:
+            with contextlib.suppress(self._fault):
+                self._outlet.put(b"")

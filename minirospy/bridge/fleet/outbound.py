@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawSubscription
 from minirospy.bridge.fleet.frames import FrameRewriter, prefixed
-from minirospy.bridge.fleet.keys import TopicToken, out_key, replay_key
+from minirospy.bridge.fleet.keys import TopicToken, out_key
 from minirospy.bridge.fleet.sender import Outflow
 from minirospy.errors import DeserializationError
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -27,21 +29,35 @@ class OutboundTopic:
     """Sends a topic's messages, and its latched ones again to each reader that comes later."""
 
     def __init__(
-        self, node: Node, token: TopicToken, outflow: Outflow, rewriter: FrameRewriter | None
+        self,
+        node: Node,
+        token: TopicToken,
+        outflow: Outflow,
+        rewriter: FrameRewriter | None = None,
+        *,
+        key: str = "",
+        is_left_out: Callable[[Header], bool] = lambda _: False,
     ) -> None:
+        """``key``: that of its messages, "" for the fleet's own; with one the topic may have no publisher yet.
+
+        ``is_left_out(header)``: the publishers whose messages are not sent.
+        """
         self.token = token
         self.outflow = outflow
         self._node = node
         self._rewriter = rewriter
         self._change = prefixed(token.robot)
         self._latched: dict[int, bytes] = {}
-        self._key = out_key(token.robot, token.gateway, token.md5sum, token.topic)
+        self._key = key or out_key(token.robot, token.gateway, token.md5sum, token.topic)
+        self._is_typed = bool(key)
+        self._is_left_out = is_left_out
         self._misfits = RateLimitedLogger(_log)
         self._subscription: RawSubscription | None = None
 
     def open(self) -> None:
         """Subscribe to the topic."""
-        self._subscription = self._node.subscribe_raw(self.token.topic, self._deliver)
+        type_ = InterfaceType(self.token.type, self.token.md5sum) if self._is_typed else None
+        self._subscription = self._node.subscribe_raw(self.token.topic, self._deliver, type_=type_)
 
     async def close(self) -> None:
         """Unsubscribe. Idempotent."""
@@ -50,16 +66,16 @@ class OutboundTopic:
             await subscription.close()
         self.outflow.close()
 
-    def replay(self, reader: str) -> None:
-        """Send the latched messages to a reader that has come later."""
+    def replay(self, key: str) -> None:
+        """Send the latched messages again, under the key of a reader that has come later."""
         self._forget_disconnected()
-        token = self.token
-        key = replay_key(token.robot, token.gateway, token.md5sum, token.topic, reader)
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
         if header.get("callerid") == self._node.name or header.get("md5sum") != self.token.md5sum:
+            return
+        if self._is_left_out(header):
             return
         body = bytes(frame)
         if self._rewriter:

@@ -8,10 +8,9 @@ from enum import IntEnum
 from fnmatch import fnmatchcase
 
 from minirospy.bridge.access import NameFilter
-from minirospy.bridge.fleet.keys import Claim
+from minirospy.bridge.fleet.keys import Claim, is_global_name
 from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import Snapshot
-from minirospy.names import is_legal_name
 
 __all__ = [
     "Export",
@@ -21,6 +20,7 @@ __all__ = [
     "exported_services",
     "exported_topics",
     "holder",
+    "is_logger_service",
     "lane_of_type",
     "parse_lanes",
     "parse_rates",
@@ -176,9 +176,14 @@ def exported_services(
         others = _others(nodes, own)
         if not others or not _is_shown(service, starts) or not allows(service):
             continue
-        if not (every and service.endswith(_LOGGER_SERVICES)):
+        if not (every and is_logger_service(service)):
             found[service] = others
     return found
+
+
+def is_logger_service(service: str) -> bool:
+    """Return whether a service is one of the two that each node has for its loggers."""
+    return service.endswith(_LOGGER_SERVICES)
 
 
 def holder(claims: Iterable[Claim]) -> Claim | None:
@@ -205,13 +210,7 @@ def _halves(word: str, option: str, example: str) -> tuple[str, str]:
 
 
 def _is_shown(name: str, hidden: tuple[str, ...]) -> bool:
-    return (
-        name.startswith("/")
-        and len(name) <= 256
-        and not name.endswith("/")
-        and is_legal_name(name)
-        and not name.startswith(hidden)
-    )
+    return is_global_name(name) and not name.startswith(hidden)
 
 
 def _others(nodes: Sequence[str], own: Collection[str]) -> tuple[str, ...]:

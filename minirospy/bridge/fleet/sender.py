@@ -55,8 +55,9 @@ class _Worker:
 class Outflow:
     """A topic's messages to the fleet; made by :meth:`Sender.flow`. ``send`` may be called from any thread."""
 
-    def __init__(self, worker: _LaneWorker, lane: Lane, hertz: float) -> None:
+    def __init__(self, worker: _LaneWorker, lane: Lane, hertz: float, is_bare: bool) -> None:
         self.lane = lane
+        self.is_bare = is_bare
         self.throttled = 0
         self._worker = worker
         self._throttle = Throttle(hertz)
@@ -141,8 +142,12 @@ class _LaneWorker(_Worker):
                 oldest = next(iter(outflow._outlets))
                 outflow._numbers.pop(oldest, None)
                 outflow._outlets.pop(oldest).undeclare()
-            outlet = self._network.outlet(key, self._lane)
+            make = self._network.outlet_to_others if outflow.is_bare else self._network.outlet
+            outlet = make(key, self._lane)
         outflow._outlets[key] = outlet
+        if outflow.is_bare:
+            outlet.put(message)
+            return
         number = outflow._numbers[key] = outflow._numbers.get(key, 0) + 1
         outlet.put(message, attachment=serialize_stamp(Stamp(number, self._clock())))
 
@@ -154,9 +159,9 @@ class Sender:
         """``clock``: returns the time in ns that goes with each message."""
         self._lanes = {lane: _LaneWorker(lane, network, clock) for lane in Lane}
 
-    def flow(self, lane: Lane, hertz: float = 0.0) -> Outflow:
-        """Return a topic's flow, of at most so many messages a second (0: all)."""
-        return Outflow(self._lanes[lane], lane, hertz)
+    def flow(self, lane: Lane, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
+        """Return a topic's flow, of at most so many messages a second (0: all). ``is_bare``: for others, without stamps."""
+        return Outflow(self._lanes[lane], lane, hertz, is_bare)
 
     def close(self) -> None:
         """End the threads. Idempotent."""

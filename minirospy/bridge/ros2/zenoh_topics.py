@@ -6,7 +6,7 @@ import contextlib
 import importlib
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING
 
 from minirospy.bridge.ros2.zenoh_keys import Entity, Kind
 from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
@@ -18,14 +18,6 @@ if TYPE_CHECKING:
 __all__ = ["ZenohPublisher", "subscribe"]
 
 _log = logging.getLogger(__name__)
-
-
-class _Matching(Protocol):
-    matching: bool
-
-
-class _Outlet(Outlet, Protocol):
-    matching_status: _Matching
 
 
 class ZenohPublisher(Handle):
@@ -54,12 +46,12 @@ class ZenohPublisher(Handle):
             self._outlet.put(data, attachment=self.attachment())
 
 
-def _outlet(node: ZenohNode, end: Entity) -> _Outlet:
+def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
     if not end.qos.is_transient_local:
-        return cast("_Outlet", node.session.declare_publisher(end.key, congestion_control=drop))
+        return node.session.declare_publisher(end.key, congestion_control=drop)
     extension = importlib.import_module("zenoh.ext")
-    outlet: _Outlet = extension.declare_advanced_publisher(
+    outlet: Outlet = extension.declare_advanced_publisher(
         node.session,
         end.key,
         congestion_control=drop,
