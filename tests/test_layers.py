@@ -91,7 +91,16 @@ PURE_FILES = (
     }
     | {
         PACKAGE / "bridge" / "fleet" / name
-        for name in ("clocks.py", "contents.py", "frames.py", "keys.py", "lanes.py", "report.py", "rules.py")
+        for name in (
+            "clocks.py",
+            "contents.py",
+            "frames.py",
+            "keys.py",
+            "lanes.py",
+            "report.py",
+            "ros1_keys.py",
+            "rules.py",
+        )
     }
     | {PACKAGE / "dashboard" / "views.py"}
     | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}

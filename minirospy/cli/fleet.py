@@ -84,6 +84,14 @@ def _pass_options(parser: Parser) -> None:
         help="teleop, data or bulk, as '/arm/*=teleop' (by type)",
         completer="nothing",
     )
+    parser.add_argument(
+        "--ros1-keys",
+        nargs="?",
+        const="*",
+        metavar="NAMESPACE",
+        help="pass topics and services to and from robots that run zenoh-bridge-ros1, names as they are (namespace *)",
+        completer="nothing",
+    )
 
 
 def _gateway_parser() -> Parser:
@@ -162,6 +170,7 @@ def _gateway(
     robots: Sequence[str],
     rate: Sequence[str],
     priority: Sequence[str],
+    ros1_keys: str | None,
     params: Sequence[str] = (),
     frames: bool = False,
 ) -> int:
@@ -169,6 +178,7 @@ def _gateway(
 
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
+    from minirospy.bridge.fleet.ros1_keys import parse_namespace
     from minirospy.bridge.fleet.rules import GatewayRules, parse_lanes, parse_rates
     from minirospy.bridge.serve import run
 
@@ -181,7 +191,8 @@ def _gateway(
         lanes=parse_lanes(priority),
         has_frames=frames,
     )
-    options = GatewayOptions(name, imports or not name, network, rules)
+    namespace = "" if ros1_keys is None else parse_namespace(ros1_keys)
+    options = GatewayOptions(name, imports or not name, namespace, network, rules)
 
     async def start(node: Node) -> Gateway:
         # What the gateway logs goes where the node's lines go.
@@ -205,8 +216,11 @@ def _control(
     robots: Sequence[str],
     rate: Sequence[str],
     priority: Sequence[str],
+    ros1_keys: str | None,
 ) -> int:
-    return _gateway("", True, connect, listen, config, scout, topics, services, robots, rate, priority)
+    return _gateway(
+        "", True, connect, listen, config, scout, topics, services, robots, rate, priority, ros1_keys
+    )
 
 
 def _router(connect: Sequence[str], listen: Sequence[str], config: str, scout: bool) -> int:

@@ -19,6 +19,7 @@ from minirospy.bridge.fleet.exporter import Exporter
 from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, is_robot_name, parse_definition
 from minirospy.bridge.fleet.network import FleetNetwork, Later, NetworkOptions, QueryFailed
+from minirospy.bridge.fleet.ros1_side import Ros1Side
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.tasks import Faults
@@ -36,11 +37,13 @@ _log = logging.getLogger(__name__)
 class GatewayOptions:
     """``name``: of the robot, "" for a control room alone. ``imports``: whether the robots of the fleet are shown here.
 
+    ``ros1_namespace``: of the keys of zenoh-bridge-ros1 that are passed, too, "" for none.
     ``clock`` returns the time in ns, ``host`` tells machines apart ("" for this one's own): tests have others.
     """
 
     name: str = ""
     imports: bool = False
+    ros1_namespace: str = ""
     network: NetworkOptions = field(default_factory=NetworkOptions)
     rules: GatewayRules = field(default_factory=GatewayRules)
     clock: Callable[[], int] = time.time_ns
@@ -61,6 +64,7 @@ class Gateway:
         self.id = secrets.token_hex(8)
         self.exporter: Exporter | None = None
         self.importer: Importer | None = None
+        self.ros1: Ros1Side | None = None
         self.network: FleetNetwork | None = None
         host = options.host or hashlib.sha256(f"{uuid.getnode()}".encode()).hexdigest()[:16]
         self.claim = Claim(options.name or "-", self.id, options.clock(), host)
@@ -113,10 +117,24 @@ class Gateway:
                 intake,
                 self.claim,
                 options.rules,
-                lambda: self.importer.names if self.importer else [],
+                self._hidden,
                 self._spawn,
             )
             await self.exporter.start()
+        if options.ros1_namespace:
+            self.ros1 = Ros1Side(
+                self.node,
+                network,
+                definitions,
+                sender,
+                intake,
+                self.claim,
+                options.rules,
+                options.ros1_namespace,
+                self._hidden,
+                self._spawn,
+            )
+            await self.ros1.start()
 
     async def close(self) -> None:
         """Leave the fleet. Idempotent."""
@@ -127,6 +145,8 @@ class Gateway:
             await self.exporter.close()
         if self.importer:
             await self.importer.close()
+        if self.ros1:
+            await self.ros1.close()
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -162,6 +182,8 @@ class Gateway:
                 {"topic": topic, "messages": each.passed} for topic, each in exporter.inbound.items()
             ]
 
+        if self.ros1:
+            found["ros1_keys"] = self.ros1.status()
         if self.importer:
             found["refused"] = self.importer.contents.refused
             found["robots"] = [
@@ -208,6 +230,10 @@ class Gateway:
             for task in (opening, ending):
                 task.cancel()
             await asyncio.gather(opening, ending, return_exceptions=True)
+
+    def _hidden(self) -> list[str]:
+        """Return the names of the robots whose topics are here as their copies."""
+        return self.importer.names if self.importer else []
 
     async def _pong(self, _: str, __: bytes) -> bytes:
         return self.options.clock().to_bytes(8, "little", signed=True)

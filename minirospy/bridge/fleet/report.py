@@ -105,10 +105,14 @@ def _robot_lines(answer: Answer, is_shown: bool) -> list[str]:
         f"{_number(link, 'throttled')} over its rate"
         for link in _tables(status, "sent")
     ]
-    return found + [
-        f"  receives {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}"
-        for link in _tables(status, "passed_in")
-    ]
+    return (
+        found
+        + [
+            f"  receives {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}"
+            for link in _tables(status, "passed_in")
+        ]
+        + _ros1_lines(status)
+    )
 
 
 def _control_lines(answer: Answer) -> list[str]:
@@ -132,7 +136,26 @@ def _control_lines(answer: Answer) -> list[str]:
             f"{_number(link, 'dropped')} dropped"
             for link in _tables(robot, "to_robot")
         ]
-    return found
+    return found + _ros1_lines(status)
+
+
+def _ros1_lines(status: Json) -> list[str]:
+    ros1 = status.get("ros1_keys")
+    if not isinstance(ros1, dict):
+        return []
+    found = [
+        f"  keys of zenoh-bridge-ros1 ({_text(ros1, 'namespace')}): {_number(ros1, 'announced')} announced, "
+        f"{_number(ros1, 'seen')} of others, {_number(ros1, 'refused')} left out"
+    ]
+    found += [
+        f"    sends {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}, "
+        f"{_number(link, 'dropped')} dropped"
+        for link in _tables(ros1, "sent")
+    ]
+    return found + [
+        f"    receives {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}"
+        for link in _tables(ros1, "passed_in")
+    ]
 
 
 def _clock(clock: ClockOffset | None) -> str:

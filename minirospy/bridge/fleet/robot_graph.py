@@ -45,6 +45,8 @@ class RobotGraph:
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}
         self.services: dict[str, ServiceToken] = {}
+        self.service_names: set[str] = set()
+        """All services of others, those that are not announced, too."""
         self._node = node
         self._definitions = definitions
         self._claim = claim
@@ -62,6 +64,7 @@ class RobotGraph:
         hidden, own = self._hidden(), {self._node.name}
         if self._gateways:
             own.update(self._gateways(snapshot))
+        self.service_names = {name for name, nodes in snapshot.services.items() if set(nodes) - own}
         exports = exported_topics(snapshot, own, self._rules.topics, hidden)
         services = exported_services(snapshot, own, self._rules.services, hidden)
         await self._look_at_publishers(exports)
