@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TypeVar
 from xml.parsers import expat
 
 from minirospy.errors import LaunchError, NotFoundError, nearest
@@ -14,6 +15,7 @@ from minirospy.launch.substitution import Substitution, SubstitutionError
 
 __all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
 
+_N = TypeVar("_N", int, float)
 _NODE = [
     "pkg", "type", "name", "args", "machine", "respawn", "respawn_delay", "required", "ns", "clear_params", "output",
     "cwd", "launch-prefix",
@@ -151,19 +153,19 @@ class Tag:
             raise self.error(f"invalid bool value for {key}: {text} (it is 'true' or 'false')")
         return value
 
-    def number(self, key: str, default: float, *, may_be_empty: bool = False) -> float:
+    def number(self, key: str, default: float) -> float:
         """Return an attribute that is a number. Raises LaunchError."""
         text = self.optional(key)
         try:
-            return default if text is None or (may_be_empty and not text) else float(text)
+            return default if text is None else float(text)
         except ValueError:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
-    def integer(self, key: str, default: int) -> int:
-        """Return an attribute that is a whole number; the default where it is empty. Raises LaunchError."""
+    def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
+        """Return an attribute that is a number of a kind; the default where it is empty. Raises LaunchError."""
         text = self.optional(key)
         try:
-            return int(text) if text else default
+            return kind(text) if text else default
         except ValueError:
             raise self.error(f"'{key}' must be a number: [{text}]") from None
 

@@ -441,7 +441,7 @@ class _File:
             env_loader=tag.optional("env-loader") or "",
             user=tag.optional("user") or "",
             password=tag.optional("password") or "",
-            ssh_port=tag.integer("ssh-port", 22),
+            ssh_port=tag.number_or_empty("ssh-port", 22, int),
             timeout=timeout,
             file=self._file,
             line=tag.line,
@@ -531,10 +531,10 @@ class _File:
         if "/" in name:
             raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
         node = self._process(tag, scope, name)
-        seconds = tag.number("time-limit", 60, may_be_empty=True)
+        seconds = tag.number_or_empty("time-limit", 60.0, float)
         if seconds <= 0:
             raise tag.error("'time-limit' must be a positive number of seconds")
-        self._spec.tests.append(TestSpec(test_name, node, seconds, tag.integer("retry", 0)))
+        self._spec.tests.append(TestSpec(test_name, node, seconds, tag.number_or_empty("retry", 0, int)))
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:

@@ -46,8 +46,8 @@ def test_attributes_of_a_test() -> None:
 @pytest.mark.parametrize(
     ("attributes", "text"),
     [
-        ('retry="x"', "invalid float value for retry: x"),
-        ('time-limit="x"', "invalid float value for time-limit: x"),
+        ('retry="x"', "'retry' must be a number: [x]"),
+        ('time-limit="x"', "'time-limit' must be a number: [x]"),
         ('time-limit="-1"', "'time-limit' must be a positive number"),
         ('output="screen"', "<test> tags cannot have 'output' attribute"),
         ('respawn="false"', "<test> tags cannot have 'respawn' attribute"),
