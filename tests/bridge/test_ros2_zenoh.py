@@ -180,6 +180,17 @@ def test_messages_of_ros2_come_but_not_those_of_the_bridge(node: RmwNode, side: 
     wait_until(lambda: not publisher.matching_status.matching)
 
 
+def test_own_subscription_is_not_the_subscriber_that_is_waited_for(node: RmwNode, side: ZenohSide) -> None:
+    side.subscribe("/chatter", "std_msgs/String", bytes, depth=7, is_reliable=True, is_latched=False)
+    publisher = side.publisher("/chatter", "std_msgs/String", depth=7, is_latched=False)
+    # Its token is there before messages reach it.
+    node.end(1, "MS", CHATTER)
+    wait_until(lambda: side.ends("/chatter").subscribers)
+    assert publisher.subscribers == 0
+    node.subscribe(CHATTER)
+    wait_until(lambda: publisher.subscribers == 1)
+
+
 def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: ZenohSide) -> None:
     publisher = side.publisher("/chatter", "std_msgs/String", depth=1, is_latched=True)
     publisher.publish(b"old")

@@ -13,8 +13,8 @@ from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
 from minirospy.aio.raw import raw_class
-from minirospy.bridge.ros2.bridge import Ros2Bridge
-from minirospy.bridge.ros2.links import BRIDGE_PREFIX
+from minirospy.bridge.ros2.bridge import Ros2Bridge, _ToRos2
+from minirospy.bridge.ros2.links import Direction
 from minirospy.idl.load import message_class
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import typestore
@@ -84,8 +84,9 @@ def to_ros1(data: bytes) -> bytes:
 class Ros1:
     """The ends in ROS 1: a subscription that nothing refers to ends."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, bridge: Ros2Bridge) -> None:
         self.node = node
+        self.bridge = bridge
         self.kept: list[Any] = []
 
     async def publish(self, topic: str, data: bytes, *, latch: bool = False) -> Any:
@@ -93,9 +94,18 @@ class Ros1:
         publisher = await self.node.advertise(topic, class_, latch=latch)
         self.kept.append(publisher)
         if not latch:
-            await until(lambda: f"/{BRIDGE_PREFIX}" in publisher.subscribers)
+            # A subscriber of the bridge's name may be the short connection that reads the header.
+            await until(lambda: self._is_bridged(topic))
         publisher.publish_raw(data)
         return publisher
+
+    def _is_bridged(self, topic: str) -> bool:
+        """Return whether the bridge's subscription is connected."""
+        for link, passing in self.bridge.topics.links.items():
+            if link.topic == topic and link.direction is Direction.TO_ROS2:
+                assert isinstance(passing, _ToRos2)
+                return bool(passing._subscription and passing._subscription.headers)
+        return False
 
     async def subscribe(self, topic: str) -> queue.Queue[bytes]:
         came: queue.Queue[bytes] = queue.Queue()
@@ -152,7 +162,7 @@ async def next_of(came: queue.Queue[bytes]) -> bytes:
 @pytest.mark.usefixtures("master")
 def test_transforms_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> None:
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
-        ros1 = Ros1(other)
+        ros1 = Ros1(other, bridge)
         came = await ros1.subscribe("/tf")
         await in_thread(publish, peer, "/tf", to_ros2(transforms("a", "b")))
         # Messages of ROS 2 have no number, which is zero.
@@ -169,7 +179,7 @@ def test_transforms_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> N
 def test_static_transforms_of_all_publishers_reach_who_joins_later(node: RmwNode, endpoint: str) -> None:
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
         async with Node("second", rosout=False) as second:
-            ros1 = [Ros1(each) for each in (other, second)]
+            ros1 = [Ros1(each, bridge) for each in (other, second)]
             for each, child in zip(ros1, "ab", strict=True):
                 await each.publish("/tf_static", transforms(child), latch=True)
             there = await in_thread(lambda: subscribe(peer, "/tf_static", static=True))
@@ -193,12 +203,12 @@ def test_static_transforms_of_ros2_reach_who_joins_later_in_ros1(node: RmwNode, 
                     each, "/tf_static", to_ros2(transforms(child)), static=True
                 )
             )
-        ros1 = Ros1(other)
+        ros1 = Ros1(other, bridge)
         came = await ros1.subscribe("/tf_static")
         while children(await next_of(came)) != {"a", "b"}:
             pass
         async with Node("late", rosout=False) as late:
-            later = Ros1(late)
+            later = Ros1(late, bridge)
             came = await later.subscribe("/tf_static")
             assert children(await next_of(came)) == {"a", "b"}
         second.session.close()
@@ -209,7 +219,7 @@ def test_static_transforms_of_ros2_reach_who_joins_later_in_ros1(node: RmwNode, 
 @pytest.mark.usefixtures("master")
 def test_time_passes_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> None:
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
-        ros1 = Ros1(other)
+        ros1 = Ros1(other, bridge)
         clock = Clock()
         clock.clock.secs, clock.clock.nsecs = 12, 34
         cdr = b"\0\1\0\0" + data_of(clock)
@@ -234,7 +244,7 @@ def test_log_lines_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> No
         return store.types["rcl_interfaces/msg/Log"](stamp, level, "motor", "it is hot", "m.cpp", "run", 7)
 
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
-        ros1 = Ros1(other)
+        ros1 = Ros1(other, bridge)
         came = await ros1.subscribe("/rosout")
         cdr = bytes(typestore().serialize_cdr(log(40), "rcl_interfaces/msg/Log"))
         await in_thread(lambda: publish(peer, "/rosout", cdr, static=True))

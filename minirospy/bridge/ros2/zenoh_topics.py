@@ -48,13 +48,16 @@ class ZenohPublisher(Handle):
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
+    # The bridge's own subscription to the topic, which takes nothing of this session, does not count as a match.
+    remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
-        return node.session.declare_publisher(end.key, congestion_control=drop)
+        return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
     extension = importlib.import_module("zenoh.ext")
     outlet: Outlet = extension.declare_advanced_publisher(
         node.session,
         end.key,
         congestion_control=drop,
+        allowed_destination=remote,
         cache=extension.CacheConfig(max_samples=end.qos.depth),
         sample_miss_detection=extension.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=1.0),
         publisher_detection=True,
