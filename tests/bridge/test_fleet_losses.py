@@ -110,7 +110,11 @@ def test_a_gateway_that_ends_takes_its_robot_away_until_it_is_back(fleet: Fleet)
     fleet.run(strings.wait_for_subscribers(1, SECONDS))
     fleet.stop(gateway)
     fleet.until(lambda: fleet.gateways[0].importer.robots == {})  # type: ignore[union-attr]
-    assert "/robot1/chat" not in {topic for topic, _ in fleet.run(control._state())[0]}
+
+    async def is_gone() -> bool:
+        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+
+    fleet.until(is_gone)
 
     fleet.until(lambda: not strings.num_connections)
     robot.gateway("robot1")
@@ -428,7 +432,11 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     assert (code, text) == (1, "minirospy fleet: ERROR: robot [robot1]: Parameter [/nothing] is not set\n")
 
     gateway.kill()
-    fleet.until_gone(control, "/robot1/chat")
+
+    async def is_gone() -> bool:
+        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+
+    fleet.until(is_gone)
     for process in (room, router):
         process.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
     if sys.platform != "win32":
