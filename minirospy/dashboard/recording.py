@@ -23,6 +23,9 @@ __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
 """After SIGINT the file is completed: what waits for a slow disk takes its time."""
 
+_TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
+"""No file is open yet: an interpreter that starts may lose a SIGINT, where it comes while a callback of importlib runs."""
+
 _MOST_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
                 ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
@@ -57,6 +60,7 @@ class Recording:
                 raise UsageError(f"'{topic[:200]}' is not the name of a topic")
 
         self._path = path
+        self._paths = (path.with_name(f"{path.name}.active"), path)
         self._master_uri = master_uri
         self._topics = tuple(topics)
         self._lines: deque[str] = deque(maxlen=_MOST_LINES)
@@ -111,7 +115,7 @@ class Recording:
     def state(self) -> RecordingState:
         """Return the state now."""
         size = 0
-        for path in (self._path.with_name(f"{self._path.name}.active"), self._path):
+        for path in self._paths:
             try:
                 size = max(size, path.stat().st_size)
             except OSError:
@@ -133,7 +137,8 @@ class Recording:
         await asyncio.get_running_loop().run_in_executor(None, self._stop)
 
     def _stop(self) -> None:
-        end_processes([self._process], _TIMEOUTS, lambda _: None)
+        has_file = any(path.exists() for path in self._paths)
+        end_processes([self._process], _TIMEOUTS if has_file else _TIMEOUTS_BEFORE_FILE, lambda _: None)
         self._reader.join()
         self._guardian.remove(self._process)
         self._guardian.close()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
 import struct
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,12 +21,13 @@ from websockets.typing import Subprotocol
 
 from minirospy.bag.timeline import Timeline
 from minirospy.bridge.access import Access
-from minirospy.dashboard import bag_door
+from minirospy.dashboard import bag_door, recording
 from minirospy.dashboard.bag_door import SUBPROTOCOL, BagSession
 from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.bag_player import OpenBag
 from minirospy.dashboard.recording import Recording
 from minirospy.errors import BagFormatError
+from minirospy.launch.process import Process, Timeouts, start_process
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag, text_body
 from tests.dashboard.conftest import TOKEN
@@ -334,6 +337,24 @@ def test_recording_is_kept_where_its_page_closes_while_it_starts(
     wait_until(lambda: not door.sessions)
     starting.opened.set()
     wait_until(lambda: door.recording is not None)
+
+
+def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
+    tmp_path: Path, master: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = (
+        "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up'); time.sleep(600)"
+    )
+
+    def deaf(name: str, command: list[str], **options: Any) -> Process:
+        return start_process(name, [sys.executable, "-c", program], **options)
+
+    monkeypatch.setattr(recording, "start_process", deaf)
+    monkeypatch.setattr(recording, "_TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
+    started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
+    wait_until(lambda: "up" in started._lines)
+    asyncio.run(started.stop())
+    assert started.state().error == "it was stopped before it had started: nothing was recorded"
 
 
 def test_bag_is_closed_where_its_page_closes_while_it_opens(
