@@ -37,7 +37,7 @@ SEEN = {
     "board": ("svg.board text", "GPIO 11"),
     "turtlesim": (".turtle-row", "/turtle1"),
     "teleop": (".teleop", "/joy"),
-    "publish": ("select option", "/button_state"),
+    "publish": ("select option", "/odometry"),
     "services": ("select option", "/set_led_state"),
     "actions": ("select option", "/count"),
     "parameters": (".row.parameter", "/robot_description"),
@@ -131,6 +131,15 @@ def use(page: Page, view: str) -> None:
         page.wait("return document.querySelectorAll('.pane').length === 4")
         page.wait_text(".pane .line .text", "the battery is low")
         page.wait_text(".pane .series .num", "1")
+    elif view == "nodes":
+        page.click(".nodes td button", "/talker_scan")
+        page.wait_text(".side h2", "/talker_scan")
+        page.wait("return document.querySelector('.scroll').clientHeight > 120")
+    elif view == "3d":
+        page.wait_text(*SEEN[view])
+        if page.evaluate("!document.querySelector('.scene-side').checkVisibility()"):
+            page.click(".scenebar > button[aria-pressed=false]")
+        page.wait("return document.querySelector('.scene-side').clientHeight > 200")
     elif view in ("image", "publish", "services", "actions", "bag"):
         find, name = SEEN[view]
         page.wait(
@@ -139,7 +148,7 @@ def use(page: Page, view: str) -> None:
         page.choose("#view select", name)
         result = {
             "image": "canvas.image",
-            "publish": "label.field",
+            "publish": "fieldset fieldset label.field",
             "services": "label.field",
             "bag": ".bag-label",
         }
