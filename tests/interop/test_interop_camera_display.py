@@ -104,7 +104,8 @@ def scene() -> dict[str, Any]:
     blue = robot_scene.stamped(Image, "lens", width=WIDTH, height=HEIGHT, encoding="rgb8", step=3 * WIDTH)
     # The upper half is darker.
     blue.data = bytes((0, 0, 100)) * (WIDTH * HEIGHT // 2) + bytes((0, 0, 200)) * (WIDTH * HEIGHT // 2)
-    return {"/tf_static": TFMessage([lens]), "/cube": cube, "/lens/image": blue}
+    dock = robot_scene.transform("map", "dock", FAR, -0.3, 1.2)
+    return {"/tf_static": TFMessage([lens, dock]), "/cube": cube, "/lens/image": blue}
 
 
 def color(page: Page, x: float, y: float) -> list[int]:
@@ -162,6 +163,15 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     small = page.evaluate("document.querySelector('canvas.inset').width")
     page.click("canvas.inset")
     page.wait(f"return document.querySelector('canvas.inset').width > {small} * 1.5")
+    # Frames have their names in it: this one is right of the middle and above it.
+    count = (
+        "(() => { const c = document.querySelector('canvas.inset'), w = c.width, h = c.height;"
+        "const d = c.getContext('2d').getImageData(0.65 * w, 0.34 * h, 0.3 * w, 0.16 * h).data;"
+        "let n = 0; for (let i = 0; i < d.length; i += 4) n += Math.min(d[i], d[i + 1], d[i + 2]) > 200; return n; })()"
+    )
+    assert page.evaluate(count) == 0
+    page.click("[data-name='TF'] input[type=checkbox]")
+    page.wait(f"return {count} > 20")
     send("/lens/camera_info", camera_info(P=[0] * 12))
     status(page, "Camera", "the camera is not calibrated")
     page.click("[data-name='Camera'] input[type=checkbox]")

@@ -8,6 +8,15 @@ const LINE = 15; // pixels
 const MOST = 400;
 const TEXT_SIZE = 0.91; // of RViz's letters: a marker's scale.z is more than their em
 
+/** Return how far down a name is at this place, so that it covers none of those that are there already. */
+function stacked(taken, x, y, width, line) {
+  let top = y;
+  const covers = (other) => Math.abs(other.top - top) < line && x < other.x + other.width && other.x < x + width;
+  for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++) top = other.top + line;
+  taken.push({ x, top, width });
+  return top;
+}
+
 export class Labels {
   constructor() {
     this.element = h("div", { class: "labels", "aria-hidden": "true" });
@@ -35,6 +44,33 @@ export class Labels {
     if (color) label.span.style.color = color;
   }
 
+  /** Paint the labels over a picture that another camera has of the scene. */
+  paint(context, camera, width, height) {
+    const place = new Vector3();
+    const taken = [];
+    const line = LINE * devicePixelRatio;
+    Object.assign(context, { globalAlpha: 1, textBaseline: "top", strokeStyle: "#000", lineWidth: 3 * devicePixelRatio, lineJoin: "round" });
+    for (const label of this.all) {
+      place.copy(label.place).project(camera);
+      if (!label.isShown || !(Math.max(...place.toArray().map(Math.abs)) < 1)) continue;
+      const [x, y] = [((place.x + 1) / 2) * width, ((1 - place.y) / 2) * height];
+      const text = label.span.textContent;
+      context.fillStyle = label.span.style.color || "#fff";
+      if (label.metres === null) {
+        context.font = `600 ${0.8 * line}px system-ui, sans-serif`;
+        context.textAlign = "left";
+        const top = stacked(taken, x, y, context.measureText(text).width, line);
+        context.strokeText(text, x, top);
+        context.fillText(text, x, top);
+      } else {
+        const size = (TEXT_SIZE * label.metres * camera.projectionMatrix.elements[5] * height) / 2 / camera.position.distanceTo(label.place);
+        context.font = `${Math.min(300, Math.max(3, size))}px "Liberation Sans", Arial, sans-serif`;
+        context.textAlign = "center";
+        context.fillText(text, x, y - size / 2);
+      }
+    }
+  }
+
   draw(stage) {
     const place = new Vector3();
     const taken = [];
@@ -56,9 +92,7 @@ export class Labels {
         const far = stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(label.place);
         label.span.style.fontSize = `${Math.min(300, Math.max(3, (TEXT_SIZE * label.metres * stage.pixelsPerMetre) / far))}px`;
       } else {
-        const covers = (other) => Math.abs(other.top - top) < LINE && x < other.x + other.width && other.x < x + label.width;
-        for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++) top = other.top + LINE;
-        taken.push({ x, top, width: label.width });
+        top = stacked(taken, x, top, label.width, LINE);
       }
       label.span.style.transform = `translate(${x.toFixed(1)}px, ${top.toFixed(1)}px)`;
     }

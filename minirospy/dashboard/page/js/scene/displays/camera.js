@@ -90,9 +90,11 @@ export class Camera extends TopicDisplay {
     Object.assign(this.canvas, { width, height });
     const context = this.canvas.getContext("2d");
     context.drawImage(drawing, left, top, width, height, 0, 0, width, height);
-    if (this.get("Image Rendering") === "background") return;
-    context.globalAlpha = Math.min(1, Math.max(0, this.number("Overlay Alpha", 0.5)));
-    const zoom = Math.max(0.01, this.number("Zoom Factor", 1));
-    context.drawImage(this.picture, (width * (1 - zoom)) / 2, (height * (1 - zoom)) / 2, width * zoom, height * zoom);
+    if (this.get("Image Rendering") !== "background") {
+      context.globalAlpha = Math.min(1, Math.max(0, this.number("Overlay Alpha", 0.5)));
+      const zoom = Math.max(0.01, this.number("Zoom Factor", 1));
+      context.drawImage(this.picture, (width * (1 - zoom)) / 2, (height * (1 - zoom)) / 2, width * zoom, height * zoom);
+    }
+    this.context.stage.labels.paint(context, this.camera, width, height);
   }
 }
