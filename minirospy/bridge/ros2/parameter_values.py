@@ -7,12 +7,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Sequence
+from enum import Enum
 from typing import NamedTuple
 from xmlrpc.client import Binary
 
 from minirospy.errors import BridgeError
 
-__all__ = ["FIELDS", "Value", "leaves", "listed", "ros1_name", "ros1_value", "ros2_name", "ros2_value"]
+__all__ = [
+    "FIELDS",
+    "ParameterService",
+    "Value",
+    "leaves",
+    "listed",
+    "ros1_name",
+    "ros1_value",
+    "ros2_name",
+    "ros2_value",
+]
 
 FIELDS = (
     "",
@@ -32,6 +43,21 @@ _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
 _ARRAY_OF_SINGLE = 5
 _SMALLEST, _LARGEST = -(2**31), 2**31 - 1
+
+
+class ParameterService(Enum):
+    """The services that each node of ROS 2 has for its parameters, and their types in rcl_interfaces."""
+
+    LIST = "list_parameters", "ListParameters"
+    GET = "get_parameters", "GetParameters"
+    TYPES = "get_parameter_types", "GetParameterTypes"
+    DESCRIBE = "describe_parameters", "DescribeParameters"
+    SET = "set_parameters", "SetParameters"
+    SET_ATOMICALLY = "set_parameters_atomically", "SetParametersAtomically"
+
+    def __init__(self, service: str, type_: str) -> None:
+        self.service = service
+        self.type = type_
 
 
 class Value(NamedTuple):

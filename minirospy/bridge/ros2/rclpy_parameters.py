@@ -10,7 +10,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Protocol, TypeVar, cast
 
-from minirospy.bridge.ros2.parameter_values import FIELDS, Value, listed
+from minirospy.bridge.ros2.parameter_values import FIELDS, ParameterService, Value, listed
 from minirospy.bridge.ros2.rclpy_calls import Calls, Client, Message, NotAnsweredError, ServiceClass
 from minirospy.errors import BridgeError, MinirospyError
 
@@ -44,19 +44,22 @@ class ParameterServer:
         self._loop = loop
         self._messages = importlib.import_module("rcl_interfaces.msg")
         classes = importlib.import_module("rcl_interfaces.srv")
-        handlers: dict[str, tuple[str, _Handler]] = {
-            "list_parameters": ("ListParameters", self._list),
-            "get_parameters": ("GetParameters", self._get),
-            "get_parameter_types": ("GetParameterTypes", self._types),
-            "describe_parameters": ("DescribeParameters", self._describe),
-            "set_parameters": ("SetParameters", self._set),
-            "set_parameters_atomically": ("SetParametersAtomically", self._set_atomically),
+        handlers: dict[ParameterService, _Handler] = {
+            ParameterService.LIST: self._list,
+            ParameterService.GET: self._get,
+            ParameterService.TYPES: self._types,
+            ParameterService.DESCRIBE: self._describe,
+            ParameterService.SET: self._set,
+            ParameterService.SET_ATOMICALLY: self._set_atomically,
         }
         self._services = [
             calls.node.create_service(
-                getattr(classes, class_), f"/{node}/{name}", self._guarded(handler), **calls.options
+                getattr(classes, each.type),
+                f"/{node}/{each.service}",
+                self._guarded(handler),
+                **calls.options,
             )
-            for name, (class_, handler) in handlers.items()
+            for each, handler in handlers.items()
         ]
 
     def close(self) -> None:
@@ -125,12 +128,12 @@ class NodeParameters:
 
     def names(self, node: str) -> list[str]:
         """Return the names of a node's parameters."""
-        response = self._call(node, "list_parameters", "ListParameters", {})
+        response = self._call(node, ParameterService.LIST, {})
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
         """Return a parameter; of type 0 where it is not set."""
-        response = self._call(node, "get_parameters", "GetParameters", {"names": [name]})
+        response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)
 
@@ -138,16 +141,16 @@ class NodeParameters:
         """Set a parameter."""
         messages = importlib.import_module("rcl_interfaces.msg")
         parameter = messages.Parameter(name=name, value=_made(messages.ParameterValue, value))
-        response = self._call(node, "set_parameters", "SetParameters", {"parameters": [parameter]})
+        response = self._call(node, ParameterService.SET, {"parameters": [parameter]})
         for result in cast("list[object]", _field(response, "results")):
             if not _field(result, "successful"):
                 raise BridgeError(
                     f"[{node}] refuses [{name}]: {_field(result, 'reason') or 'without a reason'}"
                 )
 
-    def _call(self, node: str, service: str, class_: str, fields: dict[str, object]) -> object:
-        type_ = cast("ServiceClass", getattr(importlib.import_module("rcl_interfaces.srv"), class_))
-        client: Client = self._calls.client(f"{node}/{service}", type_)
+    def _call(self, node: str, service: ParameterService, fields: dict[str, object]) -> object:
+        type_ = cast("ServiceClass", getattr(importlib.import_module("rcl_interfaces.srv"), service.type))
+        client: Client = self._calls.client(f"{node}/{service.service}", type_)
         try:
             end = time.monotonic() + _SECONDS
             while not client.is_ready:

@@ -10,7 +10,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import TYPE_CHECKING, cast
 
 from minirospy.bridge.ros2.cdr_values import decode, encode
-from minirospy.bridge.ros2.parameter_values import FIELDS, Value, listed
+from minirospy.bridge.ros2.parameter_values import FIELDS, ParameterService, Value, listed
 from minirospy.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.idl.type_hash import Fields
 
@@ -40,17 +40,17 @@ class ZenohParameterServer:
         self._store = store
         self._loop = loop
         self._fields = fields
-        handlers: dict[str, tuple[str, Callable[[_Values], Awaitable[_Values]]]] = {
-            "list_parameters": ("ListParameters", self._list),
-            "get_parameters": ("GetParameters", self._get),
-            "get_parameter_types": ("GetParameterTypes", self._types),
-            "describe_parameters": ("DescribeParameters", self._describe),
-            "set_parameters": ("SetParameters", self._set),
-            "set_parameters_atomically": ("SetParametersAtomically", self._set_atomically),
+        handlers: dict[ParameterService, Callable[[_Values], Awaitable[_Values]]] = {
+            ParameterService.LIST: self._list,
+            ParameterService.GET: self._get,
+            ParameterService.TYPES: self._types,
+            ParameterService.DESCRIBE: self._describe,
+            ParameterService.SET: self._set,
+            ParameterService.SET_ATOMICALLY: self._set_atomically,
         }
         self._services = [
-            side.serve(f"/{node}/{name}", f"{_PACKAGE}/{type_}", self._answer(type_, handler))
-            for name, (type_, handler) in handlers.items()
+            side.serve(f"/{node}/{each.service}", f"{_PACKAGE}/{each.type}", self._answer(each.type, handler))
+            for each, handler in handlers.items()
         ]
 
     def close(self) -> None:
@@ -114,26 +114,26 @@ class ZenohNodeParameters:
 
     def names(self, node: str) -> list[str]:
         """Return the names of a node's parameters."""
-        result = self._call(node, "list_parameters", "ListParameters", {})["result"]
+        result = self._call(node, ParameterService.LIST, {})["result"]
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
         """Return a parameter; of type 0 where it is not set."""
-        found = self._call(node, "get_parameters", "GetParameters", {"names": [name]})["values"]
+        found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)
 
     def set(self, node: str, name: str, value: Value) -> None:
         """Set a parameter."""
         parameter = {"name": name, "value": _written(value)}
-        response = self._call(node, "set_parameters", "SetParameters", {"parameters": [parameter]})
+        response = self._call(node, ParameterService.SET, {"parameters": [parameter]})
         for result in cast("list[_Values]", response["results"]):
             if not result["successful"]:
                 raise BridgeError(f"[{node}] refuses [{name}]: {result['reason'] or 'without a reason'}")
 
-    def _call(self, node: str, service: str, type_: str, values: _Values) -> _Values:
-        whole = f"{_PACKAGE}/srv/{type_}"
-        client = self._side.client(f"{node}/{service}", f"{_PACKAGE}/{type_}")
+    def _call(self, node: str, service: ParameterService, values: _Values) -> _Values:
+        whole = f"{_PACKAGE}/srv/{service.type}"
+        client = self._side.client(f"{node}/{service.service}", f"{_PACKAGE}/{service.type}")
         try:
             end = time.monotonic() + _SECONDS
             while not client.is_ready:
