@@ -108,10 +108,11 @@ def _ros2_bridge(
     list: bool,
 ) -> int:
     import asyncio
+    import os
 
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
-    from minirospy.bridge.ros2.links import BRIDGE_PREFIX
+    from minirospy.bridge.ros2.links import BRIDGE_PREFIX, parse_domain
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
     from minirospy.bridge.serve import run
     from minirospy.errors import BridgeError
@@ -125,6 +126,8 @@ def _ros2_bridge(
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
     if connect and not zenoh:
         raise Misuse("--connect is for --zenoh")
+    # Here already: the sides are opened when there is a master.
+    parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
     catalogue = Catalogue(Packages().folders())
     open_side = _zenoh(known, catalogue, connect) if zenoh else _rclpy()
     options = Ros2Options(

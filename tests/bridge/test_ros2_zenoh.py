@@ -446,6 +446,18 @@ def test_a_domain_that_is_not_a_number_is_refused(domain_id: str, monkeypatch: p
     assert str(caught.value) == f"ROS_DOMAIN_ID is [{domain_id}]: it must be a number, such as 0"
 
 
+@pytest.mark.timeout(LIMIT)
+def test_a_domain_that_is_not_a_number_is_refused_without_a_master(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{free_port()}")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "one")
+    assert main(["--zenoh"]) == 1
+    text = capsys.readouterr().err
+    assert text.endswith("ROS_DOMAIN_ID is [one]: it must be a number, such as 0\n")
+    assert text.count("\n") == 1
+
+
 def test_a_domain_has_no_zeros_in_front(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "007")
     node = ZenohNode("bridge", NetworkOptions((endpoint,)))

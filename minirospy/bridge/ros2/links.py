@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from minirospy.errors import BridgeError
+from minirospy.escape import escaped
 from minirospy.introspect.snapshot import Snapshot
 
-__all__ = ["BRIDGE_PREFIX", "Direction", "Link", "Ros2End", "Ros2Topic", "is_bridge", "links", "marker"]
+__all__ = [
+    "BRIDGE_PREFIX", "Direction", "Link", "Ros2End", "Ros2Topic", "is_bridge", "links", "marker", "parse_domain",
+]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
 """How the names of all bridges start, on both sides: their ends do not count as ends."""
+
+
+def parse_domain(text: str) -> str:
+    """Return the domain of ROS 2 that ``ROS_DOMAIN_ID`` names: 0 where it is empty. Raise BridgeError."""
+    if not re.fullmatch(r"[0-9]{0,9}", text):
+        raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
+    return str(int(text or "0"))
 
 
 class Direction(Enum):

@@ -29,7 +29,7 @@ from minirospy.bridge.ros2.interface import (
     Ros2Publisher,
 )
 from minirospy.bridge.ros2.layouts import TypesDiffer
-from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic
+from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic, parse_domain
 from minirospy.bridge.ros2.rclpy_actions import Accept, ActionClass, ActionClient, ActionServer
 from minirospy.bridge.ros2.rclpy_calls import (
     Calls,
@@ -155,7 +155,7 @@ class RclpySide:
     @property
     def domain(self) -> str:
         """The domain of ROS 2."""
-        return os.environ.get("ROS_DOMAIN_ID") or "0"
+        return parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
         """Return all topics and their types."""

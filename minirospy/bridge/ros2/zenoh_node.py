@@ -6,11 +6,11 @@ import contextlib
 import importlib
 import itertools
 import os
-import re
 import threading
 import time
 from collections.abc import Callable
 
+from minirospy.bridge.ros2.links import parse_domain
 from minirospy.bridge.ros2.zenoh_keys import (
     Entity,
     Kind,
@@ -32,7 +32,6 @@ from minirospy.bridge.zenoh_library import (
     require_zenoh,
 )
 from minirospy.errors import BridgeError
-from minirospy.escape import escaped
 
 __all__ = ["Graph", "Handle", "ZenohNode"]
 
@@ -90,7 +89,7 @@ class ZenohNode:
         """Open the session; waits for the router. Raises BridgeError."""
         require_zenoh("ros2-bridge --zenoh")
         self.zenoh = importlib.import_module("zenoh")
-        self.domain = _domain()
+        self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
         self.session = self._opened(options)
         self._zid = str(self.session.info.zid())
         self._name = name
@@ -142,14 +141,6 @@ class ZenohNode:
 
     def _changed(self, sample: Sample) -> None:
         self.graph.set(str(sample.key_expr), sample.kind == self.zenoh.SampleKind.PUT)
-
-
-def _domain() -> str:
-    """Return the domain of ROS 2, which is a part of all keys. Raise BridgeError."""
-    text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if not re.fullmatch(r"[0-9]{1,9}", text):
-        raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
-    return str(int(text))
 
 
 class Handle:
