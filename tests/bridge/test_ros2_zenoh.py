@@ -192,9 +192,16 @@ def test_own_subscription_is_not_the_subscriber_that_is_waited_for(node: RmwNode
 
 
 def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: ZenohSide) -> None:
+    there = node.subscribe(CHATTER)
     publisher = side.publisher("/chatter", "std_msgs/String", depth=1, is_latched=True)
     publisher.publish(b"old")
-    publisher.publish(HELLO)
+
+    def has_passed() -> bool:
+        publisher.publish(HELLO)
+        return any(each.payload.to_bytes() == HELLO for each in there.queue)
+
+    # One that joins while the first message is on its way gets that, too.
+    wait_until(has_passed)
     came: queue.Queue[Any] = queue.Queue()
     # As rmw_zenoh declares a subscriber that is transient local.
     subscriber = zenoh.ext.declare_advanced_subscriber(
