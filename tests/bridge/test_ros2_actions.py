@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import builtins
+import queue
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -254,6 +256,33 @@ def test_goals_of_ros2_go_to_ros1_and_come_to_an_end() -> None:
 
 
 @pytest.mark.usefixtures("master")
+def test_a_result_that_has_come_when_the_link_ends_is_not_lost() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        ending = asyncio.Event()
+
+        async def execute(_: Any) -> dict[str, list[int]]:
+            await ending.wait()
+            return {}
+
+        server = await ActionServer(node, "/fly", FibonacciAction, execute)
+        await bridge.look()
+        accept = side.action_servers["/fly"].accept
+        goal = await asyncio.wrap_future(accept(cdr()[:4] + bytes(4), lambda _: None))
+        goals: Any = accept.__self__  # type: ignore[attr-defined]
+        result = FibonacciActionResult()
+        result.status.goal_id.id = goal.id.id
+        result.status.status = GoalState.SUCCEEDED
+        result.result.sequence = [1, 2]
+        goals._take_result(data_of(result))
+        await goals.close()
+        assert goal.ended.result(0) == (SUCCEEDED, cdr(1, 2))
+        ending.set()
+        await server.close()
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
 def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = {**SEND_GOAL, "/odd/_action/send_goal": "odd_msgs/Odd_SendGoal"}
@@ -334,6 +363,56 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
     server: Any = Ros2ActionServer(calls, "/fly", cast("Any", None), cast("Any", None))
     assert server
     assert lines == ["a goal"]
+
+
+def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A result takes some of the executor's rounds: a server that is destroyed before leaves its client waiting."""
+    order: list[str] = []
+    tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()
+
+    class Server:
+        def __init__(self, *_: object, **__: object) -> None:
+            pass
+
+        def destroy(self) -> None:
+            order.append("destroyed")
+
+    monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionServer=Server))
+    monkeypatch.setitem(sys.modules, "rclpy.qos", SimpleNamespace(QoSProfile=lambda **_: None))
+    node = SimpleNamespace(get_logger=lambda: None)
+    options = {"callback_group": None, "qos_profile": None}
+    closing = threading.Event()
+
+    def end(task: Callable[[], object]) -> None:
+        tasks.put(task)
+        closing.set()
+
+    calls: Any = SimpleNamespace(node=node, options=options, end=end)
+    server: Any = Ros2ActionServer(calls, "/fly", cast("Any", None), cast("Any", None))
+
+    def goal(*, is_ended: bool) -> Any:
+        ended: Future[object] = Future()
+        if is_ended:
+            ended.set_result(None)
+        return None, SimpleNamespace(ended=ended), None
+
+    def answer(rounds: int) -> None:
+        if rounds:
+            tasks.put(lambda: answer(rounds - 1))
+        else:
+            del server._goals[1]
+            order.append("sent")
+
+    server._goals = {1: goal(is_ended=True), 2: goal(is_ended=False)}
+    tasks.put(lambda: closing.wait(LIMIT))
+    answer(5)
+    thread = threading.Thread(target=lambda: [task() for task in iter(tasks.get, None)])
+    thread.start()
+    server.close()
+    tasks.put(None)
+    thread.join()
+    assert order == ["sent", "destroyed"]
 
 
 def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:

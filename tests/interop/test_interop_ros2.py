@@ -232,6 +232,13 @@ def reserved_domain(parts: contextlib.ExitStack) -> str:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
+    with running_scene(tmp_path_factory.mktemp("ros2")) as (found, _):
+        yield found
+
+
+@contextlib.contextmanager
+def running_scene(folder: Path) -> Iterator[tuple[Scene, subprocess.Popen[bytes]]]:
+    """Run a scene with a bridge, which ends without an error."""
     with contextlib.ExitStack() as parts:
         uri = parts.enter_context(running_master("ours"))
         domain = reserved_domain(parts)
@@ -242,7 +249,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
             "ROS_DOMAIN_ID": domain,
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         }
-        rules = tmp_path_factory.mktemp("ros2") / "rules.yaml"
+        rules = folder / "rules.yaml"
         rules.write_text(RULES)
         words = ["ros2-bridge", "--rules", str(rules)]
         code = f"import sys; from minirospy.cli.main import main; sys.exit(main({words}))"
@@ -253,7 +260,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
             assert bridge.wait(LIMIT) == 0
 
         parts.callback(end)
-        yield Scene(uri, environment, parts)
+        yield Scene(uri, environment, parts), bridge
 
 
 def sample(type_: str) -> bytes:
@@ -705,6 +712,27 @@ def test_goals_of_ros2_reach_a_server_of_ros1(scene: Scene) -> None:
     assert end_of(13) == (6, list(range(13)))
     scene.end(server)
     scene.peer.do("close", "/back/count")
+
+
+def test_a_goal_of_ros2_is_aborted_when_the_bridge_ends(tmp_path: Path) -> None:
+    async def execute(goal: Any) -> dict[str, list[int]]:
+        await goal.publish_feedback([1])
+        await asyncio.sleep(LIMIT)
+        return {}
+
+    with running_scene(tmp_path) as (scene, bridge):
+
+        async def start() -> Any:
+            return await ActionServer(scene.node, "/endless", FibonacciAction, execute)
+
+        scene.run(start())
+        scene.peer.do("goal", "/endless", type=FIBONACCI, fields={"order": 7})
+        assert scene.peer.wait(lambda each: each["op"] == "accepted")["is_accepted"]
+        assert scene.peer.wait(lambda each: each["op"] == "feedback")["data"] == [1]
+        bridge.terminate()
+        assert scene.peer.wait(lambda each: each["op"] == "end")["status"] == 6
+        # Not interrupted a second time while it ends.
+        assert bridge.wait(LIMIT) == 0
 
 
 # --- the page

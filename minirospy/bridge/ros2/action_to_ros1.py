@@ -109,7 +109,9 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """End it: goals that run are aborted."""
+        """End it: goals that run are aborted, those whose result has come get it."""
+        # A result that has come is taken in the next round.
+        await asyncio.sleep(0)
         for goal in list(self._goals.values()):
             self._end(goal, ABORTED, None)
         for task in self._tasks:

@@ -6,6 +6,7 @@ All of this runs in the executor's thread, but for the methods that say otherwis
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import threading
 import uuid
@@ -26,6 +27,7 @@ SUCCEEDED = 4
 ABORTED = 6
 
 _FEEDBACK_DEPTH = 100
+_CLOSE_SECONDS = 1.0
 _HEADER = 4
 _ID = 16
 
@@ -274,6 +276,8 @@ class ActionServer:
         self._class = class_
         self._accept = accept
         self._goals: dict[int, tuple[Message, GoalOfRos1, Feedback]] = {}
+        self._requests = 0
+        self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
         # Its constructor shows it to the executor, which may have a goal for it, before it has a logger.
         named = {"_logger": calls.node.get_logger()}
@@ -292,10 +296,31 @@ class ActionServer:
         )
 
     def close(self) -> None:
-        """Offer it no more."""
+        """Offer it no more; results that are known, and refusals, are sent first. From any other thread than the executor's."""
+        sent = threading.Event()
+        self._calls.end(functools.partial(self._wait_until_sent, sent))
+        sent.wait(_CLOSE_SECONDS)
+        self._is_closed = True
         self._calls.end(self._server.destroy)
 
+    def _wait_until_sent(self, sent: threading.Event) -> None:
+        """Set the event in the first of the executor's rounds in which no goal waits to be answered."""
+        if self._is_closed:
+            return
+        if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
+            self._calls.end(functools.partial(self._wait_until_sent, sent))
+        else:
+            # What rclpy does after our part of the answer may be a task of its own.
+            self._calls.end(sent.set)
+
     async def _requested(self, goal: Message) -> object:
+        self._requests += 1
+        try:
+            return await self._answered(goal)
+        finally:
+            self._requests -= 1
+
+    async def _answered(self, goal: Message) -> object:
         feedback = Feedback(self._calls, self._class.Feedback)
         try:
             accepted = await self._calls.result(self._accept(self._calls.serialize(goal), feedback))
