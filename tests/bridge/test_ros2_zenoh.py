@@ -149,6 +149,7 @@ def test_messages_for_ros2_have_the_key_and_attachment_of_rmw_zenoh(node: RmwNod
     publisher.publish(HELLO)
     publisher.publish(HELLO)
 
+    wait_until(lambda: any("/MP/" in each for each in node.tokens()))
     (token,) = [each for each in node.tokens() if "/MP/" in each]
     entity = parse_token(token)
     assert entity
