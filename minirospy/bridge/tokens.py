@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import stat
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,10 +30,17 @@ def read_tokens(home: Path) -> Tokens | None:
     """Return the tokens in ROS_HOME; None where there are none."""
     try:
         with os.fdopen(open_file(home / _NAME, os.O_RDONLY), encoding="utf-8") as file:
+            if sys.platform != "win32" and not _is_own(os.fstat(file.fileno())):
+                return None
             fields = json.load(file)
         return Tokens(str(fields["write"]), str(fields["read"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _is_own(found: os.stat_result) -> bool:
+    """Return whether a file is this user's alone: in a folder that others may write to they may have made it."""
+    return found.st_uid == os.geteuid() and not stat.S_IMODE(found.st_mode) & 0o077
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:

@@ -14,6 +14,7 @@ from minirospy.cli.verbs import Command
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.tokens import Tokens
+    from minirospy.dashboard.codes import Codes
 
 __all__ = ["DASHBOARD", "WINDOWS", "dashboard"]
 
@@ -369,6 +370,7 @@ def _serve(
             view,
             fields,
             tokens,
+            started.dashboard.codes,
             no_browser=no_browser,
             listen=listen,
             read_only=read_only,
@@ -400,6 +402,7 @@ def _announce(
     view: str,
     fields: Mapping[str, Sequence[str]],
     tokens: Tokens,
+    codes: Codes,
     *,
     no_browser: bool,
     listen: bool,
@@ -415,7 +418,8 @@ def _announce(
     # The person at this machine gets the rights of its programs.
     own = tokens.read if read_only else tokens.write
     here = link(host, port, view, fields, token=own)
-    is_opened = not no_browser and open_link(here)
+    # Other users of the machine may list command lines, that of the browser too.
+    is_opened = not no_browser and open_link(link(host, port, view, fields, code=codes.new(own)))
     print(f"{'The browser opens' if is_opened else 'Open in a browser:'} {here}", flush=True)
     if not listen:
         return

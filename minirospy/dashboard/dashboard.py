@@ -10,6 +10,7 @@ from minirospy.bridge.bridge import Addition, Bridge, BridgeOptions
 from minirospy.dashboard.bag_door import BagDoor
 from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.board_door import BoardDoor
+from minirospy.dashboard.codes import Codes
 from minirospy.dashboard.drive_door import DriveDoor
 from minirospy.dashboard.files import handlers, read_folder
 from minirospy.dashboard.joint_door import JointDoor
@@ -40,6 +41,7 @@ class Dashboard:
         joint_state_publisher_gui does, also while no page is open.
         """
         master_uri = node._node.environment.master_uri
+        self.codes = Codes()
         self._board = BoardDoor()
         self.rviz = RvizDoor(rviz_file)
         self._tools = ToolsDoor(master_uri)
@@ -49,7 +51,8 @@ class Dashboard:
         driving = DriveDoor(lambda: self.bridge.graph)
         own = (self.rviz, self._bags, self._launches, self._joints)
         doors = (self._board, self._tools, driving, *own)
-        self.bridge = Bridge(node, options, addition=Addition(doors, handlers(read_folder())))
+        pages = {**handlers(read_folder()), "/token": self.codes.serve}
+        self.bridge = Bridge(node, options, addition=Addition(doors, pages))
 
     @property
     def port(self) -> int:

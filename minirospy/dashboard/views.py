@@ -82,12 +82,12 @@ def link(
     fields: Mapping[str, Iterable[str]] | None = None,
     *,
     token: str = "",
+    code: str = "",
     encrypted: bool = False,
 ) -> str:
-    """Return the address of a view; ``fields`` are its settings, each may have several values."""
+    """Return the address of a view; ``fields`` are its settings, each may have several values. ``code``: see codes.py."""
     words = [(name, value) for name, values in (fields or {}).items() for value in values]
-    if token:
-        words.append(("token", token))
+    words += [(name, value) for name, value in (("token", token), ("code", code)) if value]
     query = f"?{urlencode(words, quote_via=quote, safe='/[]:')}" if words else ""
     scheme = "https" if encrypted else "http"
     name = f"[{host}]" if ":" in host else host

@@ -371,7 +371,7 @@ class Turns:
 
 
 def test_messages_that_take_long_are_handled_in_turns() -> None:
-    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False)
+    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, ports=(1, 2))
     site.check.return_value = Grant.READ
     handled: list[str] = []
 

@@ -117,6 +117,24 @@ def test_usage_error_has_status_2(
     assert text in capsys.readouterr().err
 
 
+def test_command_line_of_the_browser_has_no_token(
+    master: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Opened(Exception):
+        """Ends the command."""
+
+    opened: list[str] = []
+
+    def answer(link: str) -> bool:
+        opened.append(link)
+        raise Opened
+
+    monkeypatch.setattr(browser, "open_link", answer)
+    with pytest.raises(Opened):
+        command.dashboard(["--port", "0"])
+    assert re.fullmatch(r"http://localhost:\d+/#/topics\?code=[\w-]{22}", opened[0])
+
+
 def test_browser_is_opened_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     import queue
 

@@ -120,6 +120,8 @@ def test_chapter_on_visualization_shows_the_pressed_button(student: Student) -> 
     curve = student.browser_of(plot)
     nodes = student.browser_of(graph)
     board = student.browser_of("minirospy dashboard board")
+    # The link has a code, which the page has exchanged.
+    board.wait("return sessionStorage.getItem('token')?.length === 22 && !location.hash.includes('code')")
 
     nodes.wait_text(".graph .topic text", "/button_state")
     nodes.wait_text(".graph .node text", "/led_actuator")

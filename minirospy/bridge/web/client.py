@@ -72,6 +72,9 @@ class HttpRequest(NamedTuple):
     query: Mapping[str, str]
     headers: Mapping[str, str]
     peer: str
+    peer_port: int = 0
+    port: int = 0
+    """The ports of the client and of the server."""
 
 
 class Session(Protocol):

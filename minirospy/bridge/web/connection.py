@@ -294,7 +294,7 @@ class Connection:
             return grant
         parts = urlsplit(request.path)
         query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
-        return HttpRequest(unquote(parts.path), query, headers, self.peer), grant, is_page
+        return HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.ports), grant, is_page
 
     def _watch(self, check: Callable[[], None]) -> None:
         """Call ``check`` from now on in place of what watched the connection until now."""

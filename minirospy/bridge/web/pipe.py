@@ -36,13 +36,16 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet."""
+    """One connection. ``is_full``: what was written is not with the kernel yet; ``ports``: of the peer, and one's own."""
 
     @property
     def is_full(self) -> bool: ...
 
     @property
     def unsent(self) -> int: ...
+
+    @property
+    def ports(self) -> tuple[int, int]: ...
 
     def write(self, pieces: Sequence[Piece]) -> None: ...
 
@@ -74,6 +77,11 @@ class PlainPipe:
     def unsent(self) -> int:
         """Bytes that wait for the kernel."""
         return sum(map(len, self._rest))
+
+    @property
+    def ports(self) -> tuple[int, int]:
+        """The ports of the peer and of this end."""
+        return _ports(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces, or keep what the kernel does not take now."""
@@ -156,6 +164,13 @@ class PlainPipe:
         self._events.ended()
 
 
+def _ports(sock: socket.socket) -> tuple[int, int]:
+    try:
+        return sock.getpeername()[1], sock.getsockname()[1]
+    except OSError:  # it has disconnected
+        return 0, 0
+
+
 def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
     if hasattr(sock, "sendmsg"):
         return sock.sendmsg(pieces)
@@ -181,6 +196,11 @@ class TlsPipe(asyncio.Protocol):
     def unsent(self) -> int:
         """Bytes that wait for the kernel."""
         return self._transport.get_write_buffer_size() if self._transport else 0
+
+    @property
+    def ports(self) -> tuple[int, int]:
+        """The ports of the peer and of this end."""
+        return _ports(self._transport.get_extra_info("socket")) if self._transport else (0, 0)
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces."""

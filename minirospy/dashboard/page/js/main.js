@@ -61,7 +61,7 @@ const STATES = {
   refused: "no connection, trying again …",
 };
 
-const token = takeToken();
+const token = await takeToken();
 const link = new Link(token);
 const tabs = document.getElementById("tabs");
 const main = document.getElementById("view");
@@ -69,15 +69,20 @@ const notices = document.getElementById("notices");
 let current = null;
 let shown = null; // the place of the current view
 
-/** Return the token of the address, which is kept for this tab, and removed from the address and the history. */
-function takeToken() {
+/** Return the token of the address, or of its code, which is kept for this tab, and removed from the address and the history. */
+async function takeToken() {
   const { view, words } = addressOf(location.hash);
-  const given = words.get("token");
-  if (given) {
-    sessionStorage.setItem("token", given);
-    words.delete("token");
+  const code = words.get("code");
+  let given = words.get("token");
+  if (given || code) {
+    for (const name of ["token", "code"]) words.delete(name);
     history.replaceState(null, "", fragmentOf(view, words));
   }
+  if (code) {
+    const answer = await fetch("token", { headers: { authorization: `Bearer ${code}` } }).catch(() => null);
+    if (answer?.ok) given = await answer.text();
+  }
+  if (given) sessionStorage.setItem("token", given);
   return sessionStorage.getItem("token") ?? "";
 }
 
