@@ -34,6 +34,8 @@ FASTEST_LOOK = 0.25
 
 _QUEUE = 100
 _PROBES = 8
+_PROBE_SECONDS = 2.0
+"""After this the graph is reported without the types of services that are still looked up."""
 
 
 @dataclass(frozen=True)
@@ -286,6 +288,8 @@ class SharedGraph:
     async def _look_up_services(self, found: Snapshot) -> None:
         """Find the types of new services, which the master does not know: their nodes do."""
 
+        is_late = False
+
         async def probe(name: str, nodes: tuple[str, ...]) -> None:
             async with self._probing:
                 try:
@@ -298,6 +302,8 @@ class SharedGraph:
                     self.service_types.failed(name, nodes)
                 else:
                     self.service_types.found(name, nodes, header)
+                    if is_late:
+                        self.look_soon()
 
         new = [
             (name, nodes)
@@ -306,7 +312,12 @@ class SharedGraph:
         ]
         self.service_types.keep(found.services)
         if new:
-            await asyncio.gather(*(probe(*each) for each in new))
+            for name, nodes in new:
+                # Until its node has answered.
+                self.service_types.failed(name, nodes)
+            # Nodes that do not answer keep nobody from what else has changed.
+            await asyncio.wait([self.spawn(probe(*each)) for each in new], timeout=_PROBE_SECONDS)
+            is_late = True
 
     # --- topics
 

@@ -22,6 +22,8 @@ __all__ = ["ServiceInfo", "ServiceTypes", "TypeTexts", "installed_type", "type_o
 
 _MOST_NAMES = 2_000
 """Types that are remembered, also those that are not installed: a peer may name any number."""
+_AT_ONCE = 32
+"""Publishers that are queried at a time."""
 _AGAIN_SECONDS = 10.0
 """After this a service that did not answer is tried again."""
 
@@ -55,13 +57,27 @@ class TypeTexts:
         self._installed: dict[str, InterfaceType | None] = {}
         self._rpc = AsyncRpcClient()
 
-    async def of_topic(self, topic: str, type_: str, publishers: tuple[str, ...]) -> InterfaceType | None:
-        """Return the type of a topic's messages; where it is not installed here, a publisher is queried.
+    async def of_publishers(
+        self, topics: Mapping[str, tuple[str, ...]], seconds: float
+    ) -> dict[str, InterfaceType]:
+        """Return the types of these topics that one of their publishers names in time: each may stall."""
+        if not topics:
+            return {}
+        limit = asyncio.Semaphore(_AT_ONCE)
 
-        None where neither knows its text.
-        """
-        found = await self.installed(type_)
-        return found or await self._from_publishers(topic, publishers)
+        async def look(topic: str, publishers: tuple[str, ...]) -> InterfaceType | None:
+            async with limit:
+                return await self._from_publishers(topic, publishers)
+
+        tasks = {topic: asyncio.ensure_future(look(topic, nodes)) for topic, nodes in topics.items()}
+        try:
+            await asyncio.wait(tasks.values(), timeout=seconds)
+            done = {topic: task.result() for topic, task in tasks.items() if task.done()}
+        finally:
+            for task in tasks.values():
+                task.cancel()
+            await asyncio.gather(*tasks.values(), return_exceptions=True)
+        return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
         """Return an installed type, None where there is none of the name."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -28,6 +30,27 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
         assert "/short" not in graph.node._published
 
     bridge.run(advertise_and_close())
+
+
+def test_nodes_that_do_not_answer_keep_nobody_from_the_others(bridge: Running) -> None:
+    bridge.publisher(bridge.node("talker"), "/chatter", String)
+    with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+
+        async def register() -> None:
+            master = bridge.bridge.node._node.master
+            for number in range(20):
+                uri = f"http://{address}/"
+                await master("registerPublisher", f"/t{number}", "odd_msgs/Odd", uri)
+                await master("registerService", f"/s{number}", f"rosrpc://{address}", uri)
+
+        bridge.run(register())
+        start = time.monotonic()
+        client = bridge.client()
+        assert client.channel("/chatter")
+        assert client.channel("/t19")
+        assert client.channels["/t19"]["schemaName"] == "odd_msgs/Odd"
+        assert time.monotonic() - start < 20
 
 
 @pytest.mark.parametrize("turns", range(6))

@@ -13,6 +13,9 @@ from minirospy.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Channels", "Services"]
 
+_SECONDS = 3.0
+"""The types of topics that are not installed here are waited for this long: all clients wait for what is offered."""
+
 
 class Channels:
     """Topics as channels. A topic whose type or definition changes becomes another channel."""
@@ -51,12 +54,22 @@ class Channels:
             self._remove(id_)
 
         new = []
+        others = {}
         for topic, declared in wanted.items():
             if topic in self._by_topic:
                 continue
-            found = await graph.texts.of_topic(topic, declared, snapshot.publishers.get(topic, ()))
-            type_ = found or InterfaceType(declared, ANY)
-            new.append(self._add(topic, declared, type_))
+            type_ = await graph.texts.installed(declared)
+            if type_:
+                new.append(self._add(topic, declared, type_))
+            else:
+                others[topic] = snapshot.publishers.get(topic, ())
+
+        # One whose publisher does not answer in time is known by its first message.
+        found = await graph.texts.of_publishers(others, _SECONDS)
+        new += [
+            self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
+            for topic in others
+        ]
         return new, removed
 
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
