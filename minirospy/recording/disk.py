@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from minirospy.private_files import open_file
+
 __all__ = ["DiskThread", "QueuedFile"]
 
 Buffer = bytes | bytearray | memoryview
@@ -75,7 +77,9 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        self._file = open(path, "w+b", buffering=0)  # noqa: SIM115 - closed by close()
+        # Its name may be guessed, by the time: a link that waits there is not followed.
+        opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
+        self._file = os.fdopen(opened, "r+b", buffering=0)
 
     def write(self, data: Buffer) -> int:
         """Write all of ``data``, which must not change any more."""

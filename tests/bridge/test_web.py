@@ -252,6 +252,28 @@ def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Runn
     assert_alive(bridge.client())
 
 
+def test_silent_connections_give_way_to_clients(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(connections=20, handshake_seconds=1000.0))
+    first = bridge.client()
+    held = [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(19)]
+    listener = bridge.bridge.listeners["foxglove"]
+    wait_until(lambda: bridge.call(lambda: len(listener.connections)) == 20)
+
+    def age() -> None:
+        for each in listener.connections:
+            each.traffic.since -= 300.0
+
+    bridge.call(age)
+    clients = [bridge.client() for _ in range(19)]
+    for client in (first, *clients):
+        assert_alive(client)
+    assert raw_answer(bridge.port, b"").startswith(b"HTTP/1.1 503 ")
+    for sock in held:
+        with contextlib.suppress(ConnectionError):
+            assert read_all(sock) == b""
+        sock.close()
+
+
 def test_thousand_connections_leave_the_first_ones_unaffected(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(handshake_seconds=1000.0))
     first = bridge.client()

@@ -116,6 +116,11 @@ class Connection:
         """Return whether more may be sent."""
         return not self._is_closing
 
+    @property
+    def is_silent(self) -> bool:
+        """Return whether no request has come."""
+        return not (self.client or self.exchange or self._is_closing)
+
     # --- from the pipe
 
     def received(self, data: bytes) -> None:

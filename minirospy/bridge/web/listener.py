@@ -202,7 +202,7 @@ class Listener:
 
     def _refusal_of(self, peer: str) -> bytes | None:
         """Return the answer to a client that may not connect now."""
-        if len(self.connections) >= self.limits.connections:
+        if len(self.connections) >= self.limits.connections and not self._drop_silent():
             refusal = _TOO_MANY
         elif not self.rate.admits(peer):
             refusal = _TOO_OFTEN
@@ -210,6 +210,14 @@ class Listener:
             return None
         self.refused += 1
         return refusal
+
+    def _drop_silent(self) -> bool:
+        """Disconnect the client that has sent no request for longest, if it had time for that; return whether there was one."""
+        latest = time.monotonic() - self.limits.handshake_seconds / 6
+        silent = [each for each in self.connections if each.is_silent and each.traffic.since < latest]
+        if silent:
+            min(silent, key=lambda each: each.traffic.since).abort()
+        return bool(silent)
 
     def _add(self, connection: Connection) -> Connection:
         self.connections.add(connection)
