@@ -668,6 +668,30 @@ def test_persistent_proxies_outlive_a_server(master: str) -> None:
     run(main)
 
 
+def test_closing_a_persistent_proxy_ends_the_call_of_another_task(master: str) -> None:
+    async def main() -> None:
+        called, gate = asyncio.Event(), asyncio.Event()
+
+        async def slow(request: object) -> tuple[bool, str]:
+            called.set()
+            await gate.wait()
+            return True, "late"
+
+        async with Node("a") as a, Node("b") as b:
+            await a.serve("/s", Trigger, slow)
+            proxy = b.service_proxy("/s", Trigger, persistent=True)
+            call = asyncio.ensure_future(proxy())
+            await called.wait()
+            proxy.close()
+            with pytest.raises(ServiceException, match="unable to receive data from sender"):
+                await asyncio.wait_for(call, 30)
+            gate.set()
+            assert (await proxy()).message == "late"
+            proxy.close()
+
+    run(main)
+
+
 def test_closing_a_service_lets_its_calls_finish(graph: MasterProxy) -> None:
     async def main() -> None:
         called, gate = asyncio.Event(), asyncio.Event()

@@ -83,7 +83,7 @@ class ServiceProxy(Generic[_Response_co]):
 
         async with self._lock:
             if self._client and self._client.has_ended():
-                self.close()
+                self._disconnect()
             if self._client is None:
                 self._client = await self._connect()
             keeping = False
@@ -96,12 +96,19 @@ class ServiceProxy(Generic[_Response_co]):
             finally:
                 # Cancelled in the middle, the answer would be taken for that of the next call.
                 if not keeping:
-                    self.close()
+                    self._disconnect()
 
         return response
 
     def close(self) -> None:
-        """Close a persistent connection. Idempotent."""
+        """Close a persistent connection; a call that another task makes by it fails. Idempotent."""
+        if self._lock.locked() and self._client:
+            # The call closes it: a socket that is closed meanwhile would leave that waiting.
+            self._client.hang_up()
+        else:
+            self._disconnect()
+
+    def _disconnect(self) -> None:
         client, self._client = self._client, None
         if client:
             client.close()

@@ -343,5 +343,5 @@ def _checked_size(queue_size: int | None) -> int | None:
         return None
     try:
         return max(0, int(queue_size))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"queue_size must be an integer or None: {queue_size!r}") from None

@@ -224,7 +224,7 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._client and self._client.has_ended():
-                self.close()
+                self._disconnect()
             if self._client is None:
                 self._client = self._connect(body)
             return self._exchange(self._client, body, keep=True)
@@ -234,7 +234,15 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection."""
+        """Close a persistent connection; a call that another thread makes by it fails."""
+        client = self._client
+        if client and self._lock.locked():
+            # Closing a socket does not end the wait of another thread for it. That thread closes it.
+            client.hang_up()
+        else:
+            self._disconnect()
+
+    def _disconnect(self) -> None:
         client, self._client = self._client, None
         if client:
             client.close()

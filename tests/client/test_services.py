@@ -116,6 +116,43 @@ def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
         assert hear(client) == "service [/s] unavailable"
 
 
+CLOSING = """
+import threading
+import rospy
+from std_srvs.srv import Trigger
+
+def call():
+    try:
+        proxy()
+    except rospy.ServiceException as error:
+        print(error, flush=True)
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+thread = threading.Thread(target=call)
+thread.start()
+input()
+proxy.close()
+thread.join()
+input()
+print(proxy().message, flush=True)
+"""
+
+
+def test_closing_a_persistent_proxy_ends_the_call_of_another_thread(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, CLOSING)
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client).startswith(
+        "transport error completing service call: unable to receive data from sender"
+    )
+    say(server, "gate.set()")
+    say(client)
+    assert hear(client) == "late"
+
+
 def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
     """It connects to the last known address first; the answer comes from the node that the master names."""
     client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))

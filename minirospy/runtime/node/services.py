@@ -303,6 +303,10 @@ class AsyncServiceClient:
         """Return whether the server has hung up: a request that is sent now would not be read."""
         return sockets.is_readable(self._sock)
 
+    def hang_up(self) -> None:
+        """End a call that is under way in another task."""
+        sockets.hang_up(self._sock)
+
     def close(self) -> None:
         """Close the connection. Idempotent."""
         self._sock.close()
