@@ -84,7 +84,7 @@ class ActionClient:
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal; its handle, which has to be kept for as long as the goal is of interest.
+        """Send a goal and return its handle, which has to be kept for as long as the goal is of interest.
 
         ``transition_cb(handle)`` is called on each change, ``feedback_cb(handle, feedback)`` with feedback,
         both in threads of the library, one after the other.

@@ -120,33 +120,33 @@ class ServerGoalHandle:
 
     def set_accepted(self, text: str = "") -> None:
         """Accept the goal."""
-        self._tell("Accepting goal, id: %s, stamp: %.2f")
+        self._log("Accepting goal, id: %s, stamp: %.2f")
         if self._step(GoalEvent.ACCEPT, text) and self.action_server:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
         """End the goal at a client's request: RECALLED where it had not been accepted, else PREEMPTED."""
-        self._tell("Setting status to canceled on goal, id: %s, stamp: %.2f")
+        self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
     def set_rejected(self, result: Message | None = None, text: str = "") -> None:
         """Refuse the goal."""
-        self._tell("Setting status to rejected on goal, id: %s, stamp: %.2f")
+        self._log("Setting status to rejected on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.REJECT, result, text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
         """End the goal: it has failed."""
-        self._tell("Setting status to aborted on goal, id: %s, stamp: %.2f")
+        self._log("Setting status to aborted on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.ABORT, result, text)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
         """End the goal: it is reached."""
-        self._tell("Setting status to succeeded on goal, id: %s, stamp: %.2f")
+        self._log("Setting status to succeeded on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.SUCCEED, result, text)
 
     def set_cancel_requested(self) -> bool:
-        """Return a client wants the goal canceled; whether that changes anything."""
-        self._tell("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
+        """Record that a client wants the goal canceled; return whether that changes its state."""
+        self._log("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
         tracker = self.status_tracker
         if not self.goal or tracker is None or self.action_server is None:
             return False
@@ -160,7 +160,7 @@ class ServerGoalHandle:
 
     def publish_feedback(self, feedback: Message) -> None:
         """Send feedback to the goal's client."""
-        self._tell("Publishing feedback for goal, id: %s, stamp: %.2f")
+        self._log("Publishing feedback for goal, id: %s, stamp: %.2f")
         if not self.goal or self.status_tracker is None or self.action_server is None:
             rospy.logerr("Attempt to publish feedback on an uninitialized ServerGoalHandle")
             return
@@ -185,7 +185,7 @@ class ServerGoalHandle:
             return GoalStatus()
         return self.status_tracker.status
 
-    def _tell(self, line: str) -> None:
+    def _log(self, line: str) -> None:
         goal_id = self.get_goal_id()
         rospy.logdebug(line, goal_id.id, goal_id.stamp.to_sec())
 

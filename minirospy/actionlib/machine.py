@@ -27,7 +27,7 @@ TransitionCallback = Callable[["ClientGoalHandle"], object]
 FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
-_NOT_TOLD = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
+_MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
 """States in which a goal may be missing from the server's list: not there yet, or there no more."""
 
 
@@ -165,7 +165,7 @@ class CommStateMachine:
             if status is not None:
                 self.latest_goal_status = status
                 self._follow(status.status)
-            elif self.state not in _NOT_TOLD:
+            elif self.state not in _MAY_BE_MISSING:
                 self._mark_as_lost()
 
     def update_result(self, action_result: ActionResult) -> None:
@@ -250,7 +250,7 @@ class GoalManager:
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal; its handle."""
+        """Send a goal and return its handle."""
         action_goal = self.ActionGoal(goal_id=self._generate_id(), goal=goal)
         action_goal.header.stamp = rospy.get_rostime()
         machine = CommStateMachine(action_goal, transition_cb, feedback_cb, self.send_goal_fn, self.cancel_fn)

@@ -100,8 +100,8 @@ class ActionServer:
         self.started = False
 
         self._trackers: dict[str, StatusTracker] = {}
-        self._told_at = 0.0
-        self._teller: _Teller | None = None
+        self._published_at = 0.0
+        self._status_thread: _StatusThread | None = None
 
         if auto_start:
             self.warn_of_auto_start()
@@ -138,9 +138,9 @@ class ActionServer:
         """Leave the action's topics; :meth:`start` takes the goals up again."""
         with self.lock:
             self.started = False
-            if self._teller:
-                self._teller.stop()
-                self._teller = None
+            if self._status_thread:
+                self._status_thread.stop()
+                self._status_thread = None
             for end in (self.goal_sub, self.cancel_sub, self.status_pub, self.result_pub, self.feedback_pub):
                 if end:
                     end.unregister()
@@ -184,7 +184,7 @@ class ActionServer:
             tcp_nodelay=True,
         )
 
-        self._teller = _Teller(self.publish_status_now, 1.0 / self.status_frequency)
+        self._status_thread = _StatusThread(self.publish_status_now, 1.0 / self.status_frequency)
 
     def publish_result(self, status: GoalStatus, result: Message | None) -> None:
         """Send a goal's result, and its status."""
@@ -206,10 +206,10 @@ class ActionServer:
         with self.lock:
             pause = len(self._trackers) * _SECONDS_A_STATUS
             now = time.monotonic()
-            if len(self._trackers) <= _FEW_STATUSES or now - self._told_at >= pause:
+            if len(self._trackers) <= _FEW_STATUSES or now - self._published_at >= pause:
                 self.publish_status_now()
-            elif self._teller:
-                self._teller.hurry(self._told_at + pause - now)
+            elif self._status_thread:
+                self._status_thread.hurry(self._published_at + pause - now)
 
     def publish_status_now(self) -> None:
         """Publish the statuses of all goals but those that ended long ago."""
@@ -218,7 +218,7 @@ class ActionServer:
             self._forget_old(now)
             message = StatusList([tracker.serialize() for tracker in self._trackers.values()])
             message.header.stamp = now
-            self._told_at = time.monotonic()
+            self._published_at = time.monotonic()
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
@@ -305,7 +305,7 @@ class ActionServer:
             publisher.publish(message)
 
 
-class _Teller:
+class _StatusThread:
     """A thread that calls ``publish`` every ``period`` seconds, and sooner on request."""
 
     def __init__(self, publish: Callable[[], None], period: float) -> None:

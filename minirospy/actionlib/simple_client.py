@@ -75,7 +75,7 @@ class SimpleActionClient:
         execute_timeout: times.Duration = rospy.Duration(),  # noqa: B008
         preempt_timeout: times.Duration = rospy.Duration(),  # noqa: B008
     ) -> int:
-        """Send a goal and wait for its end; its state then.
+        """Send a goal, wait for its end, and return its state.
 
         After ``execute_timeout`` the goal is canceled, and its end awaited for ``preempt_timeout`` more. A zero
         Duration waits for ever.
@@ -144,7 +144,7 @@ class SimpleActionClient:
             self.gh.cancel()
 
     def stop_tracking_goal(self) -> None:
-        """Hear of the goal no more; the server goes on with it."""
+        """Call no callback of the goal any more; the server goes on with it."""
         self.gh = None
         self._finished = None
 
@@ -171,7 +171,7 @@ class SimpleActionClient:
             finally:
                 self._finish(tracked)
         elif step is SimpleStep.WRONG:
-            self._tell_wrong(comm_state)
+            self._log_wrong(comm_state)
 
     def _finish(self, tracked: ClientGoalHandle | None) -> None:
         """Wake the threads that wait for the goal: it and its done callback are over."""
@@ -181,7 +181,7 @@ class SimpleActionClient:
                 self._set_simple_state(SimpleGoalState.DONE)
         self._news.notify()
 
-    def _tell_wrong(self, comm_state: int) -> None:
+    def _log_wrong(self, comm_state: int) -> None:
         if comm_state == CommState.DONE:
             rospy.logerr("SimpleActionClient received DONE twice")
             return

@@ -28,7 +28,7 @@ _MOST_MISSED = 3
 def run_child(
     name: str, parent: str, run_id: str, environment: Environment, packages: Packages, options: RunOptions
 ) -> int:
-    """Be the child ``name`` of the roslaunch at the URI ``parent``, until it or a signal ends it; the exit status.
+    """Be the child ``name`` of the roslaunch at the URI ``parent``, until it or a signal ends it; return the exit status.
 
     Raises MinirospyError where the parent does not answer.
     """

@@ -192,7 +192,7 @@ class Tag:
         return True
 
     def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
-        """Tell of each attribute that a tag of this name does not have: most often it is a typing error."""
+        """Warn of each attribute that a tag of this name does not have: most often it is a typing error."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:

@@ -314,7 +314,7 @@ class _File:
         self._problems.append(error)
 
     def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
-        """Read a tag; the scope for those after it."""
+        """Read a tag; return the scope of those after it."""
         reader = self._tags.get(tag.name)
         if reader is None or (allowed is not None and tag.name not in allowed):
             near = [] if reader else nearest(tag.name, allowed or self._tags)

@@ -90,7 +90,7 @@ class Guardian:
         self._popen = None if self._children.is_guarded else self._start()
 
     def add(self, process: Process) -> None:
-        """Note that a process has started."""
+        """Report a process that has started."""
         if process.node is None:
             self._has_master = True
         elif self._popen is None and not self._has_master:
@@ -98,7 +98,7 @@ class Guardian:
         self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
-        """Note that a process has exited."""
+        """Report a process that has exited."""
         self._write(f"-{process.pid}\n")
 
     def close(self) -> None:
@@ -164,7 +164,7 @@ def start_process(
 def end_processes(
     processes: Sequence[Process], timeouts: Timeouts, warn: Callable[[str], None]
 ) -> list[Process]:
-    """SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; those that SIGKILL ended."""
+    """Send SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; return those that SIGKILL ended."""
     steps = (
         (_interrupt, timeouts.interrupt, ""),
         (_terminate, timeouts.terminate, "escalating to SIGTERM"),

@@ -42,7 +42,7 @@ class Monitor(Protocol):
         """Have a process ended where this one is killed."""
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """Note that a process on another machine has exited."""
+        """Report that a process on another machine has exited."""
 
 
 Method = Callable[..., object]

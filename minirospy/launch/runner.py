@@ -92,7 +92,7 @@ class Launcher:
         self._master.run_id = run_id
 
     def run(self, *, wait: bool = False) -> int:
-        """Run until the end; the exit status: 0, or 1 where a required node died of a fault.
+        """Run until the end; return the exit status: 0, or 1 where a required node died of a fault.
 
         ``wait``: wait for a master instead of starting one. Raises LaunchError, MasterUnreachableError.
         """
@@ -255,7 +255,7 @@ class Launcher:
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch the nodes until they, or a required one, have exited, or stop() was called; the exit status.
+        """Watch the nodes until they, or a required one, have exited, or stop() was called; return the exit status.
 
         ``forever``: also where no node is left.
         """
@@ -273,7 +273,7 @@ class Launcher:
         self.supervisor.stop(why)
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """Note that a process on another machine has exited; from any thread."""
+        """Report that a process on another machine has exited; from any thread."""
         self.supervisor.remote_ended(node, name, code)
 
     def _process_exited(self, process: Process) -> None:
@@ -284,7 +284,7 @@ class Launcher:
             self._on_end(process)
 
     def _on_end(self, process: Process) -> None:
-        """Note that a node has exited: for subclasses."""
+        """React to a node that has exited: for subclasses."""
 
     # --- ending
 
@@ -323,7 +323,7 @@ class Launcher:
         self._master.close()
 
     def _end(self, processes: list[Process]) -> list[Process]:
-        """End processes; those that needed SIGKILL."""
+        """End processes; return those that needed SIGKILL."""
         for process in processes:
             self._output.say(f"[{process.name}] killing on exit")
         return end_processes(processes, self._options.timeouts, self._output.warn)

@@ -123,7 +123,7 @@ class Supervisor:
         self._events.put(_NoMoreNodes())
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """Note that a process on another machine has exited."""
+        """Report that a process on another machine has exited."""
         self._events.put(_RemoteExited(node, name, code))
 
     # --- in the thread that runs the launch
@@ -201,7 +201,7 @@ class Supervisor:
         return None
 
     def _exited(self, process: Process) -> int | None:
-        """React to a process that has exited; a status where the run is over."""
+        """React to a process that has exited; return a status where the run is over."""
         self._on_exit(process)
         if process is self.master:
             self.master = None

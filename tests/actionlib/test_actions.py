@@ -120,8 +120,8 @@ now, delays, sizes = [1000.0], [], []
 module.time = SimpleNamespace(sleep=time.sleep, monotonic=lambda: now[0])
 actions = server.action_server
 actions.status_list_timeout = rospy.Duration(1000)
-actions._teller.stop()
-actions._teller = SimpleNamespace(hurry=delays.append, stop=lambda: None)
+actions._status_thread.stop()
+actions._status_thread = SimpleNamespace(hurry=delays.append, stop=lambda: None)
 publish = actions.publish_status_now
 def publish_status_now():
     sizes.append(len(actions.status_list))

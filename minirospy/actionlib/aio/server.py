@@ -157,7 +157,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             self._subscriptions.append(subscription)
             self._start(self._read(subscription, take))
             await subscription
-        self._start(self._tell(1.0 / frequency))
+        self._start(self._publish_regularly(1.0 / frequency))
 
     async def _read(
         self, subscription: Subscription[Message], take: Callable[[Any], Awaitable[None]]
@@ -281,8 +281,8 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         message.header.stamp = self._node.now()
         await self._feedback.publish(message)
 
-    async def _tell(self, period: float) -> None:
-        """Tell the statuses of all goals: on a change, and regularly."""
+    async def _publish_regularly(self, period: float) -> None:
+        """Publish the statuses of all goals: on a change, and regularly."""
         while not self._node.is_shutdown:
             self._changed.clear()
             now = self._node.now()
