@@ -147,18 +147,16 @@ class SimulatedClock:
         """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
 
         While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
-        Raises ROSTimeMovedBackwardsException.
+        Raises ROSTimeMovedBackwardsException where the clock is set to before the sleep's start.
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)
         try:
-            while (before := self._now) == 0 and not stop.is_set():
+            while (start := self._now) == 0 and not stop.is_set():
                 self._wait(sleeper)
-            end = before + nanoseconds
-            while (now := self._now) < end and not stop.is_set():
-                if now < before:
-                    raise ROSTimeMovedBackwardsException((before - now) / 1e9)
-                before = now
+            while (now := self._now) < start + nanoseconds and not stop.is_set():
+                if now < start:
+                    raise ROSTimeMovedBackwardsException((start - now) / 1e9)
                 self._wait(sleeper)
             return not stop.is_set()
         finally:

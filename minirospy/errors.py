@@ -445,7 +445,7 @@ class ROSInterruptException(ROSException):
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
-    """Simulated time jumped back while somebody slept, by ``time`` seconds."""
+    """Simulated time jumped back to ``time`` seconds before the start of a sleep."""
 
     def __init__(self, time: float) -> None:
         super().__init__("ROS time moved backwards")

@@ -818,9 +818,12 @@ def test_simulated_time(master: str) -> None:
                 await sleeping
                 sleeping = asyncio.ensure_future(node.sleep(5))
                 await asyncio.sleep(0)
-                await ticks.publish(Time(3))
-                with pytest.raises(ROSTimeMovedBackwardsException):
+                for seconds in (19, 16, 3):
+                    await ticks.publish(Time(seconds))
+                    await until(lambda: node.now() == Time(seconds))  # noqa: B023 - it is called in this turn
+                with pytest.raises(ROSTimeMovedBackwardsException) as raised:
                     await sleeping
+                assert raised.value.time == 12
 
     run(main)
 

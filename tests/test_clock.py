@@ -167,6 +167,23 @@ def test_time_that_jumps_back_raises(now: int) -> None:
     assert error.time == 10 - now / 1e9
 
 
+def test_time_that_jumps_back_within_a_sleep_prolongs_it() -> None:
+    clock = SimulatedClock(10 * SECOND)
+    sleeping = Sleeping(clock, 5 * SECOND)
+    sleeping.at(14 * SECOND)
+    sleeping.at(10 * SECOND)
+    sleeping.at(13 * SECOND)
+    clock.set(15 * SECOND)
+    assert sleeping.end() is True
+
+    sleeping = Sleeping(clock, 5 * SECOND)
+    sleeping.at(19 * SECOND)
+    clock.set(12 * SECOND)
+    error = sleeping.end()
+    assert isinstance(error, ROSTimeMovedBackwardsException)
+    assert error.time == 3
+
+
 def test_stop_ends_a_simulated_sleep() -> None:
     for clock in (SimulatedClock(), SimulatedClock(SECOND)):
         sleeping = Sleeping(clock, SECOND)

@@ -69,16 +69,17 @@ class SimulatedTime:
         self._tick = asyncio.Event()
 
     async def sleep(self, nanoseconds: int) -> None:
-        """Wait until the time has moved on so far, or the node ends. Raises ROSTimeMovedBackwardsException."""
+        """Wait until the time has moved on so far, or the node ends.
+
+        Raises ROSTimeMovedBackwardsException where it is set to before the sleep's start.
+        """
         while self.now == 0 and not self._stopping.is_set():
             await self._next_tick()
-        before = self.now
-        end = before + nanoseconds
-        while self.now < end and not self._stopping.is_set():
+        start = self.now
+        while self.now < start + nanoseconds and not self._stopping.is_set():
             await self._next_tick()
-            if self.now < before:
-                raise ROSTimeMovedBackwardsException(self.now / 1e9)
-            before = self.now
+            if self.now < start:
+                raise ROSTimeMovedBackwardsException((start - self.now) / 1e9)
 
     async def _next_tick(self) -> None:
         # The end of the node does not tick: look again now and then.

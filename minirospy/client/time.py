@@ -33,7 +33,7 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back during a sleep, by ``time`` seconds; a KeyboardInterrupt, too, as in rospy."""
+    """Simulated time jumped back to ``time`` seconds before a sleep's start; a KeyboardInterrupt, too, as in rospy."""
 
 
 class Duration(times.Duration):
@@ -95,7 +95,7 @@ def sleep(duration: float | times.Duration) -> None:
 
     Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that polls
     is_shutdown(), by returning. Raises ROSTimeMovedBackwardsException where
-    simulated time jumps back.
+    simulated time jumps back to before the sleep's start.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
     _sleep(nanoseconds)

@@ -72,6 +72,19 @@ sleeper.sleeping()
 at(13.25)
 sleeper.end()
 
+sleeper = Sleeper("back within the sleep", lambda: rospy.sleep(4))
+at(16)
+sleeper.sleeping()
+at(14)
+sleeper.sleeping()
+at(17.25)
+sleeper.end()
+sleeper = Sleeper("back to before it", lambda: rospy.sleep(4))
+at(19)
+sleeper.sleeping()
+at(13.25)
+sleeper.end()
+
 events, again = [], []
 sleepers = [
     Sleeper("sleep", lambda: rospy.sleep(2)),
