@@ -26,7 +26,7 @@ from minirospy.runtime.node.services import ServiceServer
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.master_proxy import master_unreachable, unwrap
-from minirospy.runtime.transport.workers import Workers
+from minirospy.runtime.transport.workers import InOrder, Workers
 
 __all__ = ["Registrations"]
 
@@ -86,7 +86,8 @@ class Registrations:
         self._environment = environment
         self._tables = tables
         self._rpc = rpc
-        self._workers = workers
+        # At the limit of threads they wait, and the watch goes on.
+        self._again = InOrder(workers)
         self._watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
@@ -276,7 +277,7 @@ class Registrations:
             if has_forgotten and any(self._known.values()):
                 _log.warning("the master at %s has restarted: registered again", self._environment.master_uri)
                 for function in self.when_registered_again:
-                    self._workers.start(function)
+                    self._again.start(function)
             elif has_forgotten:
                 # Once: this master does not count as one that knows this node any more.
                 _log.warning("the master does not know this node, and refuses to")

@@ -15,7 +15,13 @@ from typing import Any
 import pytest
 
 from minirospy.environment import Environment
-from minirospy.errors import HandshakeRefused, MasterUnreachableError, RpcUnreachable, WireError
+from minirospy.errors import (
+    HandshakeRefused,
+    MasterUnreachableError,
+    RpcUnreachable,
+    ThreadLimitError,
+    WireError,
+)
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node import topics
 from minirospy.runtime.node.node import Node
@@ -734,6 +740,36 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
 
     run(scene)
     assert "has restarted: registered again" in caplog.text
+
+
+def test_a_node_at_the_limit_of_threads_registers_at_every_master_that_restarts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise ThreadLimitError(1, [])
+
+    async def restarted(port: int) -> None:
+        master = Master(host="127.0.0.1", port=port)
+        await master.start()
+        try:
+            await until(lambda: set(master.registry.publishers()) == {"/t"})
+            # The watch has looked once more.
+            await asyncio.sleep(0.2)
+        finally:
+            await master.close()
+
+    async def scene() -> None:
+        async with graph("/a", watch_seconds=0.05, port=free_port()) as (master, (a,)):
+            await publish(a, "/t")
+            a.when_registered_again.append(int)
+            port = master.port
+            await master.close()
+            with monkeypatch.context() as patch:
+                patch.setattr(a.workers, "start", refuse)
+                for _ in range(2):
+                    await restarted(port)
+
+    run(scene)
 
 
 def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
