@@ -205,7 +205,11 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._faults.report(error)
                 if not self._has_failed:
-                    self.send_error(f"the dashboard failed to show {self.subject}: {type(error).__name__}")
+                    # The text of other errors is for the terminal: it may name what is no client's business.
+                    why = (
+                        _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
+                    )
+                    self.send_error(f"the dashboard failed to show {self.subject}: {why}")
                 self._has_failed = True
                 pause = PAUSE_SECONDS
             if pause is not None:

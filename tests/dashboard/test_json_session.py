@@ -223,14 +223,24 @@ def test_client_that_is_no_owner_gets_the_reason_and_nothing_else() -> None:
     run_manually(work)
 
 
-def test_look_that_fails_is_reported_once_and_repeated(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        (ZeroDivisionError("by nothing"), "ZeroDivisionError"),
+        (UsageError("by nothing"), "by nothing"),
+        (OSError(28, "by nothing"), "[Errno 28] by nothing"),
+    ],
+)
+def test_look_that_fails_is_reported_once_and_repeated(
+    fault: Exception, reason: str, caplog: pytest.LogCaptureFixture
+) -> None:
     async def work() -> None:
         client = Client()
         door, session = opened(client)
         await client.until(1)
-        session.fault = ZeroDivisionError("by nothing")
+        session.fault = fault
         session.changed()
-        assert (await client.until(2))[1] == {"error": "the dashboard failed to show toys: ZeroDivisionError"}
+        assert (await client.until(2))[1] == {"error": f"the dashboard failed to show toys: {reason}"}
         failed = session.follows
         session.changed()
         await until(lambda: session.follows > failed)
