@@ -194,8 +194,8 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> No
         raise BridgeError(f"{who} needs the library eclipse-zenoh: {line}") from error
     version = importlib.metadata.version("eclipse-zenoh")
     parts = [int(each) for each in re.findall(r"\d+", version)]
-    if parts[0] != 1 or parts < [1, 4]:
-        raise BridgeError(f"{who} needs eclipse-zenoh of version 1.4 or newer below 2, not {version}: {line}")
+    if parts[0] != 1 or parts < [1, 5]:
+        raise BridgeError(f"{who} needs eclipse-zenoh of version 1.5 or newer below 2, not {version}: {line}")
 
 
 def configured(options: NetworkOptions) -> Config:

@@ -500,7 +500,7 @@ def test_a_library_of_another_protocol_is_refused(
     monkeypatch.setattr(importlib.metadata, "version", lambda _: version)
     assert main(["--zenoh"]) == 1
     assert (
-        f"eclipse-zenoh of version 1.4 or newer below 2, not {version}: python -m pip"
+        f"eclipse-zenoh of version 1.5 or newer below 2, not {version}: python -m pip"
         in capsys.readouterr().err
     )
 

@@ -130,13 +130,6 @@ class FleetNetwork:
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
 
-    def require_localities(self) -> None:
-        """Raise BridgeError where this version of Zenoh's library cannot leave out what the session itself sends."""
-        if not hasattr(self._zenoh, "Locality"):
-            raise BridgeError(
-                "--ros1-keys needs a newer eclipse-zenoh: python -m pip install --upgrade 'minirospy[fleet]'"
-            )
-
     # --- tokens
 
     def declare_token(self, key: str) -> Later:

@@ -110,7 +110,6 @@ class Ros1Side:
 
     async def start(self) -> None:
         """Pass until :meth:`close`. Raises BridgeError, MasterUnreachableError, RpcError."""
-        self._network.require_localities()
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()
         if self._others:
