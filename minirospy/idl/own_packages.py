@@ -11,7 +11,6 @@ COMPILED_AHEAD = frozenset(
         "actionlib",
         "actionlib_msgs",
         "bond",
-        "diagnostic_msgs",
         "dynamic_reconfigure",
         "geometry_msgs",
         "minirospy_msgs",
