@@ -55,6 +55,7 @@ SHARED = {
     "tf/composed.py",
     "tf/euler.py",
     "tf/matrices.py",
+    "submodules.py",
     "tf/vectors.py",
 }
 """Modules of compat that are not the counterpart of one module."""

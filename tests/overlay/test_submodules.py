@@ -42,6 +42,35 @@ def test_module_that_is_listed_as_missing_is_missing(module: str) -> None:
         importlib.import_module(module)
 
 
+LOADED = {
+    "rosbag": ["bag", "migration", "rosbag_main"],
+    "rosgraph": ["roslogging", "xmlrpc"],
+    "roslib": ["manifest", "stacks"],
+    "rosmaster": [
+        "exceptions",
+        "main",
+        "master_api",
+        "paramserver",
+        "registrations",
+        "threadpool",
+        "util",
+        "validators",
+    ],
+    "rosunit": ["pmon"],
+}
+"""Submodules that real ROS imports with the package, and that are imported here when they are used."""
+
+
+@pytest.mark.parametrize("package", LOADED)
+def test_submodules_come_with_their_package(package: str) -> None:
+    program = (
+        f"import {package} as m; print(*[getattr(m, name).__name__ for name in {LOADED[package]!r}]); m.nope"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == [f"{package}.{name}" for name in LOADED[package]]
+    assert done.stderr.endswith(f"AttributeError: module {package!r} has no attribute 'nope'\n")
+
+
 def test_importing_submodules_prints_nothing() -> None:
     program = "\n".join(f"import {module}" for module in RECORD["offered"])
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)

@@ -12,6 +12,7 @@ from minirospy.compat.rosbag.bag import (
     ROSBagFormatException,
     ROSBagUnindexedException,
 )
+from minirospy.compat.submodules import on_first_use
 
 __all__ = [
     "Bag",
@@ -21,6 +22,8 @@ __all__ = [
     "ROSBagUnindexedException",
     "rosbagmain",
 ]
+
+__getattr__ = on_first_use("rosbag", "bag", "migration", "rosbag_main")
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> int:

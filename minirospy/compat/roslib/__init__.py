@@ -1,6 +1,10 @@
 """roslib. Source: http://wiki.ros.org/roslib."""
 
+from minirospy.compat.submodules import on_first_use
+
 __all__ = ["is_interactive", "set_interactive"]
+
+__getattr__ = on_first_use("roslib", "manifest", "stacks")
 
 _interactive = [False]
 

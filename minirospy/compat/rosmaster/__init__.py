@@ -5,7 +5,21 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from minirospy.compat.submodules import on_first_use
+
 __all__ = ["rosmaster_main"]
+
+__getattr__ = on_first_use(
+    "rosmaster",
+    "exceptions",
+    "main",
+    "master_api",
+    "paramserver",
+    "registrations",
+    "threadpool",
+    "util",
+    "validators",
+)
 
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ from minirospy.compat.rosbag import (
     ROSBagUnindexedException,
     rosbagmain,
 )
+from minirospy.compat.rosbag import __getattr__ as __getattr__
 
 __all__ = [
     "Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException", "rosbagmain",

@@ -1,5 +1,6 @@
 """roslib, provided by minirospy."""
 
+from minirospy.compat.roslib import __getattr__ as __getattr__
 from minirospy.compat.roslib import is_interactive, set_interactive
 from minirospy.compat.roslib.launcher import load_manifest
 from roslib import exceptions as exceptions

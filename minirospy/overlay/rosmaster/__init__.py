@@ -1,5 +1,6 @@
 """rosmaster, provided by minirospy: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
 
+from minirospy.compat.rosmaster import __getattr__ as __getattr__
 from minirospy.compat.rosmaster import rosmaster_main
 from rosmaster import master as master
 from rosmaster.master import DEFAULT_MASTER_PORT

@@ -1,5 +1,6 @@
 """rosunit, provided by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
 
+from minirospy.compat.rosunit import __getattr__ as __getattr__
 from minirospy.compat.rosunit import __version__ as __version__
 from minirospy.testing.unit import (
     XML_OUTPUT_FLAG,
