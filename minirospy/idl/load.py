@@ -355,6 +355,8 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
         # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
+    # As genpy calls it: programs that read bags look for `_sensor_msgs__Image`.
+    found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     # Its source goes with it: a publisher may send any number of definitions.
     weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found

@@ -217,7 +217,7 @@ def test_arrays_of_numbers_are_read_when_they_are_used() -> None:
     message = data_class().deserialize(serialized(data_class(a=[1, 2], b=[3], c=b"4")))
     assert set(message._raw) == {"a", "b"}
     assert (message.a, message.b, message.c) == ((1.0, 2.0), (3,), b"4")
-    with pytest.raises(AttributeError, match="'M' object has no attribute 'd'"):
+    with pytest.raises(AttributeError, match="'_p__M' object has no attribute 'd'"):
         _ = message.d
 
 
