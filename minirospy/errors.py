@@ -330,6 +330,10 @@ class BagFormatError(BagError):
         return self.why if self.position is None else f"{self.why} (at byte {self.position})"
 
 
+class NoBagError(BagFormatError):
+    """The file does not start as a bag does."""
+
+
 class BagVersionError(BagError):
     """The bag has a ``version`` (101 is 1.1) that cannot be read, or not be used for this purpose."""
 

@@ -94,7 +94,7 @@ class BagReader(ABC):
         return [array("Q", index.times) for index in self.index(connections)]
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """Return the headers of the chunks by their positions. Raise BagFormatError."""
+        """Return the headers of the chunks by their positions. Raise BagUnindexedError."""
         return {}
 
     def size(self) -> int:

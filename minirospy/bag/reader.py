@@ -156,8 +156,11 @@ class ChunkedReader(BagReader):
         return list(found.values())
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """See :meth:`BagReader.chunk_headers`."""
-        return {chunk.position: self._chunks.header(chunk.position) for chunk in self.chunks}
+        """See :meth:`BagReader.chunk_headers`. Raise BagUnindexedError if one is damaged: the index leads elsewhere."""
+        try:
+            return {chunk.position: self._chunks.header(chunk.position) for chunk in self.chunks}
+        except BagFormatError as error:
+            raise BagUnindexedError(str(error)) from error
 
     def close(self) -> None:
         """See :meth:`BagReader.close`."""
@@ -170,17 +173,20 @@ class ChunkedReader(BagReader):
         return indexes
 
     def _index_records(self, wanted: set[int]) -> Iterator[tuple[int, int, array[int], array[int]]]:
-        """Yield connection, chunk, times and offsets of the index records behind the chunks."""
+        """Yield connection, chunk, times and offsets of the index records behind the chunks. Raise BagUnindexedError."""
         limit = self.size()
-        for chunk in self.chunks:
-            if wanted.isdisjoint(chunk.counts):
-                continue
-            self.stream.seek(self._chunks.header(chunk.position).end)
-            for _ in chunk.counts:
-                record = records.read_record(self.stream, limit)
-                times, offsets = read_entries(self.stream, record)
-                if (number := record.uint32("conn")) in wanted:
-                    yield number, chunk.position, times, offsets
+        try:
+            for chunk in self.chunks:
+                if wanted.isdisjoint(chunk.counts):
+                    continue
+                self.stream.seek(self._chunks.header(chunk.position).end)
+                for _ in chunk.counts:
+                    record = records.read_record(self.stream, limit)
+                    times, offsets = read_entries(self.stream, record)
+                    if (number := record.uint32("conn")) in wanted:
+                        yield number, chunk.position, times, offsets
+        except BagFormatError as error:
+            raise BagUnindexedError(str(error)) from error
 
 
 class _Run:

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
-from minirospy.errors import BagEncryptedError, BagFormatError
+from minirospy.errors import BagEncryptedError, BagFormatError, NoBagError
 
 __all__ = [
     "BAG_HEADER_SIZE",
@@ -235,16 +235,16 @@ def to_nanoseconds(seconds: int, nanoseconds: int) -> int:
 
 
 def read_version(stream: BinaryIO) -> int:
-    """Read a bag's first line; return its version, 200 for 2.0. Raise BagFormatError."""
+    """Read a bag's first line; return its version, 200 for 2.0. Raise NoBagError."""
     line = stream.readline(100)
     if not line.strip():
-        raise BagFormatError("empty file")
+        raise NoBagError("empty file")
 
     text = line.rstrip().decode("ascii", "replace")
     name, _, version = text.rpartition(" V")
     major, dot, minor = version[:1], version[1:2], version[2:3]
     if not (name.startswith("#ROS") and dot == "." and _is_digit(major) and _is_digit(minor)):
-        raise BagFormatError("This does not appear to be a bag file")
+        raise NoBagError("This does not appear to be a bag file")
     return int(major) * 100 + int(minor)
 
 

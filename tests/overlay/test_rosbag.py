@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -235,7 +237,7 @@ def test_what_is_not_a_bag_is_refused_in_rosbags_words(
     (tmp_path / "a.bag").write_bytes(data)
     with pytest.raises(kind) as refused:
         rosbag.Bag(tmp_path / "a.bag")
-    assert str(refused.value) == what
+    assert (type(refused.value), str(refused.value)) == (kind, what)
 
 
 @pytest.mark.parametrize(
@@ -263,6 +265,43 @@ def test_closed_bag_refuses(path: str) -> None:
             call()
 
 
+def test_closed_bag_still_knows_what_it_has(path: str) -> None:
+    with rosbag.Bag(path) as bag:
+        pass
+    assert (bag.get_message_count(), bag.get_start_time(), bag.get_end_time()) == (15, 100.0, 109.0)
+    assert bag.get_type_and_topic_info().topics["/count"] == ("std_msgs/Int32", 5, 1, 0.5)
+    assert bag.get_message_count(["/count"]) == 5
+    with pytest.raises(ValueError, match="I/O operation on closed bag"):
+        bag.read_messages()
+
+
+def test_no_topic_is_selected_by_an_empty_name_in_a_list(path: str) -> None:
+    with rosbag.Bag(path) as bag:
+        assert [len(list(bag.read_messages(topics))) for topics in ([""], [None], "", [])] == [0, 0, 15, 15]
+
+
+@pytest.mark.parametrize("limit", [103.0, 103, "103", genpy.Duration(3)])
+def test_limits_of_time_are_times(path: str, limit: Any) -> None:
+    with rosbag.Bag(path) as bag:
+        for name in ("start_time", "end_time"):
+            with pytest.raises(TypeError, match=r"are of type rospy\.Time, not"):
+                bag.read_messages(**{name: limit})
+
+
+def test_classes_have_the_names_that_genpy_gives_them(path: str) -> None:
+    """Programs select messages by them, as `type(msg).__name__ == "_sensor_msgs__Image"`."""
+    with rosbag.Bag(path) as bag:
+        found = {type(each.message).__name__ for each in bag}
+    assert found == {"_std_msgs__String", "_std_msgs__Int32"}
+
+
+def test_submodules_are_there_after_import_rosbag() -> None:
+    """Programs write `import rosbag` and `except rosbag.bag.ROSBagException`."""
+    program = "import rosbag; print(rosbag.bag.ROSBagException is rosbag.ROSBagException, rosbag.migration.__name__)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("True rosbag.migration\n", "")
+
+
 def test_missing_file_and_directory_are_the_systems_errors(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         rosbag.Bag(tmp_path / "missing.bag")
@@ -287,11 +326,27 @@ def test_wrong_messages_are_refused(tmp_path: Path) -> None:
         assert bag.get_message_count() == 1
 
 
+def test_raw_text_is_encoded_and_what_is_no_bytes_leaves_the_bag_whole(tmp_path: Path) -> None:
+    with rosbag.Bag(tmp_path / "a.bag", "w") as bag:
+        bag.write(b"/a", Int32(1), at(1))  # type: ignore[arg-type]
+        bag.write("/b", ("std_msgs/Int32", "\2\0\0\0", Int32._md5sum, Int32), at(2), raw=True)
+        for body in (["x"], None, 3):
+            with pytest.raises(TypeError, match="a bytes-like object is required"):
+                bag.write("/c", ("std_msgs/Int32", body, Int32._md5sum, Int32), at(3), raw=True)
+        bag.write("/c", Int32(4), at(4))
+    with rosbag.Bag(tmp_path / "a.bag") as bag:
+        assert [(topic, message.data) for topic, message, _ in bag] == [("/a", 1), ("/b", 2), ("/c", 4)]
+
+
 def test_encryption_is_refused_by_name(tmp_path: Path) -> None:
     with rosbag.Bag(tmp_path / "a.bag", "w") as bag:
         bag.set_encryptor()
         with pytest.raises(ROSBagEncryptNotSupportedException, match="rosbag/AesCbcEncryptor"):
             bag.set_encryptor("rosbag/AesCbcEncryptor")
+        bag.write("/a", Int32(1), at(1))
+        bag.flush()
+        with pytest.raises(rosbag.ROSBagException, match="Cannot set encryptor after chunks are written"):
+            bag.set_encryptor()
 
 
 def test_options_may_change_between_chunks(tmp_path: Path) -> None:

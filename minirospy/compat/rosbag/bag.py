@@ -253,6 +253,8 @@ class Bag(OpenedBag):
         if writer is None:
             raise self._not_writable()
         nanoseconds = time.time_ns() if t is None else t.secs * 1_000_000_000 + t.nsecs
+        if isinstance(topic, bytes):
+            topic = topic.decode()
 
         if raw:
             if len(msg) not in (4, 5):
@@ -264,6 +266,9 @@ class Bag(OpenedBag):
             msg.serialize(pieces)
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
+        if type(body) is not bytes:
+            # What is no bytes must fail before a part of it is in the chunk.
+            body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
         try:
@@ -340,6 +345,9 @@ class Bag(OpenedBag):
 
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
         """Return (msg_types, topics): md5sums by type, and (msg_type, message_count, connections, frequency) by topic."""
+        if self._file is None and self._filename is not None:
+            with Bag(self._filename, skip_index=self._skip_index) as bag:
+                return bag.get_type_and_topic_info(topic_filters)
         summary = self._summary(frequencies=not self._skip_index)
         topics = {
             each.name: TopicTuple(each.type, each.messages, each.connections, each.frequency)
@@ -352,7 +360,12 @@ class Bag(OpenedBag):
         return TypesAndTopicsTuple(dict(summary.types), topics)
 
     def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
-        """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``."""
+        """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
+
+        Raise ROSBagException where the bag already has chunks, as the real module does.
+        """
+        if self._current().chunks:
+            raise ROSBagException("Cannot set encryptor after chunks are written")
         if encryptor == "rosbag/AesCbcEncryptor":
             raise ROSBagEncryptNotSupportedException(f"encryption by [{encryptor}] is not supported")
 
@@ -417,6 +430,10 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
+        # The real module still has it in memory when the bag is closed.
+        if self._file is None and self._filename is not None:
+            with Bag(self._filename, skip_index=True) as bag:
+                return bag._summary(frequencies=frequencies)
         path = None if self._filename is None else os.fspath(self._filename)
         if self._writer:
             self.flush()

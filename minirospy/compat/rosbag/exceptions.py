@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
-from minirospy.errors import BagEncryptedError, BagError, BagFormatError, BagUnindexedError
+from minirospy.errors import BagEncryptedError, BagError, BagFormatError, BagUnindexedError, NoBagError
 
 __all__ = [
     "ROSBagEncryptException",
@@ -73,5 +73,6 @@ def raise_as_ros(error: BagError) -> NoReturn:
         raise ROSBagUnindexedException from error
     if isinstance(error, BagEncryptedError):
         raise ROSBagEncryptNotSupportedException(str(error)) from error
-    kind = ROSBagFormatException if isinstance(error, BagFormatError) else ROSBagException
+    is_damage = isinstance(error, BagFormatError) and not isinstance(error, NoBagError)
+    kind = ROSBagFormatException if is_damage else ROSBagException
     raise kind(str(error)) from error

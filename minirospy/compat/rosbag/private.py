@@ -20,12 +20,12 @@ from minirospy.compat.rosbag.internals import (
     make_time,
 )
 from minirospy.names import canonicalize
+from minirospy.times import Time
 
 if TYPE_CHECKING:
     from minirospy.bag.base import BagReader, Position
     from minirospy.client.time import Time as RospyTime
     from minirospy.idl.protocols import Message
-    from minirospy.times import Time
 
 __all__ = ["BagMessage", "BagMessageWithConnectionHeader", "ConnectionFilter", "PrivateBag", "nanoseconds_of"]
 
@@ -130,10 +130,10 @@ class PrivateBag(ABC):
         connection_filter: ConnectionFilter | None = None,
     ) -> Iterator[_ConnectionInfo]:
         """Yield the connections on these topics that the filter selects."""
-        wanted = {topics} if isinstance(topics, str) else set(topics or ())
+        wanted = {topics} - {""} if isinstance(topics, str) else set(topics or ())
         canonical = {canonicalize(topic) for topic in wanted if topic}
         for each in self._connections.values():
-            if canonical and not {each.topic, canonicalize(each.topic)} & canonical:
+            if wanted and not {each.topic, canonicalize(each.topic)} & canonical:
                 continue
             if connection_filter and not connection_filter(
                 each.topic, each.datatype, each.md5sum, each.msg_def, each.header
@@ -198,5 +198,10 @@ class PrivateBag(ABC):
 
 
 def nanoseconds_of(stamp: Time | None) -> int | None:
-    """Return a limit of time; time 0 is none, as in the real module."""
-    return stamp.to_nsec() if stamp else None
+    """Return a limit of time; time 0 is none, as in the real module. Raise TypeError if it is not a rospy.Time."""
+    if not stamp:
+        return None
+    if not isinstance(stamp, Time):
+        hint = f": rospy.Time.from_sec({stamp})" if isinstance(stamp, (int, float)) else ""
+        raise TypeError(f"start_time and end_time are of type rospy.Time, not {type(stamp).__name__}{hint}")
+    return stamp.to_nsec()
