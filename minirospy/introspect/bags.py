@@ -273,7 +273,7 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield the writer of a new file; chunks are compressed in parallel. After an error it is a bag of what was written.
+    """Yield the writer of a new file; chunks are compressed in parallel. Errors and Ctrl-C leave a bag of what was written.
 
     Raise UsageError where the name is that of an MCAP file, before anything is written.
     """
@@ -290,7 +290,7 @@ def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
             yield writer
         except OSError:
             raise
-        except Exception:
+        except (Exception, KeyboardInterrupt):
             writer.close()
             raise
         writer.close()

@@ -54,6 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         words = ["help", *(word for word in words if word not in ("-h", "--help"))]
     if not words or words[0] == "help":
         words = [*words[1:2], "-h"] if words[1:] else []
+    if words[:1] == ["record"]:
+        words = list(rosbag_record.without_split_size(words))
     if words and FAMILY.find(words[0]):
         return FAMILY.main(words)
     if not words:

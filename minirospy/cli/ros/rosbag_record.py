@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from minirospy.cli.parser import Misuse, Parser, attach_completer
 from minirospy.cli.verbs import Command, Verb
@@ -16,16 +16,16 @@ from minirospy.errors import BagCompressionError, ROSInterruptException, UsageEr
 if TYPE_CHECKING:
     from minirospy.recording.options import RecordOptions
 
-__all__ = ["COMMAND", "VERB", "main"]
+__all__ = ["COMMAND", "VERB", "main", "without_split_size"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `rosrun rosbag record`; return its exit status."""
-    return COMMAND.main(list(_without_split_size(sys.argv[1:] if argv is None else argv)))
+    return COMMAND.main(list(without_split_size(sys.argv[1:] if argv is None else argv)))
 
 
-def _without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words with ``--split --size N`` for the ``--split=N`` and ``--split N`` of old launch files."""
+def without_split_size(words: Sequence[str]) -> Iterator[str]:
+    """Yield the words with ``--split --size N`` for the ``--split=N`` and ``--split N`` of old launch files and scripts."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
@@ -103,6 +103,14 @@ def _parser() -> Parser:
     )
     own.add_argument("--zstd", action="store_true", help="use Zstandard compression, with --mcap")
     return parser
+
+
+def _record_verb(output_prefix: str, output_name: str, **others: Any) -> int:
+    # `rosrun rosbag record` takes both, and the name counts.
+    if output_prefix and output_name:
+        text = "Can't set both prefix and name."
+        raise Misuse(text, text)
+    return _record(output_prefix=output_prefix, output_name=output_name, **others)
 
 
 def _record(
@@ -220,5 +228,7 @@ def _check_range(what: str, value: int) -> None:
         raise UsageError(f"{what} must be 0 or positive")
 
 
-VERB = Verb("rosbag record", "Record a bag file with the contents of specified topics.", _parser, _record)
+VERB = Verb(
+    "rosbag record", "Record a bag file with the contents of specified topics.", _parser, _record_verb
+)
 COMMAND = Command("record", _parser, _record)

@@ -158,10 +158,13 @@ def _rewrite(
 
 
 def _is_readable(path: str, *, unindexed: bool) -> bool:
-    from minirospy.introspect.bags import open_reader
+    from minirospy.introspect.bags import data_size, open_reader
 
     try:
-        with open_reader(path):
+        with open_reader(path) as reader:
+            if not unindexed:
+                # This reads the headers of all chunks: where one is damaged the bag stays as it is.
+                data_size(reader)
             return True
     except (BagError, OSError) as error:
         if unindexed and isinstance(error, BagUnindexedError):
