@@ -5,6 +5,7 @@ topics with the scan open; frames a second by requestAnimationFrame. clients: te
 50 topics in fast motion: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
 soak: ten such clients and two pages in chromium, on 50 topics, a scan, and frames that move, all in fast motion: at 100 Hz, until
 each client has had the messages that an hour has at 10 Hz; memory of the server, the clients and the pages over the run.
+--pages 10: eight more pages have the 50 topics open.
 CPU is that of a process, in percent of one core.
 """
 
@@ -250,16 +251,17 @@ def measure_clients(seconds: float, rate: float) -> None:
     )
 
 
-def measure_soak(hours: float, rate: float) -> None:
-    """Print memory over a long run with ten clients and two pages; ``hours`` of 50 topics at 10 Hz."""
+def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_pages: int) -> None:
+    """Print memory over a long run with clients and pages; ``hours`` of 50 topics at 10 Hz."""
     from tests.interop.browser import Page
 
     opened = "&".join(f"open=%2Fmany%2Ft{index}" for index in range(50))
     plots = "&".join(f"path=%2Fmany%2Ft{index}%2Fdata[0]" for index in range(4))
-    trees = (f"row(topics?{opened},console)", f"row(3d,column(plot?{plots},graph))")
+    topics = f"topics?{opened}"
+    trees = [f"row({topics},console)", f"row(3d,column(plot?{plots},graph))", *[topics] * 8]
     with graph() as (server, port), contextlib.ExitStack() as stack:
         pages = []
-        for tree in trees:
+        for tree in trees[:count_of_pages]:
             pages.append(
                 Page(
                     f"http://localhost:{port}/#/layout?tree={quote(tree)}", flags=("--js-flags=--expose-gc",)
@@ -268,18 +270,19 @@ def measure_soak(hours: float, rate: float) -> None:
             stack.callback(pages[-1].close)
         start(stack, sys.executable, "-c", MANY, str(rate))
         start(stack, sys.executable, "-c", MOVING, str(rate))
-        clients = [Client(port) for _ in range(10)]
+        clients = [Client(port) for _ in range(count_of_clients)]
         for each in clients:
             stack.callback(each.close)
             each.start()
-        pages[0].wait("return document.querySelectorAll('.topics [aria-expanded=true]').length >= 50")
+        for page in (pages[0], *pages[2:]):
+            page.wait("return document.querySelectorAll('.topics [aria-expanded=true]').length >= 50")
         pages[1].wait("return Number(document.querySelector('canvas.stage')?.dataset.drawn) > 10")
         time.sleep(20)
 
         spent, started = cpu(server), time.monotonic()
         counts = [(each.messages, each.bytes) for each in clients]
         wanted = hours * 50 * 10 * 3600
-        print("soak: seconds  server  clients  page 1: heap, processes  page 2: heap, processes  (MB)")
+        print("soak: seconds  server  clients  of each page: heap, processes  (MB)")
         for step in range(13):
             while (
                 min(each.messages - count for each, (count, _) in zip(clients, counts, strict=True))
@@ -317,6 +320,10 @@ def main() -> None:
     parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients", "soak"])
     parser.add_argument("--seconds", type=float, default=10.0, help="of the measurement")
     parser.add_argument("--hours", type=float, default=1.0, help="of the soak, in slow motion")
+    parser.add_argument("--clients", type=int, default=10, metavar="N", help="of the soak, at least one")
+    parser.add_argument(
+        "--pages", type=int, default=2, choices=range(2, 11), metavar="N", help="of the soak: 2 to 10"
+    )
     parser.add_argument("--rate", type=float, default=100.0, help="of each of the 50 topics, in Hz")
     words = parser.parse_args()
     if "page" in words.what:
@@ -324,7 +331,7 @@ def main() -> None:
     if "clients" in words.what:
         measure_clients(words.seconds, words.rate)
     if "soak" in words.what:
-        measure_soak(words.hours, words.rate)
+        measure_soak(words.hours, words.rate, words.clients, words.pages)
 
 
 if __name__ == "__main__":
