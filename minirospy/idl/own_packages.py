@@ -8,7 +8,6 @@ __all__ = ["COMPILED_AHEAD", "own_definitions"]
 
 COMPILED_AHEAD = frozenset(
     [
-        "actionlib",
         "actionlib_msgs",
         "bond",
         "dynamic_reconfigure",
