@@ -254,7 +254,8 @@ class SharedGraph:
         before, self.snapshot = self.snapshot, after
         changes = compare(before, after)
         is_first, self._is_first_look = self._is_first_look, False
-        if changes or is_first or before.types != after.types:
+        has_types, self.service_types.has_news = self.service_types.has_news, False
+        if changes or is_first or has_types or before.types != after.types:
             for listener in tuple(self._listeners):
                 try:
                     listener(changes)
@@ -287,7 +288,6 @@ class SharedGraph:
 
     async def _look_up_services(self, found: Snapshot) -> None:
         """Find the types of new services, which the master does not know: their nodes do."""
-
         is_late = False
 
         async def probe(name: str, nodes: tuple[str, ...]) -> None:
@@ -313,8 +313,7 @@ class SharedGraph:
         self.service_types.keep(found.services)
         if new:
             for name, nodes in new:
-                # Until its node has answered.
-                self.service_types.failed(name, nodes)
+                self.service_types.started(name, nodes)
             # Nodes that do not answer keep nobody from what else has changed.
             await asyncio.wait([self.spawn(probe(*each)) for each in new], timeout=_PROBE_SECONDS)
             is_late = True

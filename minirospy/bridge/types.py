@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -139,6 +140,8 @@ class ServiceTypes:
     """The types of services, found once for each service and its providers."""
 
     def __init__(self) -> None:
+        self.has_news = False
+        """Whether types were found since this was set to False."""
         self._known: dict[str, tuple[tuple[str, ...], ServiceInfo | None, float]] = {}
 
     def __getitem__(self, name: str) -> ServiceInfo | None:
@@ -151,8 +154,13 @@ class ServiceTypes:
         known = self._known.get(name)
         return known is None or known[0] != nodes or (known[1] is None and time.monotonic() >= known[2])
 
+    def started(self, name: str, nodes: tuple[str, ...]) -> None:
+        """Record that a service's node is being queried: until it has answered, or failed to, it is not queried again."""
+        self._known[name] = (nodes, None, math.inf)
+
     def found(self, name: str, nodes: tuple[str, ...], header: Mapping[str, str]) -> None:
         """Record the type that a service's node has named."""
+        self.has_news = True
         self._known[name] = (nodes, _described(name, header), time.monotonic() + _AGAIN_SECONDS)
 
     def failed(self, name: str, nodes: tuple[str, ...]) -> None:

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
+import threading
 import time
 from typing import TYPE_CHECKING
 
 import pytest
 from std_msgs.msg import String
+from std_srvs.srv import Empty
 
+from minirospy.bridge import graph as bridge_graph
+from minirospy.bridge import types as bridge_types
 from minirospy.bridge.graph import SharedGraph
+from minirospy.introspect.snapshot import Snapshot
+from minirospy.wire.header import serialize_header
 from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
@@ -51,6 +58,68 @@ def test_nodes_that_do_not_answer_keep_nobody_from_the_others(bridge: Running) -
         assert client.channel("/t19")
         assert client.channels["/t19"]["schemaName"] == "odd_msgs/Odd"
         assert time.monotonic() - start < 20
+
+
+def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
+    bridge.publisher(bridge.node("talker"), "/chatter", String)
+    may_answer = threading.Event()
+    fields = {"callerid": "/late", "type": Empty._type, "md5sum": Empty._md5sum}
+
+    def answer(server: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                sock, _ = server.accept()
+                with sock:
+                    may_answer.wait()
+                    # The probe may have given up: then there is another.
+                    with contextlib.suppress(OSError):
+                        sock.sendall(serialize_header(fields))
+                        sock.recv(4096)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=answer, args=(server,), daemon=True)
+        thread.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+
+        async def register() -> None:
+            master = bridge.bridge.node._node.master
+            await master("registerService", "/late", f"rosrpc://{address}", f"http://{address}/")
+
+        bridge.run(register())
+        client = bridge.client()
+        # Topics are offered when the bridge has waited for services.
+        assert client.channel("/chatter")
+        assert "/late" not in client.services
+        may_answer.set()
+        assert client.service("/late")
+
+
+def test_service_is_looked_up_once_at_a_time(bridge: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bridge_graph, "_PROBE_SECONDS", 0.0)
+    monkeypatch.setattr(bridge_types, "_AGAIN_SECONDS", 0.0)
+    probed: list[str] = []
+    may_answer = asyncio.Event()
+
+    async def header_of(_: object, name: str) -> dict[str, str]:
+        probed.append(name)
+        await may_answer.wait()
+        return {}
+
+    async def look_up() -> None:
+        graph = SharedGraph(bridge.bridge.node)
+        for _ in range(5):
+            await graph._look_up_services(Snapshot(services={"/silent": ("/node",)}))
+            await asyncio.sleep(0)
+        assert probed == ["/silent"]
+        may_answer.set()
+        await asyncio.gather(*graph._tasks)
+        await graph._look_up_services(Snapshot(services={"/silent": ("/node",)}))
+        await asyncio.gather(*graph._tasks)
+        assert probed == ["/silent", "/silent"]
+        await graph.close()
+
+    monkeypatch.setattr(bridge_graph, "service_header", header_of)
+    bridge.run(look_up())
 
 
 @pytest.mark.parametrize("turns", range(6))
