@@ -112,9 +112,9 @@ def make_bag(
     return path.name
 
 
-def play(start: Start, *words: str, **kwargs: int) -> subprocess.Popen[str]:
+def play(start: Start, *words: str, prelude: str = "", **kwargs: int) -> subprocess.Popen[str]:
     # Subscribers connect meanwhile.
-    return start("play", *words, "--wait-for-subscribers", **kwargs)
+    return start("play", *words, "--wait-for-subscribers", prelude=prelude, **kwargs)
 
 
 def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_path: Path) -> None:
@@ -297,6 +297,11 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
     )
 
 
+STALLED = "from minirospy.recording import player; player._STALLED_SECONDS = {}"
+PATIENT = STALLED.format(1e9)
+"""Nothing but what a test does ends the wait for a subscriber."""
+
+
 def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_path: Path) -> None:
     body = "x" * 1_000_000
     name = make_bag(tmp_path / "b.bag", [("/a", i, body) for i in range(30)])
@@ -308,7 +313,7 @@ def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_
         heard.append(len(frame))
 
     ear.node.listen("/a", deliver)
-    process = play(start, name, "-i", "-q")
+    process = play(start, name, "-i", "-q", prelude=PATIENT)
     read_until(process, "Done.")
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(2.0)
@@ -316,6 +321,17 @@ def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_
     assert process.wait(GUARD) == 0
     wait_until(lambda: len(heard) >= 30)
     assert heard == [4 + len(body)] * 30
+
+
+def test_subscriber_that_takes_nothing_is_not_waited_for(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", i, "x" * 1_000_000) for i in range(30)])
+    ended = threading.Event()
+    ear.node.listen("/a", lambda *_: ended.wait(GUARD))
+    process = play(start, name, "-i", "-q", prelude=STALLED.format(0.1))
+    try:
+        assert process.wait(GUARD) == 0
+    finally:
+        ended.set()
 
 
 def test_ctrl_c_ends_the_wait_for_a_slow_subscriber(ear: Ear, start: Start, tmp_path: Path) -> None:
@@ -326,7 +342,7 @@ def test_ctrl_c_ends_the_wait_for_a_slow_subscriber(ear: Ear, start: Start, tmp_
         goes_on.wait(GUARD)
 
     ear.node.listen("/a", deliver)
-    process = play(start, name, "-i", "-q")
+    process = play(start, name, "-i", "-q", prelude=PATIENT)
     read_until(process, "Done.")
     process.send_signal(signal.SIGINT)
     assert process.wait(GUARD) == 0
