@@ -144,6 +144,10 @@ class LaunchSpec:
         yield from self.nodes
         yield from (test.node for test in self.tests)
 
+    def named_runnables(self) -> Iterator[NodeSpec]:
+        """Return those that have a name before they run."""
+        return (node for node in self.runnables() if node.base_name)
+
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
         """Return the machine that a node is to run on; None is this one. Raises LaunchError."""
         name = node.machine

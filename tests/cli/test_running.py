@@ -340,6 +340,19 @@ def test_roslaunch_without_running(package: Path, capsys: pytest.CaptureFixture[
     )
 
 
+def test_tests_without_a_name_are_not_listed(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = package / "a.test"
+    file.write_text(
+        '<launch><test test-name="" pkg="pkg" type="wait.py"/><test test-name="" ns="g" pkg="pkg" type="wait.py"/>'
+        '<test test-name="q" pkg="pkg" type="wait.py"/></launch>'
+    )
+    assert roslaunch.main(["--nodes", str(file)]) == 0
+    assert roslaunch.main(["--find-node", "/", str(file)]) == 1
+    out, err = capsys.readouterr()
+    assert out == "/q\n"
+    assert "there are: /q" in err
+
+
 def test_the_line_of_a_node_where_no_master_is_named(
     package: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

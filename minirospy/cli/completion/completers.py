@@ -271,7 +271,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     # A value that is not typed yet is not an error, and errors (collected in the list) hide no node.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
-    return _as_typed((node.name for node in spec.runnables()), cursor.word)
+    return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
 
 
 # --- the graph

@@ -350,7 +350,7 @@ def _show_files(spec: LaunchSpec, _: object, __: Packages) -> None:
 
 
 def _show_nodes(spec: LaunchSpec, _: object, __: Packages) -> None:
-    print("\n".join(node.name for node in spec.runnables()))
+    print("\n".join(node.name for node in spec.named_runnables()))
 
 
 def _show_params(spec: LaunchSpec, _: object, __: Packages) -> None:
@@ -369,10 +369,10 @@ def _show_file_of(spec: LaunchSpec, name: str, _: Packages) -> None:
 
 def _node(spec: LaunchSpec, name: str) -> NodeSpec:
     wanted = "/" + name.strip("/")
-    for node in spec.runnables():
+    for node in spec.named_runnables():
         if node.name == wanted:
             return node
-    known = [node.name for node in spec.runnables()]
+    known = [node.name for node in spec.named_runnables()]
     hint = "" if not known else f"there are: {', '.join(known)}"
     raise NotFoundError("node", name, known, hint)
 
