@@ -157,7 +157,7 @@ class KeptParameters:
 
     def __init__(self) -> None:
         self._notifier: Callable[[str, object], object] | None = None
-        current_session().parameter_listeners.append(self._has_changed)
+        current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
         """Return a parameter that get_param_cached was called for before. Raises KeyError."""
@@ -175,7 +175,7 @@ class KeptParameters:
         if self._notifier:
             self._notifier(key, value)
 
-    def _has_changed(self, key: str, value: object) -> None:
+    def _dispatch(self, key: str, value: object) -> None:
         self.update(key, value)
 
 

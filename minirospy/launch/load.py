@@ -608,10 +608,11 @@ class _File:
 
 def _folder(tag: Tag) -> str:
     """Return the ``cwd`` of a node; "" where it is not there. Raises LaunchError."""
+    text = tag.optional("cwd")
+    if text is None:
+        return ""
     # ROS knows this one in lower case, too.
-    if not tag.has("cwd") or tag.optional("cwd") == "ros_home":
-        return "ROS_HOME" if tag.has("cwd") else ""
-    return tag.choice("cwd", ("ROS_HOME", "node"))
+    return "ROS_HOME" if text == "ros_home" else tag.choice("cwd", ("ROS_HOME", "node"))
 
 
 def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:

@@ -29,14 +29,14 @@ class Ros1Peer:
             config.insert_json5(key, json.dumps(value))
         self.session: Any = zenoh.open(config)
         self.namespace = namespace
-        self.heard: dict[str, int] = {}
+        self.received: dict[str, int] = {}
         """The beacons of others, by their keys from the kind on, and how many of each."""
         self._beacons: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._ended = threading.Event()
         self._lock = threading.Lock()
         pattern = f"ros1_discovery_info/*/*/*/*/{namespace}/*/**"
-        self._declared.append(self.session.declare_subscriber(pattern, self._beacon_heard))
+        self._declared.append(self.session.declare_subscriber(pattern, self._beacon_arrived))
         self._thread = threading.Thread(target=self._beat, daemon=True)
         self._thread.start()
 
@@ -63,8 +63,8 @@ class Ros1Peer:
         with self._lock:
             self._beacons.pop(f"ros1_discovery_info/*/{kind}/{self.key(type_, md5sum, name)}").undeclare()
 
-    def has_heard(self, kind: str, type_: str, md5sum: str, name: str) -> bool:
-        return f"{kind}/{self.key(type_, md5sum, name)}" in self.heard
+    def has_received(self, kind: str, type_: str, md5sum: str, name: str) -> bool:
+        return f"{kind}/{self.key(type_, md5sum, name)}" in self.received
 
     def publisher(self, type_: str, md5sum: str, name: str) -> Any:
         return self.session.declare_publisher(
@@ -121,9 +121,9 @@ class Ros1Peer:
         if not self.session.is_closed():
             self.session.close()
 
-    def _beacon_heard(self, sample: Any) -> None:
+    def _beacon_arrived(self, sample: Any) -> None:
         key = str(sample.key_expr).split("/", 2)[2]
-        self.heard[key] = self.heard.get(key, 0) + 1
+        self.received[key] = self.received.get(key, 0) + 1
 
     def _beat(self) -> None:
         while not self._ended.wait(PERIOD):

@@ -91,7 +91,7 @@ def test_topic_of_here_reaches_the_bridge(fleet: Fleet, peer: Callable[..., Ros1
     chat = publisher(fleet, place, "/arm/chat", String)
     running = gateway(place, listens=True)
     robot = peer()
-    fleet.until(lambda: robot.has_heard("pub", *STRING, "/arm/chat"))
+    fleet.until(lambda: robot.has_received("pub", *STRING, "/arm/chat"))
     # Nobody reads: nothing is subscribed to here.
     assert running.topics["/arm/chat"].outbound is None
 
@@ -111,7 +111,7 @@ def test_topic_of_the_bridge_is_shown_here_and_passed(fleet: Fleet, peer: Callab
     robot.announce("pub", *STRING, "/arm/chat")
     fleet.until_shown(place, "/arm/chat")
     found = collect(fleet, place, "/arm/chat", String)
-    fleet.until(lambda: robot.has_heard("sub", *STRING, "/arm/chat"))
+    fleet.until(lambda: robot.has_received("sub", *STRING, "/arm/chat"))
     # What is announced can be used: the first message arrives.
     sender = robot.publisher(*STRING, "/arm/chat")
     for number in range(100):
@@ -127,16 +127,16 @@ def test_messages_without_any_beacon_are_passed_both_ways(
     """A bridge is silent while another puts the same beacon; a program on Zenoh alone has none."""
     place = fleet.place()
     chat = publisher(fleet, place, "/out", String)
-    heard = collect(fleet, place, "/in", String)
+    received = collect(fleet, place, "/in", String)
     gateway(place, listens=True)
     robot = peer()
     found = robot.subscribe(*STRING, "/out")
     fleet.run(chat.wait_for_subscribers(1, SECONDS))
     fleet.run(chat.publish("to zenoh"))
     fleet.until(lambda: found == [text("to zenoh")])
-    fleet.until(lambda: robot.has_heard("sub", *STRING, "/in"))
+    fleet.until(lambda: robot.has_received("sub", *STRING, "/in"))
     robot.publisher(*STRING, "/in").put(text("from zenoh"))
-    fleet.until(lambda: [each.data for each in heard] == ["from zenoh"])
+    fleet.until(lambda: [each.data for each in received] == ["from zenoh"])
 
 
 def test_subscriber_of_the_bridge_is_shown_here(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
@@ -157,7 +157,7 @@ def test_services_are_called_both_ways(fleet: Fleet, peer: Callable[..., Ros1Pee
     asked = serve(fleet, place, "/lamp")
     gateway(place, listens=True)
     robot = peer()
-    fleet.until(lambda: robot.has_heard("srv", *SWITCH, "/lamp"))
+    fleet.until(lambda: robot.has_received("srv", *SWITCH, "/lamp"))
     assert robot.call(*SWITCH, "/lamp", b"\1") == b"\1\2\0\0\0on"
     with pytest.raises(RuntimeError, match="the lamp is stuck"):
         robot.call(*SWITCH, "/lamp", b"\0")
@@ -237,7 +237,7 @@ def test_what_ends_there_leaves_this_master_and_comes_again(
     again.announce("pub", *STRING, "/chat")
     fleet.until_shown(place, "/chat")
     found = collect(fleet, place, "/chat", String)
-    fleet.until(lambda: again.has_heard("sub", *STRING, "/chat"))
+    fleet.until(lambda: again.has_received("sub", *STRING, "/chat"))
     again.publisher(*STRING, "/chat").put(text("back"))
     fleet.until(lambda: [each.data for each in found] == ["back"])
 
@@ -249,13 +249,13 @@ def test_what_ends_here_is_announced_no_more(fleet: Fleet, peer: Callable[..., R
     running = gateway(place, listens=True)
     robot = peer()
     fleet.until(
-        lambda: robot.has_heard("pub", *STRING, "/chat") and robot.has_heard("pub", *STRING, "/other")
+        lambda: robot.has_received("pub", *STRING, "/chat") and robot.has_received("pub", *STRING, "/other")
     )
     fleet.run(chat.close())
     fleet.until(lambda: running.status()["announced"] == 1)
-    robot.heard.clear()
-    fleet.until(lambda: sum(robot.heard.values()) >= 3)
-    assert not robot.has_heard("pub", *STRING, "/chat")
+    robot.received.clear()
+    fleet.until(lambda: sum(robot.received.values()) >= 3)
+    assert not robot.has_received("pub", *STRING, "/chat")
     fleet.run(other.close())
 
 
@@ -290,28 +290,28 @@ def test_gateways_of_two_masters_pass_these_keys_without_loops(
     said = {name: publisher(fleet, place, "/chat", String) for name, place in places.items()}
     found = {name: collect(fleet, place, "/chat", String) for name, place in places.items()}
 
-    def heard(of: str) -> list[list[str]]:
+    def received(of: str) -> list[list[str]]:
         """Return what everybody got of a turn."""
         texts = [*([each.data for each in messages] for messages in found.values())]
         every = [*texts, [each[4:].decode() for each in seen]]
         return [[each for each in messages if each.startswith(of)] for messages in every]
 
-    def all_heard(turn: str) -> bool:
-        return all(len(messages) >= 2 for messages in heard(turn))
+    def all_received(turn: str) -> bool:
+        return all(len(messages) >= 2 for messages in received(turn))
 
     async def reaches_all() -> bool:
         for name, each in said.items():
             await each.publish(f"try of {name}")
-        return all(set(messages) == {"try of one", "try of two"} for messages in heard("try"))
+        return all(set(messages) == {"try of one", "try of two"} for messages in received("try"))
 
     # Until everybody is connected to everybody.
     fleet.until(reaches_all)
     for turn in ("first", "second"):
         for name, each in said.items():
             fleet.run(each.publish(f"{turn} of {name}"))
-        fleet.until(partial(all_heard, turn))
+        fleet.until(partial(all_received, turn))
     # What came back would have come before the second turn.
-    assert [sorted(messages) for messages in heard("first")] == [["first of one", "first of two"]] * 3
+    assert [sorted(messages) for messages in received("first")] == [["first of one", "first of two"]] * 3
 
 
 def test_a_second_gateway_of_these_keys_is_refused(fleet: Fleet) -> None:
@@ -334,8 +334,8 @@ def test_what_another_gateway_of_this_master_passes_is_not_announced(
     serve(fleet, place, "/lamp", node="ros1_to_zenoh_bridge2")
     publisher(fleet, place, "/other", String)
     robot = peer()
-    fleet.until(lambda: robot.has_heard("pub", *STRING, "/other"))
-    assert [key.partition("/")[0] for key in robot.heard] == ["pub"]
+    fleet.until(lambda: robot.has_received("pub", *STRING, "/other"))
+    assert [key.partition("/")[0] for key in robot.received] == ["pub"]
 
     # Nor is a message, before the graph has been looked at.
     found = robot.subscribe(*STRING, "/chat")
@@ -409,10 +409,10 @@ def test_namespaces_and_names_keep_robots_apart(fleet: Fleet, peer: Callable[...
     for each, name in ((far, "/a_far"), (near, "/b_near"), (near, "/a_near"), (every, "/a_every")):
         each.announce("pub", *STRING, name)
     fleet.until_shown(place, "/a_near", "/a_every")
-    fleet.until(lambda: near.has_heard("pub", *STRING, "/a_here"))
+    fleet.until(lambda: near.has_received("pub", *STRING, "/a_here"))
     assert not place.names() & {"/a_far", "/b_near"}
-    assert not near.has_heard("pub", *STRING, "/b_here")
-    assert not far.has_heard("pub", *STRING, "/a_here")
+    assert not near.has_received("pub", *STRING, "/b_here")
+    assert not far.has_received("pub", *STRING, "/a_here")
 
 
 def test_the_status_names_what_is_passed(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
@@ -421,7 +421,7 @@ def test_the_status_names_what_is_passed(fleet: Fleet, peer: Callable[..., Ros1P
     running = gateway(place, listens=True)
     robot = peer()
     robot.announce("pub", *STRING, "/chat")
-    fleet.until(lambda: robot.has_heard("sub", *STRING, "/chat"))
+    fleet.until(lambda: robot.has_received("sub", *STRING, "/chat"))
     robot.publisher(*STRING, "/chat").put(text("hello"))
     fleet.until(lambda: found)
     status: Any = running.status()

@@ -106,25 +106,25 @@ def test_namespaces_are_one_chunk_of_a_key(text: str) -> None:
 
 def test_a_resource_is_lost_after_its_last_beacon() -> None:
     seen = Sightings()
-    assert seen.heard(CHAT, 100.0)
-    assert not seen.heard(CHAT, 101.0)
+    assert seen.received(CHAT, 100.0)
+    assert not seen.received(CHAT, 101.0)
     assert not seen.forget_lost(101.0 + LOST_SECONDS)
     assert list(seen) == [CHAT]
     assert seen.forget_lost(101.1 + LOST_SECONDS)
     assert list(seen) == []
-    assert seen.heard(CHAT, 200.0)
+    assert seen.received(CHAT, 200.0)
 
 
 def test_resources_of_others_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros1_keys, "MOST_RESOURCES", 2)
     seen = Sightings()
     for number in range(2):
-        assert seen.heard(CHAT._replace(name=f"/t{number}"), 0.0)
+        assert seen.received(CHAT._replace(name=f"/t{number}"), 0.0)
     with pytest.raises(BridgeError, match="more than 2"):
-        seen.heard(CHAT, 0.0)
-    assert not seen.heard(CHAT._replace(name="/t0"), 3.0)
+        seen.received(CHAT, 0.0)
+    assert not seen.received(CHAT._replace(name="/t0"), 3.0)
     assert seen.forget_lost(1.0 + LOST_SECONDS)
-    assert seen.heard(CHAT, 6.0)
+    assert seen.received(CHAT, 6.0)
 
 
 def test_beacons_are_due_each_period() -> None:
@@ -142,12 +142,12 @@ def test_a_beacon_that_another_puts_is_silent_until_that_one_ends() -> None:
     beacons = Beacons(lambda: next(chances))
     beacons.update(["a"], 0.0)
     assert beacons.due(0.0) == ["a"]
-    beacons.heard("a")
-    beacons.heard("not ours")
+    beacons.received("a")
+    beacons.received("not ours")
     assert beacons.due(1.0) == ["a"]
-    beacons.heard("a")
+    beacons.received("a")
     assert beacons.due(2.0) == []
-    beacons.heard("a")
+    beacons.received("a")
     assert beacons.due(3.0) == []
     # The other has ended: after a part of a period that chance gives.
     assert beacons.due(4.0) == []
@@ -173,7 +173,7 @@ def test_of_many_that_put_a_beacon_some_goes_on() -> None:
                 gap, last = max(gap, now - last), now
                 for other in all_:
                     if other is not each:
-                        other.heard("a")
+                        other.received("a")
     assert gap < LOST_SECONDS
     assert put < 60 * 20 / 4
 

@@ -346,10 +346,10 @@ def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
         "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up'); time.sleep(600)"
     )
 
-    def deaf(name: str, command: list[str], **options: Any) -> Process:
+    def ignoring(name: str, command: list[str], **options: Any) -> Process:
         return start_process(name, [sys.executable, "-c", program], **options)
 
-    monkeypatch.setattr(recording, "start_process", deaf)
+    monkeypatch.setattr(recording, "start_process", ignoring)
     monkeypatch.setattr(recording, "_TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
     wait_until(lambda: "up" in started._lines)

@@ -7,7 +7,7 @@ Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ro
 
 HEX is the name of the type, two hexadecimal digits a byte; NAME has no slash in front; NAMESPACE is ``*``, which meets every
 other, unless bridges are kept apart. KIND is pub, sub or srv; cl is for clients of services, which no bridge announces. A beacon
-is empty, and is put every second. While a bridge hears its own key from another, it may stop its own beacons: they say that
+is empty, and is put every second. While a bridge receives its own key from another, it may stop its own beacons: they say that
 somebody has the resource, not who, nor how many.
 """
 
@@ -121,7 +121,7 @@ def beacon_key(resource: Resource, namespace: str) -> str:
 
 
 def beacon_pattern(namespace: str) -> str:
-    """Return what matches the beacons that bridges of a namespace hear."""
+    """Return what matches the beacons that bridges of a namespace receive."""
     return f"{_ROOT}/*/*/*/*/{namespace}/*/**"
 
 
@@ -152,7 +152,7 @@ def parse_beacon(key: str) -> Resource | None:
 @dataclass
 class _Beacon:
     due: float
-    is_heard: bool = False
+    is_received: bool = False
     is_silent: bool = False
     is_resuming: bool = False
 
@@ -173,11 +173,11 @@ class Beacons:
         before = self._beacons
         self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
 
-    def heard(self, key: str) -> None:
+    def received(self, key: str) -> None:
         """Record a beacon of another."""
         beacon = self._beacons.get(key)
         if beacon:
-            beacon.is_heard = True
+            beacon.is_received = True
 
     def due(self, now: float) -> list[str]:
         """Return the keys to put at a time in seconds."""
@@ -185,9 +185,9 @@ class Beacons:
         for key, beacon in self._beacons.items():
             if beacon.due > now:
                 continue
-            is_heard, beacon.is_heard = beacon.is_heard, False
+            is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
-            if is_heard:
+            if is_received:
                 # One of those that put it goes on: which one is left to chance.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
@@ -203,7 +203,7 @@ class Beacons:
 
 
 class Sightings:
-    """The resources of others whose beacons have come of late."""
+    """The resources of others whose beacons have come recently."""
 
     def __init__(self) -> None:
         self._seen: dict[Resource, float] = {}
@@ -211,7 +211,7 @@ class Sightings:
     def __iter__(self) -> Iterator[Resource]:
         return iter(self._seen)
 
-    def heard(self, resource: Resource, now: float) -> bool:
+    def received(self, resource: Resource, now: float) -> bool:
         """Record a beacon; return whether the resource is new. Raise BridgeError where there are too many."""
         is_new = resource not in self._seen
         if is_new and len(self._seen) >= MOST_RESOURCES:

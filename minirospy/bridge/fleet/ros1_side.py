@@ -52,7 +52,7 @@ _MARKER = "/minirospy/ros1_keys"
 """Each gateway of these keys subscribes to this topic, before all others: so those of one master know each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"
-"""How the nodes of zenoh-bridge-ros1 itself are called, unless told otherwise."""
+"""How the nodes of zenoh-bridge-ros1 itself are called by default."""
 _AGGREGATE = "/rosout_agg"
 _BEAT_SECONDS = 0.2
 _CALL_SECONDS = 3600.0
@@ -105,7 +105,7 @@ class Ros1Side:
         self._left_out = RateLimitedLogger(_log)
         self._faults = Faults(_log, "passing the keys of zenoh-bridge-ros1")
         self._marker: RawSubscription | None = None
-        self._beacons_heard: Later | None = None
+        self._beacons_received: Later | None = None
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
@@ -118,8 +118,8 @@ class Ros1Side:
                 "crashed, run `rosnode cleanup`"
             )
         await self.look()
-        self._beacons_heard = self._network.subscribe(
-            beacon_pattern(self.namespace), self._heard, from_others=True
+        self._beacons_received = self._network.subscribe(
+            beacon_pattern(self.namespace), self._beacon_arrived, from_others=True
         )
         self._tasks = [
             asyncio.ensure_future(keep_running(lambda: self.graph.watch(self.look), self._faults)),
@@ -132,10 +132,10 @@ class Ros1Side:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        for declared in (self._beacons_heard, *self._outlets.values(), *self._answered.values()):
+        for declared in (self._beacons_received, *self._outlets.values(), *self._answered.values()):
             if declared:
                 declared.undeclare()
-        self._beacons_heard, self._outlets, self._answered = None, {}, {}
+        self._beacons_received, self._outlets, self._answered = None, {}, {}
         topics, services, marker = self.topics, self.services, self._marker
         self.topics, self.services, self._marker = {}, {}, None
         await asyncio.gather(
@@ -148,7 +148,7 @@ class Ros1Side:
     async def look(self) -> bool:
         """Announce the graph as it is now; whether it has changed. Raises MasterUnreachableError, RpcError."""
         changed = await self.graph.look()
-        # What is announced can be used already: a bridge calls and sends as soon as it hears a beacon.
+        # What is announced can be used already: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()
         self._announce()
         return changed
@@ -188,7 +188,7 @@ class Ros1Side:
             node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
         }
         found = bridges | set(snapshot.subscribers.get(_MARKER, ())) - {self._node.name}
-        for node in sorted(found - self._others) if self._beacons_heard else ():
+        for node in sorted(found - self._others) if self._beacons_received else ():
             _log.warning(
                 "%s passes the keys of zenoh-bridge-ros1 on this master, too: messages come twice. End one of the two",
                 node,
@@ -231,14 +231,14 @@ class Ros1Side:
 
     # --- what others have
 
-    def _heard(self, key: str, _: bytes, __: bytes) -> None:
+    def _beacon_arrived(self, key: str, _: bytes, __: bytes) -> None:
         """Take a beacon. In a thread of Zenoh's."""
         try:
             resource = parse_beacon(key)
             with self._lock:
-                self._beacons.heard(key)
+                self._beacons.received(key)
                 if resource and self._allows(resource):
-                    self._has_news |= self._sightings.heard(resource, time.monotonic())
+                    self._has_news |= self._sightings.received(resource, time.monotonic())
         except BridgeError as error:
             self.refused += 1
             self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MOST_REASON])
