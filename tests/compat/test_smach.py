@@ -10,6 +10,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import tracemalloc
 from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -265,6 +266,18 @@ def test_userdata_makes_plain_values_alone(what: str, capsys: pytest.CaptureFixt
     assert (capsys.readouterr().out, String._md5sum) == ("", "992ce8a1687cec8c8bd883ec73ca41d1")
 
 
+def test_userdata_takes_no_more_memory_than_it_has_bytes() -> None:
+    data = b"\x80\x05}U\x01a" + pickle.BYTEARRAY8 + (1 << 28).to_bytes(8, "little") + b"xs."
+    text = base64.b64encode(data).decode()
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match="not userdata"):
+            unpickle_userdata(text)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
 def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
     numpy = pytest.importorskip("numpy")
     # The state takes the flag of objects away: numpy would follow what the bytes of the array point to.
@@ -273,11 +286,22 @@ def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
     array = b"cnumpy.core.numeric\n_frombuffer\n(U\x08AAAAAAAA" + dtype + b"K\x01\x85U\x01CtR"
     with pytest.raises(ValueError, match="not userdata: an array of"):
         unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + array + b"s.").decode())
-    # Nor may a state make the elements of an array larger than its memory.
-    larger = (3, "|", None, None, None, 800, 1, 0)
-    dtype = b"cnumpy\ndtype\n(U\x02S8\x89\x88tR" + pickle.dumps(larger, 2)[2:-1] + b"b"
-    with pytest.raises(ValueError, match="not userdata: an array of"):
-        unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + dtype + b"s.").decode())
+    # Nor may a state make the elements of an array larger than its memory, or negative.
+    for size in (800, -1):
+        other = (3, "|", None, None, None, size, 1, 0)
+        dtype = b"cnumpy\ndtype\n(U\x02S8\x89\x88tR" + pickle.dumps(other, 2)[2:-1] + b"b"
+        with pytest.raises(ValueError, match="not userdata: an array of"):
+            unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + dtype + b"s.").decode())
+
+
+def test_array_in_the_memory_of_another_is_refused() -> None:
+    numpy = pytest.importorskip("numpy")
+    # A second state of the other one would free it.
+    one = pickle.dumps(numpy.zeros(100), 2)[2:-1]
+    dtype = b"cnumpy\ndtype\n(U\x02f8\x89\x88tR"
+    array = b"cnumpy.core.numeric\n_frombuffer\n(" + one + dtype + b"Kd\x85U\x01CtR"
+    with pytest.raises(ValueError, match="not userdata: an array in ndarray"):
+        unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + array + b"s.").decode())
 
 
 @pytest.mark.parametrize("text", ["", "?", "AAAA", "gAJLBS4="])

@@ -23,9 +23,9 @@ __all__ = ["pickle_userdata", "unpickle_userdata"]
 _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
 """Python 2's and older numpy's names of modules."""
 _MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
-_SIMPLE = "biufcSU"
+_TEXTS = "SU"
+_SIMPLE = "biufc" + _TEXTS
 """Kinds of numpy's types: numbers and texts. Others may have pointers in their bytes."""
-_DTYPE_STATE = 8
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
@@ -67,6 +67,8 @@ class _Unpickler(pickle._Unpickler):
     """Python's own in Python: what it does to an object can be looked at before."""
 
     stack: list[Any]
+    read: Callable[[int], bytes]
+    append: Callable[[object], None]
 
     def find_class(self, module: str, name: str) -> object:
         for old, new in _RENAMED.items():
@@ -90,7 +92,16 @@ class _Unpickler(pickle._Unpickler):
             _check_dtype(target, state)
         _set_state(self)  # type: ignore[arg-type]
 
-    dispatch: ClassVar[dict[int, Any]] = {**pickle._Unpickler.dispatch, pickle.BUILD[0]: load_build}
+    def load_bytearray8(self) -> None:
+        """Make a bytearray of the bytes that are there; pickle's own has the size that the text names, before it reads them."""
+        size = int.from_bytes(self.read(8), "little")
+        self.append(bytearray(self.read(size)))
+
+    dispatch: ClassVar[dict[int, Any]] = {
+        **pickle._Unpickler.dispatch,
+        pickle.BUILD[0]: load_build,
+        pickle.BYTEARRAY8[0]: load_bytearray8,
+    }
 
 
 def _classes(name: str, kind: str) -> tuple[Any, ...]:
@@ -102,16 +113,11 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 
 def _check_dtype(target: Any, state: Any) -> None:
-    """Raise UnpicklingError unless a state leaves the size, the fields and the flags of a type of numpy as they are."""
-    size, alignment, flags = (-1, target.itemsize), (-1, target.alignment), target.flags
-    if (
-        target.kind not in _SIMPLE
-        or len(state) != _DTYPE_STATE
-        or state[2:5] != (None, None, None)
-        or state[5] not in size
-        or state[6] not in alignment
-        or state[7] != flags
-    ):
+    """Raise UnpicklingError unless a state leaves a type of numpy as it is, but for its byte order."""
+    # As numpy writes it. It would take over any size of a text, also a negative one, and any flags.
+    size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
+    allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
+    if target.kind not in _SIMPLE or tuple(state) not in allowed:
         raise pickle.UnpicklingError(f"an array of {target}")
 
 
@@ -155,15 +161,20 @@ def _empty_array(*_: object) -> object:
 
 
 def _array(data: Any, dtype: Any, shape: Any, order: Any) -> object:
-    import numpy as np
-
-    return np.frombuffer(data, dtype).reshape(shape, order=order)
+    return _from_buffer(data, dtype).reshape(shape, order=order)
 
 
 def _scalar(dtype: Any, data: Any) -> object:
+    return _from_buffer(data, dtype, 1)[0]
+
+
+def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    return np.frombuffer(data, dtype, 1)[0]
+    # Not of another array: a state that follows would free its memory.
+    if type(data) not in (bytes, bytearray):
+        raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
+    return np.frombuffer(data, dtype, count)
 
 
 _MAKERS: Mapping[str, Callable[..., object]] = {
