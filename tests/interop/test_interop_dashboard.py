@@ -588,6 +588,30 @@ def test_message_is_published_by_its_form(serve: Callable[..., Served], browse: 
 
 
 @needs_chromium
+def test_form_stays_when_the_publisher_of_its_topic_leaves(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    leaving = publisher(served, "/cmd_vel", Twist)
+    robot = served.node("robot")
+
+    async def listen() -> Any:
+        return await robot.subscribe("/cmd_vel", Twist)
+
+    subscription = served.run(listen())
+    page = browse(address(served, "publish"))
+    page.choose("select[aria-label=Topic]", "/cmd_vel")
+    page.wait_text(".form", "angular")
+    page.type("input[name=x]", "0.5")
+    page.evaluate("document.querySelector('.form').isOld = true")
+    served.run(leaving.close())
+    page.wait("return document.querySelector(\"input[aria-label='Its type']\").checkVisibility()")
+    page.click("button", "Publish once")
+    assert served.run(subscription.next(PATIENCE)).linear.x == 0.5
+    assert page.evaluate("document.querySelector('.form').isOld")
+
+
+@needs_chromium
 def test_topic_that_nobody_publishes_is_published(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:

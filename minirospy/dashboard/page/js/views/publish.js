@@ -52,7 +52,7 @@ export class Publish {
     const isOpen = this.link.state === "open" && this.link.mayWrite;
     this.fresh.hidden = !isOpen || Boolean(channel) || !(this.isNew || this.topic);
     this.name.hidden = this.choice.value !== NEW;
-    if (isOpen && this.topic && !channel && this.asked !== this.topic) this.describe("");
+    if (isOpen && this.topic && !channel && !this.schema && this.asked !== this.topic) this.describe("");
     // A form that is in use stays: the channel may be that of its own messages.
     if (channel && channel.schema !== this.schema && !this.sent) this.show(channel);
     else if (!this.schema) fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" || this.link.mayWrite ? "Choose a topic: its type becomes a form." : "This token is read-only: it publishes nothing."));
