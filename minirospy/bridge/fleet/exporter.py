@@ -110,7 +110,7 @@ class Exporter:
         self.outbound, self.inbound = {}, {}
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; whether it has changed. Raises MasterUnreachableError, RpcError."""
+        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
         changed = await self.graph.look()
         self._announce()
         await self._adjust()

@@ -146,7 +146,7 @@ class Ros1Side:
             await marker.close()
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; whether it has changed. Raises MasterUnreachableError, RpcError."""
+        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
         changed = await self.graph.look()
         # What is announced can be used already: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()

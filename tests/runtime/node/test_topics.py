@@ -742,7 +742,7 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
     assert "has restarted: registered again" in caplog.text
 
 
-def test_a_node_at_the_limit_of_threads_registers_at_every_master_that_restarts(
+def test_node_at_the_limit_of_threads_registers_with_restarted_masters(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def refuse(*_: object) -> None:
