@@ -451,9 +451,10 @@ class _File:
         if replace(other, file=machine.file, line=machine.line) != machine:
             where = f"{other.file}:{other.line}"
             raise tag.error(f"machine [{machine.name}] is declared otherwise at {where}")
-        if tag.choice("default", ("false", "true", "never")) == "true":
-            return replace(scope, machine=machine.name)
-        return scope
+        default = (tag.optional("default") or "false").lower()
+        if default not in ("false", "true", "never"):
+            raise tag.error(f"default must be one of 'false', 'true', 'never', not '{default}'")
+        return replace(scope, machine=machine.name) if default == "true" else scope
 
     def _master(self, tag: Tag, scope: _Scope) -> _Scope:
         self._spec.warnings.append(tag.error("ignoring defunct <master /> tag"))

@@ -153,7 +153,8 @@ def test_default_machine_is_that_of_the_nodes_that_follow(packages: Packages, tm
         '<launch><node name="c" pkg="p" type="t"/><machine name="k" address="10.0.0.2" default="true"/></launch>'
     )
     body = (
-        '<node name="a" pkg="p" type="t"/><group><machine name="m" address="10.0.0.1" default="true"/></group>'
+        '<node name="a" pkg="p" type="t"/><group><machine name="m" address="10.0.0.1" default="True"/></group>'
+        '<machine name="other" address="10.0.0.3" default=""/>'
         f'<node name="b" pkg="p" type="t"/><include file="{inner}"/><node name="d" pkg="p" type="t"/>'
         '<node name="e" pkg="p" type="t" machine="m"/>'
     )
@@ -241,6 +242,10 @@ def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
         ('<rosparam ns="/">[1]</rosparam>', "Cannot load non-dictionary types into global namespace '/'"),
         ('<machine name="m"/>', "missing required attribute: 'address'"),
         ('<machine name="m" address="a" timeout="0"/>', "positive number"),
+        (
+            '<machine name="m" address="a" default="x"/>',
+            "default must be one of 'false', 'true', 'never', not 'x'",
+        ),
         ('<machine name="m" address="a" ros-root="/x"/>', "use env-loader"),
         ('<machine name="m" address="a"><env name="a" value="b"/></machine>', "use env-loader"),
         ('<machine name="m" address="a"/><machine name="m" address="b"/>', "declared otherwise"),

@@ -341,7 +341,7 @@ class Test(Node):
         """Return the test of a launch file."""
         node = spec.node
         return cls(
-            spec.test_name, node.package, node.type, node.base_name, node.namespace, None, node.args, node.remaps,
+            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
             node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
         )  # fmt: skip
 
