@@ -211,11 +211,11 @@ class Sdk:
         )
 
         def call():
+            # It does not wait for the service, but its whole time limit for the response of nobody.
+            while not client.querier.matching_status.matching:
+                time.sleep(0.02)
             for fields in command["fields"]:
-                found = None
-                while found is None:
-                    # It does not wait for the service.
-                    found = client.call(**fields)
+                found = client.call(**fields)
                 say("answer", topic=topic, fields={"success": found.success, "message": found.message})
 
         threading.Thread(target=call, daemon=True).start()
