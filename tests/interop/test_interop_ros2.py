@@ -15,6 +15,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable, Coroutine, Iterator, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,6 +23,7 @@ from typing import Any, TypeVar
 import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from rosbags.typesys import Stores, get_typestore
+from rosgraph_msgs.msg import Log
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
@@ -60,6 +62,11 @@ TYPES = [
 
 RULES = """
 - {ros1_package_name: actionlib_tutorials, ros1_action_name: Fibonacci, ros2_package_name: test_msgs, ros2_action_name: Fibonacci}
+- ros1_package_name: rospy_tutorials
+  ros1_message_name: HeaderString
+  ros2_package_name: diagnostic_msgs
+  ros2_message_name: KeyValue
+  fields_1_to_2: {data: value}
 """
 
 
@@ -415,6 +422,93 @@ def _until_received(came: queue.Queue[bytes], value: bytes, send: Callable[[], N
             while came.get(timeout=1.0) != value:
                 pass
             return
+
+
+def test_a_node_of_ros2_that_restarts_is_bridged_again(scene: Scene) -> None:
+    subscription, came = scene.subscribe("/again/back")
+    publisher = scene.advertise("/again/there", "std_msgs/String", latch=True)
+    scene.publish(publisher, text("a"))
+    for _ in range(2):
+        peer = Peer(scene.environment)
+        try:
+            peer.do("publish", "/again/back", type="std_msgs/String", data="000100000200000062000000")
+            assert came.get(timeout=LIMIT) == text("b")
+            peer.do("subscribe", "/again/there", type="std_msgs/String", latched=True)
+            assert peer.message("/again/there") == b"\2\0\0\0a\0\0\0"
+        finally:
+            peer.close()
+        scene.until(lambda graph: "/again/back" not in graph.publishers)
+    scene.end(subscription)
+    scene.end(publisher)
+
+
+def test_messages_of_a_best_effort_publisher_come(scene: Scene) -> None:
+    data = sample("sensor_msgs/Imu")
+    cdr = bytes(get_typestore(Stores.ROS2_JAZZY).ros1_to_cdr(data, "sensor_msgs/msg/Imu"))
+    subscription, came = scene.subscribe("/imu")
+    # The first of them may be lost.
+    publish = partial(
+        scene.peer.do, "publish", "/imu", type="sensor_msgs/Imu", reliable=False, data=cdr.hex()
+    )
+    _until_received(came, bytes(4) + data[4:], publish)
+    scene.end(subscription)
+    scene.peer.do("close", "/imu")
+
+
+def test_a_rule_for_messages_passes_the_fields_that_it_names(scene: Scene) -> None:
+    publisher = scene.advertise("/ruled", "rospy_tutorials/HeaderString", latch=True)
+    scene.publish(publisher, sample("std_msgs/Header") + text("abc"))
+    scene.peer.do("subscribe", "/ruled", type="diagnostic_msgs/KeyValue", latched=True)
+    assert scene.peer.message("/ruled") == b"\1\0\0\0\0\0\0\0" + b"\4\0\0\0abc\0"
+    scene.end(publisher)
+    scene.peer.do("close", "/ruled")
+
+
+def test_the_time_of_a_simulation_passes_both_ways(scene: Scene) -> None:
+    time = (1_700_000_000).to_bytes(4, "little") + (500_000_000).to_bytes(4, "little")
+    subscription, came = scene.subscribe("/clock")
+    scene.peer.do("publish", "/clock", type="rosgraph_msgs/Clock", data="00010000" + time.hex())
+    assert came.get(timeout=LIMIT) == time
+    scene.end(subscription)
+    scene.peer.do("close", "/clock")
+
+    scene.peer.do("subscribe", "/clock", type="rosgraph_msgs/Clock", latched=True)
+    publisher = scene.advertise("/clock", "rosgraph_msgs/Clock", latch=True)
+    scene.publish(publisher, time)
+    assert scene.peer.message("/clock") == time
+    scene.end(publisher)
+    scene.peer.do("close", "/clock")
+
+
+def test_log_lines_pass_both_ways(scene: Scene) -> None:
+    program = """
+import rclpy
+rclpy.init()
+node = rclpy.create_node("talker")
+node.create_timer(0.1, lambda: node.get_logger().warning("the battery is low"))
+rclpy.spin(node)
+"""
+    subscription, came = scene.subscribe("/rosout")
+    with running([str(PYTHON), "-c", program], scene.environment):
+        line: Any = Log()
+        while line.name != "talker":
+            line = Log().deserialize(came.get(timeout=LIMIT))
+    assert (line.level, line.msg) == (Log.WARN, "the battery is low")
+    scene.end(subscription)
+
+    publisher = scene.advertise("/rosout", "rosgraph_msgs/Log", latch=True)
+    buffer = BytesIO()
+    Log(level=Log.ERROR, name="/motor", msg="it is hot").serialize(buffer)
+    scene.publish(publisher, buffer.getvalue())
+    scene.peer.do("subscribe", "/rosout", type="rcl_interfaces/Log", latched=True)
+    found = b""
+    while b"/motor" not in found:
+        found = scene.peer.message("/rosout")
+    # After the time: ERROR is 40 in ROS 2.
+    assert found[8] == 40
+    assert b"it is hot" in found
+    scene.end(publisher)
+    scene.peer.do("close", "/rosout")
 
 
 def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
