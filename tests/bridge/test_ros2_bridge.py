@@ -276,9 +276,17 @@ class FakeActionClient:
     """A client whose server accepts each goal, or refuses it."""
 
     is_ready: bool = True
+    answers: bool = True
     accepts: bool = True
     goals: list[tuple[bytes, Callable[[bytes], None], FakeGoal]] = field(default_factory=list)
     is_closed: bool = False
+    reaching: list[Future[None]] = field(default_factory=list)
+
+    def reach(self) -> Future[None]:
+        self.reaching.append(Future())
+        if self.answers:
+            self.reaching[-1].set_result(None)
+        return self.reaching[-1]
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         self.goals.append((goal, feedback, FakeGoal()))
@@ -319,6 +327,8 @@ class FakeSide:
     """A ROS 2 that a test holds in its hands."""
 
     domain = "0"
+    has_found_client = True
+    """Whether a server's responses reach the clients of its action."""
 
     def __init__(self) -> None:
         self.graph: dict[str, Ros2Topic] = {}
@@ -384,7 +394,7 @@ class FakeSide:
         return {"order": "int32"}, sequence, sequence
 
     def action_client(self, action: str, type_: str) -> FakeActionClient:
-        self.action_clients[action] = FakeActionClient()
+        self.action_clients[action] = FakeActionClient(answers=self.has_found_client)
         return self.action_clients[action]
 
     def action_server(self, action: str, type_: str, accept: Accept) -> FakeActionServer:

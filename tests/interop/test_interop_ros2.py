@@ -29,7 +29,7 @@ from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import RawService, call_raw, raw_class
 from minirospy.errors import ServiceException
-from minirospy.graph.goals import GoalState
+from minirospy.graph.goals import TERMINAL, GoalState
 from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.loop import LoopThread
@@ -748,6 +748,7 @@ def test_a_goal_of_ros1_is_aborted_when_its_server_in_ros2_ends(scene: Scene) ->
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=1))
             while goal.state is not GoalState.ACTIVE:
+                assert goal.state not in TERMINAL, goal.text
                 await asyncio.sleep(0.01)
             return client, goal
 

@@ -65,6 +65,9 @@ class Ros2ActionClient(Protocol):
     def is_ready(self) -> bool:
         """Whether a server is connected."""
 
+    def reach(self) -> Future[None]:
+        """Send a request without effect; return the future of its response: from then on no other response is lost."""
+
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return the future accepted goal, None where it is refused. It fails with BridgeError."""
 

@@ -139,6 +139,11 @@ class ActionClient:
         self._calls = calls
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
+        self._feedback_class = class_.Impl.FeedbackMessage
+        # Before the client: a server that has found the client's last end has found this one, too.
+        self._feedback = calls.node.create_subscription(
+            self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
+        )
         self._client: _RclpyActionClient = _client_class()(
             calls.node,
             class_,
@@ -148,15 +153,35 @@ class ActionClient:
             result_service_qos_profile=calls.options["qos_profile"],
             cancel_service_qos_profile=calls.options["qos_profile"],
         )
-        self._feedback_class = class_.Impl.FeedbackMessage
-        self._feedback = calls.node.create_subscription(
-            self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
-        )
 
     @property
     def is_ready(self) -> bool:
         """Return whether a server is connected. From any thread."""
         return bool(self._client.server_is_ready())
+
+    def reach(self) -> Future[None]:
+        """Cancel a goal that nobody has; return the future of the response. From any thread.
+
+        A server finds a client's ends later than the client finds the server, in the order in which they were made: feedback,
+        goals, cancels. Before, rmw_fastrtps drops its responses after 100 ms, and rclpy then runs a goal that counts as refused.
+        """
+        reached: Future[None] = Future()
+
+        def answered(_: object) -> None:
+            with contextlib.suppress(InvalidStateError):
+                reached.set_result(None)
+
+        def send() -> None:
+            try:
+                handle = importlib.import_module("rclpy.action.client").ClientGoalHandle(
+                    self._client, _uuid_message(uuid.uuid4().bytes), None
+                )
+                handle.cancel_goal_async().add_done_callback(answered)
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+                _fail(reached, error)
+
+        self._calls.executor.create_task(send)
+        return reached
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return the accepted goal, None where it is refused. From any thread."""
@@ -193,8 +218,7 @@ class ActionClient:
 
         try:
             message = self._calls.deserialize(goal, self._class.Goal)
-            goal_uuid = importlib.import_module("unique_identifier_msgs.msg").UUID(uuid=list(id))
-            self._client.send_goal_async(message, goal_uuid=goal_uuid).add_done_callback(answered)
+            self._client.send_goal_async(message, goal_uuid=_uuid_message(id)).add_done_callback(answered)
         except Exception as error:  # noqa: BLE001 - whatever rclpy raises
             self._callbacks.pop(id, None)
             _fail(accepted, error)
@@ -211,6 +235,10 @@ class ActionClient:
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
+
+
+def _uuid_message(id: bytes) -> object:
+    return importlib.import_module("unique_identifier_msgs.msg").UUID(uuid=list(id))
 
 
 def _client_class() -> Callable[..., _RclpyActionClient]:
