@@ -16,14 +16,16 @@ PERIOD = 1.0
 
 
 class Ros1Peer:
-    """Puts beacons, publishes, subscribes, offers services, calls them. ``endpoint``: where it connects."""
+    """Puts beacons, publishes, subscribes, offers services, calls them. ``endpoint``: where it connects, or ``listens``."""
 
-    def __init__(self, endpoint: str, namespace: str = "*", mode: str = "client") -> None:
+    def __init__(
+        self, endpoint: str, namespace: str = "*", mode: str = "client", *, listens: bool = False
+    ) -> None:
         config = zenoh.Config()
         for key, value in (
             ("mode", mode),
-            ("connect/endpoints", [endpoint]),
-            ("listen/endpoints", []),
+            ("connect/endpoints", [] if listens else [endpoint]),
+            ("listen/endpoints", [endpoint] if listens else []),
             ("scouting/multicast/enabled", False),
         ):
             config.insert_json5(key, json.dumps(value))

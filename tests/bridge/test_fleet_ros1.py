@@ -190,6 +190,34 @@ def test_services_are_called_both_ways(fleet: Fleet, peer: Callable[..., Ros1Pee
     assert pressed == [b""]
 
 
+def test_a_gateway_connects_to_a_bridge_that_listens(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
+    robot = peer(mode="peer", listens=True)
+    place = fleet.place()
+    asked = serve(fleet, place, "/lamp")
+    chat = publisher(fleet, place, "/chat", String)
+    gateway(place)
+    fleet.until(
+        lambda: robot.has_received("pub", *STRING, "/chat") and robot.has_received("srv", *SWITCH, "/lamp")
+    )
+    found = robot.subscribe(*STRING, "/chat")
+    fleet.run(chat.wait_for_subscribers(1, SECONDS))
+    fleet.run(chat.publish("hello"))
+    fleet.until(lambda: found == [text("hello")])
+    assert robot.call(*SWITCH, "/lamp", b"\1") == b"\1\2\0\0\0on"
+    assert asked == [True]
+
+    robot.announce("pub", *STRING, "/answers")
+    robot.serve(*SWITCH, "/door", lambda _: b"\1\4\0\0\0open")
+    robot.announce("srv", *SWITCH, "/door")
+    heard = collect(fleet, place, "/answers", String)
+    fleet.until(lambda: robot.has_received("sub", *STRING, "/answers"))
+    robot.publisher(*STRING, "/answers").put(text("hello, too"))
+    fleet.until(lambda: [each.data for each in heard] == ["hello, too"])
+    client = place.node("client")
+    fleet.run(client.wait_for_service("/door", SECONDS))
+    assert fleet.run(client.call("/door", SetBool, True)).message == "open"
+
+
 def test_a_service_of_this_master_is_not_replaced(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
     place = fleet.place()
     asked = serve(fleet, place, "/lamp")
