@@ -22,6 +22,7 @@ from minirospy.errors import (
     RpcRefused,
     RpcUnreachable,
 )
+from minirospy.names import is_legal_name
 from minirospy.runtime.node.services import ServiceServer
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
@@ -263,8 +264,9 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # What was unregistered meanwhile is unknown for good reason.
-                has_forgotten = asked is not None and self._known.get(asked) is not None
+                # What was unregistered meanwhile is unknown for good reason, and an illegal name is always refused.
+                if asked and (asked[0] == "Service" or is_legal_name(self._name)):
+                    has_forgotten = self._known.get(asked) is not None
             except RpcError as error:
                 _log.debug("looking up this node: %s", error)
                 continue

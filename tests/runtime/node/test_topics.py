@@ -703,6 +703,28 @@ def test_closing_the_last_topic_is_not_taken_for_a_new_master(
     assert not caplog.text
 
 
+def test_a_node_of_an_illegal_name_is_not_taken_for_forgotten(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The master refuses to look such a name up, each time; rospy lets the node run."""
+
+    async def scene() -> None:
+        async with graph("/led actuator", watch_seconds=0.02) as (_, (a,)):
+            await publish(a, "/t")
+            look, looks = a._registrations._look, asyncio.Queue[str]()
+
+            async def counted(method: str, *args: Any) -> Any:
+                looks.put_nowait(method)
+                return await look(method, *args)
+
+            monkeypatch.setattr(a._registrations, "_look", counted)
+            for _ in range(3):
+                assert await looks.get() == "lookupNode"
+
+    run(scene)
+    assert "has restarted" not in caplog.text
+
+
 def test_a_master_that_forgot_everything_gets_all_registrations_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
