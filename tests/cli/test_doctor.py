@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -100,6 +102,32 @@ def test_nodes_that_are_dead_nowhere_or_others(
         "PROBLEM nodes: /moved: another program answers at their port on 'localhost': it is the node /robot"
     )
     assert out.splitlines()[-1] == "3 problems and 1 warning"
+
+
+def test_a_suspended_node_and_a_suspended_master(
+    robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after Ctrl-Z: the system accepts connections for a process that does not run."""
+    with socket.create_server(("127.0.0.1", 0)) as suspended:
+        uri = f"http://localhost:{suspended.getsockname()[1]}/"
+        with contextlib.closing(MasterProxy(master, "/stopped")) as proxy:
+            proxy.register_publisher("/boo", "std_msgs/Bool", uri)
+        resume = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
+
+        status, out, _ = command("doctor")
+        (node,) = lines(out, "nodes")
+        assert status == 1
+        assert node.startswith(
+            "PROBLEM nodes: /stopped: connections to it on 'localhost' are accepted, but nothing"
+        )
+        assert node.endswith(f" -> {resume}")
+
+        monkeypatch.setenv("ROS_MASTER_URI", uri)
+        status, out, _ = command("doctor")
+        (silent,) = lines(out, "master")
+        assert status == 1
+        assert silent.startswith("PROBLEM master: http://localhost:")
+        assert silent.endswith(f" -> {resume}")
 
 
 def test_topics_of_different_types(robot: Any, other: Any, command: Any) -> None:

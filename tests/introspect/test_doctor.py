@@ -100,7 +100,8 @@ def test_why_an_address_does_not_answer(listener: socket.socket) -> None:
     port = listener.getsockname()[1]
     assert fault_at("http://127.0.0.1:1") is Fault.REFUSED
     assert fault_at("http://no-such-host.invalid:1") is Fault.NAME
-    assert fault_at(f"http://127.0.0.1:{port}") is Fault.SILENT
+    assert fault_at(f"http://127.0.0.1:{port}") is Fault.LATE
+    assert trouble_of(TimeoutError()).fault is Fault.SILENT
     assert trouble_of(RpcUnreachable("http://x:1", "odd")).fault is Fault.OTHER
 
 

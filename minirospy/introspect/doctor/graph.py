@@ -15,6 +15,7 @@ from minirospy.errors import MinirospyError, RpcFault, RpcProtocolError, RpcRefu
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
+    RESUME,
     Fault,
     MasterPlace,
     Trouble,
@@ -135,6 +136,8 @@ def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, 
             "set ROS_IP on their machine",
         )
 
+    if trouble.fault is Fault.LATE:
+        return f"connections to it on '{host}' are accepted, but nothing is answered ({trouble.text})", RESUME
     if trouble.fault is Fault.STRANGER:
         return f"another program answers at their port on '{host}': {trouble.text}", "`rosnode cleanup`"
     if trouble.fault is Fault.OTHER:

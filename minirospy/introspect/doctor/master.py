@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from minirospy.errors import MasterUnreachableError, RpcError, RpcFault
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
-from minirospy.introspect.doctor.reach import CONNECT_SECONDS, Fault, MasterPlace, Trouble, trouble_of
+from minirospy.introspect.doctor.reach import CONNECT_SECONDS, RESUME, Fault, MasterPlace, Trouble, trouble_of
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.http import serialize_request
 from minirospy.wire.xmlrpc import serialize_call
@@ -108,6 +108,8 @@ def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
             "see that both machines are in one network, and that no firewall refuses",
         )
 
+    if trouble.fault is Fault.LATE:
+        return problem("master", f"{where} accepts connections, but does not answer ({trouble.text})", RESUME)
     if trouble.fault is Fault.STRANGER:
         return problem(
             "master",

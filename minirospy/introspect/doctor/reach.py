@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 from minirospy.errors import (
     MasterUnreachableError,
     MinirospyError,
+    RpcLate,
     RpcProtocolError,
     RpcUnreachable,
     WireError,
@@ -30,6 +31,7 @@ from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscribe
 
 __all__ = [
     "CONNECT_SECONDS",
+    "RESUME",
     "Fault",
     "MasterPlace",
     "Trouble",
@@ -47,6 +49,9 @@ __all__ = [
 
 CONNECT_SECONDS = 1.5
 """Whoever means to answer does within this, also by a poor radio."""
+
+RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
+"""What to do about :attr:`Fault.LATE`."""
 
 LOOK_UP_SECONDS = 2.0
 """The same of a name server."""
@@ -66,6 +71,8 @@ class Fault(str, Enum):
     """the machine is there, and nobody listens at that port"""
     SILENT = "silent"
     """nothing comes back: the machine is off, the address is another one's, or a firewall drops what is sent"""
+    LATE = "late"
+    """a connection is taken, and nothing is answered: the process is busy, or suspended"""
     NO_ROUTE = "no route"
     """the way there is closed: no network, or a firewall that says no"""
     STRANGER = "stranger"
@@ -104,6 +111,8 @@ def trouble_of(error: Exception) -> Trouble:
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
 
+    if isinstance(error, RpcLate):
+        return Trouble(Fault.LATE, error.why)
     if isinstance(error, RpcUnreachable):
         text = error.why
         if isinstance(error.__cause__, Exception):
