@@ -67,7 +67,10 @@ class Interfaces:
         found = [type_ for type_ in everything if (type_.partition("/")[2] if by_itself else type_) == name]
         if not found:
             known = {type_.partition("/")[2] for type_ in everything} if by_itself else everything
-            raise NotFoundError(f"{self._kind.word} type", name, known)
+            tool = "rosmsg" if self._kind is Kind.MESSAGE else "rossrv"
+            hint = f"it is a package: `{tool} package {name}` lists its types"
+            is_package = name in self._catalogue.packages
+            raise NotFoundError(f"{self._kind.word} type", name, known, hint if is_package else "")
         return found
 
     def text(self, type_: str) -> str:

@@ -62,6 +62,7 @@ def test_lists(command: Any) -> None:
             1,
             "message type [std_msgs/Bol] not found; did you mean std_msgs/Bool",
         ),
+        (["rosmsg", "show", "std_msgs"], 1, "it is a package: `rosmsg package std_msgs` lists its types"),
         (["rosmsg", "show", "Bol"], 1, "message type [Bol] not found; did you mean Bool"),
         (["rosmsg", "show", "nope/Nope"], 1, "message type [nope/Nope] not found"),
         (["rossrv", "md5", "SetBol"], 1, "service type [SetBol] not found; did you mean SetBool"),
