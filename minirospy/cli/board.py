@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import run
+from minirospy.cli.command import run, warn
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
@@ -205,6 +205,13 @@ def _press(pin: Sequence[int]) -> None:
     with Board() as board:
         for each in pin:
             board.press(each)
+            used = board.state().pins[each]
+            # A pin that a program reads with a pull resistor has a button of the user's own.
+            if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
+                part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
+                warn(
+                    f"GPIO {each} has no button, {part}: the buttons are GPIO {' and '.join(map(str, BUTTONS))}"
+                )
 
 
 def _release_parser() -> Parser:

@@ -97,6 +97,20 @@ def test_reset(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"{new}away\n"
 
 
+def test_press_warns_where_no_button_is_wired(capsys: pytest.CaptureFixture[str]) -> None:
+    program = Gpio()
+    program.setmode(BCM)
+    program.setup(20, IN, pull_up_down=PUD_UP)
+    assert main(["press", "11", "20"]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["press", "1", "2"]) == 0
+    program.close()
+    assert capsys.readouterr().err == (
+        "WARNING: GPIO 1 has no button, nothing is wired to it: the buttons are GPIO 11 and 12\n"
+        "WARNING: GPIO 2 has no button, it is wired to a green LED: the buttons are GPIO 11 and 12\n"
+    )
+
+
 def test_without_a_terminal_it_prints_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     assert capsys.readouterr().out.startswith("pin level function pull part")
