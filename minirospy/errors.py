@@ -539,9 +539,9 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
     return tails[:3]
 
 
-def did_you_mean(word: str, known: Iterable[str], most: int = 2) -> str:
+def did_you_mean(word: str, known: Iterable[str], most: int = 2, cutoff: float = 0.6) -> str:
     """Return the suggestion after a word that does not exist: those of the ``known`` that are similar, "" if none is."""
     import difflib
 
-    suggestions = difflib.get_close_matches(word, list(known), n=most)
+    suggestions = difflib.get_close_matches(word, list(known), n=most, cutoff=cutoff)
     return f"; did you mean {' or '.join(suggestions)}?" if suggestions else ""

@@ -54,6 +54,7 @@ __all__ = [
     "run",
     "tool_node",
     "warn",
+    "warn_no_subscribers",
     "warn_unpublished",
 ]
 
@@ -64,6 +65,9 @@ _IN_ARCHIVE = (
     "minirospy cannot run from the archive {}: its programs, launch files and messages are files; "
     "install it into a venv, or by pipx"
 )
+
+_SLIP = 0.85
+"""How similar two names are, by difflib's ratio, where one letter or two are missing, wrong or too many."""
 
 INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
@@ -226,6 +230,21 @@ def warn_unpublished(graph: Graph, topic: str) -> None:
     """Warn that a topic is not known to the master, and name similar ones."""
     warn(f"topic [{topic}] does not appear to be published yet", topic)
     hint_near(topic, graph.state().publishers)
+
+
+def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
+    """Warn that nobody subscribes to ``topic`` where one that is nearly the same is in ``subscribed``.
+
+    A publisher may come first, so only what looks like a slip of the keyboard is reported: /robot2/scan is not one
+    where /robot1/scan has subscribers.
+    """
+    others = [each for each in subscribed if _without_digits(each) != _without_digits(topic)]
+    if near := did_you_mean(topic, others, cutoff=_SLIP):
+        warn(f"topic [{topic}] has no subscribers yet{near}")
+
+
+def _without_digits(name: str) -> str:
+    return name.translate(dict.fromkeys(map(ord, "0123456789")))
 
 
 def hint_near(name: str, known: Iterable[str]) -> None:

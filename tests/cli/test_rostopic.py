@@ -246,6 +246,17 @@ def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch:
     )
 
 
+def test_pub_to_nobody_names_a_similar_topic_with_subscribers(
+    robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
+    misspelt = command("rostopic", "pub", "-1", "/lisen", "std_msgs/Bool", "true")
+    assert misspelt.status == 0
+    assert misspelt.err == "WARNING: topic [/lisen] has no subscribers yet; did you mean /listen?\n"
+    for topic in ("/late", "/listen2"):
+        assert command("rostopic", "pub", "-1", topic, "std_msgs/Bool", "true").err == ""
+
+
 def test_hz_and_bw(robot: Any, program: Start) -> None:
     rate = program(["rostopic", "hz", "/ns/chatter"])
     width = program(["rostopic", "bw", "/ns/chatter"])

@@ -10,7 +10,7 @@ import itertools
 import re
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from minirospy.cli.command import RosText, WordedError, tool_node, warn
+from minirospy.cli.command import RosText, WordedError, tool_node, warn, warn_no_subscribers
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Verb
 from minirospy.errors import MessageException, NotFoundError, SerializationError, UsageError, ValueTextError
@@ -165,6 +165,8 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             _warn_of_other_type(graph, topic, cls._type)
         elif why := why_illegal(topic):
             raise UsageError(f"topic [{topic}]: {why}")
+        else:
+            warn_no_subscribers(topic, state.subscribers.keys() - {"/rosout"})
     # One message stays for late subscribers; a stream of them does not, unless asked to.
     from_documents = bool(not options.args and (cls.__slots__ or options.file))
     lasting = options.once or options.latch or (options.rate is None and not from_documents)
