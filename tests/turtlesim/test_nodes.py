@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import math
 import os
-import select
 import signal
 import struct
 import subprocess
@@ -256,35 +255,37 @@ class Terminal:
         )
         os.close(slave)
         self._shown = ""
+        self._changed = threading.Condition()
+        self._reading = threading.Thread(target=self._read, daemon=True)
+        self._reading.start()
 
     def type(self, keys: str) -> None:
         os.write(self._master, keys.encode())
 
     def wait_for(self, text: str) -> None:
-        while text not in self._shown:
-            ready, _, _ = select.select([self._master], [], [], SECONDS)
-            assert ready, self._shown
-            self._shown += os.read(self._master, 65536).decode(errors="replace")
+        with self._changed:
+            assert self._changed.wait_for(lambda: text in self._shown, SECONDS), self._shown
 
     def interrupt(self) -> None:
         self._process.send_signal(signal.SIGINT)
 
     def status(self) -> int:
-        """Return the exit status; what is written until then is read, so that nothing blocks."""
-        draining = threading.Thread(target=self._drain, daemon=True)
-        draining.start()
         status = self._process.wait(SECONDS)
-        draining.join(SECONDS)
+        self._reading.join(SECONDS)
         assert "Traceback" not in self._shown, self._shown
         return status
 
-    def _drain(self) -> None:
+    def _read(self) -> None:
+        # All the time: a program whose terminal is full waits, and its turtle stands still.
         # Linux raises an error at the end of a terminal.
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 65536):
-                self._shown += data.decode(errors="replace")
+                with self._changed:
+                    self._shown += data.decode(errors="replace")
+                    self._changed.notify_all()
 
     def close(self) -> None:
         self._process.kill()
         self._process.wait()
+        self._reading.join(SECONDS)
         os.close(self._master)
