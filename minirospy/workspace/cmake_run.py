@@ -40,6 +40,7 @@ class Command(NamedTuple):
 class _Macro(NamedTuple):
     """A definition by ``macro()`` or ``function()``, and its file."""
 
+    has_scope: bool
     parameters: list[str]
     body: tuple[Statement, ...]
     file: Path
@@ -61,12 +62,37 @@ def _items(text: str) -> list[str]:
     return [item for item in text.split(";") if item]
 
 
+def _escaped(text: str) -> str:
+    """Return a value in a form of which expansion makes the value."""
+    return text.replace("\\", "\\\\").replace("$", "\\$")
+
+
+def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
+    """Return a macro's commands with its arguments in place, as CMake does it: as text, before any variable."""
+
+    def value(match: re.Match[str]) -> str:
+        given = None if match[1] else values.get(match[2])
+        return match[0] if given is None else _escaped(given)
+
+    def words(statement: Statement) -> tuple[Word, ...]:
+        return tuple(word._replace(text=_VARIABLE.sub(value, word.text)) for word in statement.words)
+
+    return tuple(
+        each._replace(words=words(each), body=_substituted(each.body, values)) for each in statements
+    )
+
+
 class _Run:
-    """Runs the commands of one folder. ``_known`` holds its variables, ``_macros`` what it defined."""
+    """Runs the commands of one folder.
+
+    ``_known`` holds the variables of its current scope, ``_raised`` those that ``PARENT_SCOPE`` sets around it,
+    ``_macros`` what it defined.
+    """
 
     def __init__(self, folder: Path, known: dict[str, str], macros: dict[str, _Macro], depth: int) -> None:
         self._folder = folder
         self._known = known
+        self._raised: dict[str, str] = {}
         self._macros = macros
         self._depth = depth
 
@@ -143,7 +169,7 @@ class _Run:
 
         def value(match: re.Match[str]) -> str:
             name = f"ENV{{{match[2]}}}" if match[1] else match[2]
-            return self._known.get(name, "").replace("\\", "\\\\").replace("$", "\\$")
+            return _escaped(self._known.get(name, ""))
 
         count = 1
         while count:
@@ -197,10 +223,12 @@ class _Run:
 
     def _define(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         if arguments:
-            self._macros[arguments[0].lower()] = _Macro(arguments[1:], statement.body, file)
+            has_scope = statement.name == "function"
+            self._macros[arguments[0].lower()] = _Macro(has_scope, arguments[1:], statement.body, file)
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
+        """Yield the commands of a function, in a scope of its own, or of a macro, in which arguments are no variables."""
         macro = self._macros[name]
         values = {
             **dict(zip(macro.parameters, arguments, strict=False)),
@@ -209,10 +237,14 @@ class _Run:
             "ARGN": ";".join(arguments[len(macro.parameters) :]),
             "ARGC": str(len(arguments)),
         }
-        before = {key: self._known.get(key, "") for key in values}
-        self._known.update(values)
+        if not macro.has_scope:
+            yield from self._body(_substituted(macro.body, values), macro.file)
+            return
+
+        around, raised = self._known, self._raised
+        self._known, self._raised = {**around, **values}, {}
         yield from self._body(macro.body, macro.file)
-        self._known.update(before)
+        self._known, self._raised = {**around, **self._raised}, raised
 
     def _include(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         """Yield a file of the package; a module of CMake's own is left out."""
@@ -237,6 +269,7 @@ class _Run:
             places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())
             below = _Run(folder, {**self._known, **places}, self._macros, self._depth)
             yield from below.file(folder / "CMakeLists.txt")
+            self._known.update(below._raised)
 
     # --- what sets variables
 
@@ -253,8 +286,9 @@ class _Run:
         name, values = (*arguments[:1], "")[0], arguments[1:]
         if "CACHE" in values and name in self._known and "FORCE" not in values:
             return
+        scope = self._raised if values[-1:] == ["PARENT_SCOPE"] else self._known
         ends = [values.index(word) for word in ("CACHE", "PARENT_SCOPE") if word in values]
-        self._known[name] = ";".join(values[: min(ends, default=len(values))])
+        scope[name] = ";".join(values[: min(ends, default=len(values))])
 
     def _unset(self, arguments: list[str]) -> None:
         for name in arguments[:1]:

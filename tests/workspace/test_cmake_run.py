@@ -135,6 +135,33 @@ def test_macros(tmp_path: Path) -> None:
     assert said(tmp_path, text) == ["a b c 3", "d 1", "."]
 
 
+def test_macro_sets_the_variable_that_an_argument_names(tmp_path: Path) -> None:
+    """A macro's arguments are no variables: `${NAME}` remains the word that was given after a set() of that name."""
+    text = (
+        'macro(Find NAME KIND)\n set(NAME "")\n set(INNER ${KIND})\n'
+        " foreach(P IN ITEMS ${ARGN})\n  if(${KIND} STREQUAL k)\n   list(APPEND NAME x${P})\n  endif()\n endforeach()\n"
+        " set(${NAME}_ALL ${NAME})\nendmacro()\nfind(NAME k a b)\nf(${NAME} ${INNER} ${NAME_ALL})\nfind(OTHER k c)\n"
+        "f(${NAME} ${OTHER} ${OTHER_ALL})"
+    )
+    assert said(tmp_path, text) == ["xa xb k NAME", "xc OTHER"]
+
+
+def test_function_has_variables_of_its_own(tmp_path: Path) -> None:
+    text = (
+        'function(find NAME)\n set(NAME "")\n foreach(P IN LISTS ARGN)\n  list(APPEND NAME x${P})\n endforeach()\n'
+        " set(INNER 1)\n set(FOUND ${NAME} PARENT_SCOPE)\n f(${FOUND}.)\nendfunction()\n"
+        "find(FOUND a b)\nf(${FOUND} ${NAME} ${INNER})"
+    )
+    assert said(tmp_path, text) == [".", "xa xb"]
+
+
+def test_subdirectory_sets_variables_of_its_parent(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "CMakeLists.txt").write_text("set(A in PARENT_SCOPE)\nset(B in)\nf(${A})")
+    text = "project(p)\nset(A out)\nset(B out)\nadd_subdirectory(sub)\nf(${A} ${B})"
+    assert said(tmp_path, text) == ["out", "in out"]
+
+
 def test_return_ends_the_file(tmp_path: Path) -> None:
     (tmp_path / "more.cmake").write_text("f(more)\nreturn()\nf(never)")
     assert said(tmp_path, "include(more.cmake)\nf(a)\nif(1)\n return()\nendif()\nf(b)") == ["more", "a"]
