@@ -79,12 +79,10 @@ class Dispatcher:
         self,
         methods: dict[str, Method],
         *,
-        unknown: str = 'method "{}" is not supported',
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """``unknown``: the fault of a method that is not there; ``refusals``: what methods raise beside CallRefused."""
+        """``refusals``: what methods raise besides CallRefused."""
         self.methods = methods
-        self._unknown = unknown
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
     def dispatch(self, name: str, args: Sequence[object]) -> object:
@@ -133,7 +131,7 @@ class Dispatcher:
             if len(args) != 1 or not isinstance(args[0], list):
                 raise RpcFault(1, "system.multicall takes a list of structs of methodName and params")
             return self._call_many(args[0])
-        raise RpcFault(1, self._unknown.format(name[:_MAX_CHARACTERS]))
+        raise RpcFault(1, f"<class 'Exception'>:method \"{name[:_MAX_CHARACTERS]}\" is not supported")
 
     def _call_many(self, calls: list[object]) -> Steps[list[object]]:
         answers = []
@@ -242,7 +240,7 @@ def subgraph(value: object, name: str, caller_id: str) -> str:
 def global_key(value: object, name: str, caller_id: str) -> str:
     """Return the name of a parameter that starts at the root."""
     found = text(value, name, caller_id)
-    if found[0] not in "/~":
+    if found[0] != "/":
         raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")
     return found
 

@@ -107,7 +107,6 @@ class MasterApi(ABC):
                 ),
                 "minirospy.status": Method(self.get_status, {}),
             },
-            unknown="<class 'Exception'>:method \"{}\" is not supported",
             refusals=(RegistryFullError, ParametersFullError),
         )
 

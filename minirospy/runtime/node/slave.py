@@ -20,9 +20,9 @@ from minirospy.graph.calls import (
     Method,
     anything,
     global_key,
+    global_name,
     parameters,
     some,
-    text,
     uris,
 )
 from minirospy.runtime.transport.local import PROTOCOL
@@ -92,8 +92,10 @@ class SlaveApi:
                 "paramUpdate": Method(
                     self.param_update, -1, parameters(parameter_key=global_key, parameter_value=anything)
                 ),
-                "publisherUpdate": Method(self.publisher_update, -1, parameters(topic=text, publishers=uris)),
-                "requestTopic": Method(self.request_topic, [], parameters(topic=text, protocols=some)),
+                "publisherUpdate": Method(
+                    self.publisher_update, -1, parameters(topic=global_name, publishers=uris)
+                ),
+                "requestTopic": Method(self.request_topic, [], parameters(topic=global_name, protocols=some)),
                 "shutdown": Method(self.shutdown, 0, parameters(msg=anything), optional=1),
             }
         )
@@ -177,7 +179,6 @@ class SlaveApi:
 
     def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
         """Where a subscriber finds the topic, by the first protocol that both sides speak."""
-        topic = names.resolve(topic, self._node.name)
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         host, port = self._node.environment.host, self._node.tcpros_port

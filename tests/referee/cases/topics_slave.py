@@ -63,3 +63,11 @@ PROTOCOLS = ([3], [[]], ["TCPROS"], ["x"], [""], [{}], [["x"], 3], [["x"]], [], 
 for protocols in PROTOCOLS:
     outcome(f"requestTopic, {protocols!r}", lambda: node.requestTopic("/me", "/topic", protocols)[:2])
 outcome("requestTopic of another topic", lambda: node.requestTopic("/me", "/nobody", [3]))
+
+# Names that no topic has, and calls that there are not.
+for name in ("/", "a b", "http://x", "~x", "~", "a//b/"):
+    outcome(f"requestTopic {name!r}", lambda: node.requestTopic("/me", name, [["TCPROS"]]))
+    outcome(f"publisherUpdate {name!r}", lambda: node.publisherUpdate("/me", name, []))
+    outcome(f"paramUpdate {name!r}", lambda: node.paramUpdate("/me", name, 1))
+for call in ("getMaster", "_shutdown", "registerPublisher"):
+    outcome(call, lambda: getattr(node, call)("/me"))

@@ -67,7 +67,7 @@ async def running(variables: dict[str, str] = NO_MASTER) -> AsyncIterator[Node]:
             ("system.multicall", [5, {"methodName": "getNothing", "params": []}]),
             [
                 {"faultCode": 1, "faultString": "a call is a struct of methodName and params"},
-                {"faultCode": 1, "faultString": 'method "getNothing" is not supported'},
+                {"faultCode": 1, "faultString": "<class 'Exception'>:method \"getNothing\" is not supported"},
             ],
         ),
     ],
