@@ -12,6 +12,7 @@ from minirospy.errors import (
     MasterUnreachableError,
     ROSSerializationException,
     RpcError,
+    RpcRefused,
     SerializationError,
 )
 from minirospy.idl.protocols import Message
@@ -52,7 +53,8 @@ async def registered(
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:
-        log.critical("unable to register %s with master: %s", what, error)
+        why = error.text if isinstance(error, RpcRefused) else error
+        log.critical("unable to register %s with master: %s", what, why)
 
 
 def pieces_of(message: Message) -> Pieces:

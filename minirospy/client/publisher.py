@@ -166,7 +166,8 @@ class PublishedTopic(SharedTopic):
         if listener:
             self.add_subscriber_listener(listener)
 
-        publication.queue_size = queue_size
+        if queue_size is not None or len(self._handles) == 1:
+            publication.queue_size = queue_size
         publication.latch = publication.latch or latch
         publication.tcp_nodelay = publication.tcp_nodelay or tcp_nodelay
         publication.headers.update(headers or {})
@@ -193,6 +194,16 @@ class PublishedTopic(SharedTopic):
             # Started before another thread can publish the topic again.
             wait = self._session.start(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
+
+    @property
+    def queue_size(self) -> int | None:
+        """Return the last queue_size that a Publisher was given; None where publish() waits for the sockets."""
+        return self.publication.queue_size
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Return what is added to the connection headers."""
+        return self.publication.headers
 
     @property
     def is_latch(self) -> bool:

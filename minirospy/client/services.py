@@ -141,7 +141,8 @@ class Service(Generic[_S_co]):
         try:
             wait()
         except (MasterUnreachableError, RpcError) as error:
-            _log.critical("unable to register service [%s] with master: %s", self.resolved_name, error)
+            why = error.text if isinstance(error, RpcRefused) else error
+            _log.critical("unable to register service [%s] with master: %s", self.resolved_name, why)
 
     def _handle(self, body: memoryview, header: Header) -> bytes:
         """Handle the bytes of a request and return those of the response (in a worker)."""

@@ -30,6 +30,7 @@ __all__ = ["SubscribedTopic", "Subscriber", "wait_for_message"]
 _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
+_BUFF_SIZE = 65536
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: the counts themselves, and what their times come from."""
 
@@ -54,7 +55,7 @@ class Subscriber(Topic[_M_co]):
         callback: Callable[..., object] | None = None,
         callback_args: object = None,
         queue_size: int | None = None,
-        buff_size: int = 65536,
+        buff_size: int = _BUFF_SIZE,
         tcp_nodelay: bool = False,
     ) -> None:
         super().__init__(name, data_class, "sub")
@@ -78,7 +79,7 @@ class Subscriber(Topic[_M_co]):
                 state = self._session.subscribed[self.resolved_name] = SubscribedTopic(
                     self._session, self.resolved_name, data_class
                 )
-            state.join(self, tcp_nodelay)
+            state.join(self, queue_size, buff_size, tcp_nodelay)
             # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
             links = state.links
         self.impl = state
@@ -146,7 +147,9 @@ class SubscribedTopic(SharedTopic):
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         super().__init__(session, topic, data_class)
         self.subscription: Subscription | None = None
-        self._tcp_nodelay = False
+        self.queue_size: int | None = None
+        self.buff_size = _BUFF_SIZE
+        self.tcp_nodelay = False
         self._handles: list[Subscriber[Message]] = []
         self._added: list[_Callback] = []
         self._receivers: tuple[_Receiver, ...] = ()
@@ -178,8 +181,20 @@ class SubscribedTopic(SharedTopic):
         """Return whether the node with this Slave API is connected."""
         return any(link.uri == endpoint_id for link in self.links)
 
-    def join(self, handle: Subscriber[Message], tcp_nodelay: bool) -> None:
-        self._tcp_nodelay = self._tcp_nodelay or tcp_nodelay
+    @property
+    def callbacks(self) -> list[tuple[Callable[..., object], object]]:
+        """The functions that get the messages, each with its callback_args."""
+        own = [(each.callback, each.callback_args) for each in self._handles if each.callback is not None]
+        return own + list(self._added)
+
+    def join(
+        self, handle: Subscriber[Message], queue_size: int | None, buff_size: int, tcp_nodelay: bool
+    ) -> None:
+        if queue_size is not None:
+            self.queue_size = queue_size
+        if buff_size != _BUFF_SIZE:
+            self.buff_size = buff_size
+        self.tcp_nodelay = self.tcp_nodelay or tcp_nodelay
         self._handles.append(handle)
         self._update()
 
@@ -219,10 +234,12 @@ class SubscribedTopic(SharedTopic):
         with self._session.lock:
             for handle in self._handles:
                 handle._newest = max(0, queue_size or 0)
+            self.queue_size = queue_size
             self._update()
 
     def set_buff_size(self, buff_size: int) -> None:
-        """Do nothing; accepted for compatibility, as a Subscriber's ``buff_size``."""
+        """Record the size, which has no effect: as a Subscriber's ``buff_size``."""
+        self.buff_size = buff_size
 
     def register(self) -> None:
         """Register with the master, once."""
@@ -236,7 +253,7 @@ class SubscribedTopic(SharedTopic):
                 InterfaceType.of(self.data_class),
                 self._deliver,
                 newest=self._newest(),
-                tcp_nodelay=self._tcp_nodelay,
+                tcp_nodelay=self.tcp_nodelay,
             )
             wait = self._session.start(node.subscribe(self.subscription))
 

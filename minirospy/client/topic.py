@@ -6,13 +6,13 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar
 
 from minirospy.client.connection import Connection
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError
+from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.idl import protocols
 from minirospy.idl.message import Message
 from minirospy.wire.tcpros import ANY
@@ -96,11 +96,23 @@ class Topic(Generic[_M_co]):
 class SharedTopic:
     """The common part of the handles of one topic in this process: rospy's ``impl``, which user code reads."""
 
+    _handles: Collection[Topic[Any]]
+
     def __init__(self, session: Session, topic: str, data_class: type[protocols.Message]) -> None:
         self._session = session
         self.resolved_name = self.name = topic
         self.data_class = data_class
         self.type: str = data_class._type
+
+    @property
+    def ref_count(self) -> int:
+        """How many handles there are."""
+        return len(self._handles)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last handle was unregistered."""
+        return not self._handles
 
     @property
     def connections(self) -> list[Connection]:
@@ -139,7 +151,8 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
     except MasterUnreachableError as error:
         _log.critical("unable to register %s [%s] with master: %s. Will keep trying.", what, topic, error)
     except RpcError as error:
-        _log.critical("unable to register %s [%s] with master: %s", what, topic, error)
+        why = error.text if isinstance(error, RpcRefused) else error
+        _log.critical("unable to register %s [%s] with master: %s", what, topic, why)
 
 
 def unregister_from_master(wait: Callable[[], object]) -> None:

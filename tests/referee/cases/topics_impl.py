@@ -1,5 +1,6 @@
 """What programs do with the `impl` of a Publisher and a Subscriber: rosbridge and Jupyter's widgets among them."""
 
+import logging
 import os
 import re
 
@@ -124,3 +125,58 @@ for topic in (counted, readers):
         row[0] == connection.id,
         re.sub(r"\d+|None", "N", text).replace("localhost", "N.N.N.N"),
     )
+
+
+# What the handles of a topic have set together, and how many there are.
+def show_published(topic):
+    show(topic.queue_size, topic.headers, topic.ref_count, topic.closed, topic.is_latch)
+
+
+def show_subscribed(topic):
+    functions = [(function.__name__, args) for function, args in topic.callbacks]
+    show(topic.queue_size, topic.buff_size, topic.tcp_nodelay, topic.ref_count, topic.closed, functions)
+
+
+handles = [rospy.Publisher("/together", String, queue_size=3)]
+shared = handles[0].impl
+show_published(shared)
+for options in (
+    {"queue_size": 7, "headers": {"x": "1"}},
+    {"queue_size": 2, "latch": True, "headers": {"y": "1"}},
+    {},
+):
+    handles.append(rospy.Publisher("/together", String, **options))
+    show_published(shared)
+for handle in handles:
+    handle.unregister()
+    show(shared.ref_count, shared.closed)
+handles = [rospy.Subscriber("/together", String)]
+shared = handles[0].impl
+show_subscribed(shared)
+for arguments, options in (
+    ((take,), {"queue_size": 4}),
+    ((take, 3), {"queue_size": 2, "tcp_nodelay": True, "buff_size": 100}),
+    ((take,), {}),
+):
+    handles.append(rospy.Subscriber("/together", String, *arguments, **options))
+    show_subscribed(shared)
+shared.set_queue_size(9)
+shared.set_buff_size(50)
+shared.add_callback(take, 5)
+show_subscribed(shared)
+for handle in handles[::-1]:
+    handle.unregister()
+    show(shared.ref_count, shared.closed)
+
+# Names that the master refuses: the program is told by a line, and goes on.
+
+
+class Lines(logging.Handler):
+    def emit(self, record):
+        show(record.levelname, record.getMessage())
+
+
+logging.getLogger("rosout").addHandler(Lines())
+for name in ("/", "a b"):
+    rospy.Publisher(name, String, queue_size=1)
+    rospy.Subscriber(name, String)
