@@ -20,6 +20,7 @@ __all__ = [
     "UNSPECIFIED",
     "KeptParameters",
     "Unspecified",
+    "as_xmlrpc_client",
     "delete_param",
     "get_param",
     "get_param_cached",
@@ -56,7 +57,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """
     value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
-        return _as_rospy(value)
+        return as_xmlrpc_client(value)
     if default is UNSPECIFIED:
         raise KeyError(param_name)
     return default
@@ -81,7 +82,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
             cache.store(name, value, changes)
 
     if value is not NOT_SET:
-        return _as_rospy(copy.deepcopy(value))
+        return as_xmlrpc_client(copy.deepcopy(value))
     if default is UNSPECIFIED:
         raise KeyError(param_name)
     return default
@@ -209,12 +210,12 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
         raise ROSException(f"unable to {verb} parameter [{name}]: {error}") from error
 
 
-def _as_rospy(value: object) -> object:
-    """``value`` with bytes and dates in xmlrpc.client's wrappers, where rospy has them."""
+def as_xmlrpc_client(value: object) -> object:
+    """Return a value with bytes and dates in xmlrpc.client's wrappers, as from Python's own client."""
     if isinstance(value, dict):
-        return {key: _as_rospy(item) for key, item in value.items()}
+        return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_as_rospy(item) for item in value]
+        return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
         # Imported here: http.client and its kin cost more than all else of this module.
         import xmlrpc.client

@@ -6,7 +6,7 @@ import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from minirospy.client.params import check_sendable
+from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.compat.rosgraph.names import make_caller_id
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rosgraph.rosenv import get_master_uri
@@ -124,7 +124,7 @@ class Master:
 
     def getParam(self, key: str) -> Any:
         """Return a parameter's value."""
-        return self._call("getParam", key)
+        return as_xmlrpc_client(self._call("getParam", key))
 
     def setParam(self, key: str, value: object) -> int:
         """Set a parameter."""
@@ -148,7 +148,7 @@ class Master:
 
     def subscribeParam(self, caller_api: str, key: str) -> object:
         """Subscribe to a parameter's changes; return its value."""
-        return self._call("subscribeParam", caller_api, key)
+        return as_xmlrpc_client(self._call("subscribeParam", caller_api, key))
 
     def unsubscribeParam(self, caller_api: str, key: str) -> int:
         """Unsubscribe from a parameter's changes."""

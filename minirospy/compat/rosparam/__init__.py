@@ -11,7 +11,7 @@ from xmlrpc.client import Binary
 
 import yaml
 
-from minirospy.client.params import check_sendable
+from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.compat.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.compat.rosgraph.masterapi import Master, MasterError
 from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
@@ -59,14 +59,14 @@ class _YamlError(RosParamException, yaml.YAMLError):
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter's value; bytes as xmlrpc.client.Binary, as programs know them from ROS.
+    """Return a parameter's value; bytes and dates in xmlrpc.client's wrappers, as programs know them from ROS.
 
     Raises rosgraph.MasterError where it is not set, or the name is empty.
     """
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
-            return _with_binaries(parameters.get_parameter(graph, name))
+            return as_xmlrpc_client(parameters.get_parameter(graph, name))
         except NotFoundError as error:
             raise MasterError(f"Parameter [{name}] is not set") from error
 
@@ -87,15 +87,6 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
         for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
             if verbose:
                 print(f"set parameter [{name}] to [{single}]")
-
-
-def _with_binaries(value: object) -> object:
-    """Return a value with Binary instead of all bytes in it."""
-    if isinstance(value, bytes):
-        return Binary(value)
-    if isinstance(value, dict):
-        return {name: _with_binaries(inner) for name, inner in value.items()}
-    return [_with_binaries(inner) for inner in value] if isinstance(value, list) else value
 
 
 def _with_bytes(value: object) -> object:
@@ -199,7 +190,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
     values = get_param(param)
     if verbose:
         print_params(values, param)
-    Path(filename).write_text(parameters.dump_parameters(values), encoding="utf-8")
+    Path(filename).write_text(parameters.dump_parameters(_with_bytes(values)), encoding="utf-8")
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:

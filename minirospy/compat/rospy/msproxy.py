@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from minirospy.client.params import check_sendable, get_param_cached
+from minirospy.client.params import as_xmlrpc_client, check_sendable, get_param_cached
 from minirospy.client.session import current_session
 from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
@@ -61,7 +61,7 @@ class ServerProxy:
 
     def _call(self, method: str, args: tuple[object, ...]) -> object:
         try:
-            return self._client.call(method, *args)
+            return as_xmlrpc_client(self._client.call(method, *args))
         except RpcUnreachable as error:
             if isinstance(error.__cause__, OSError):
                 raise error.__cause__ from error

@@ -3,6 +3,8 @@
 import datetime
 import xmlrpc.client
 
+import rosgraph
+import rosparam
 import rospy
 from referee import outcome, show
 
@@ -57,3 +59,20 @@ got = rospy.set_param("dates", [b"1"]) or rospy.get_param("dates")
 outcome("set what was got", lambda: rospy.set_param("again", got))
 outcome("again", lambda: [each.data for each in rospy.get_param("again")])
 show([name for name in rospy.get_param_names() if name in ("/dates", "/again", "/v")])
+
+
+# The same through the modules of the tools.
+def deep(value):
+    if isinstance(value, list):
+        return [deep(each) for each in value]
+    if isinstance(value, dict):
+        return {key: deep(each) for key, each in value.items()}
+    return plain(value)
+
+
+rospy.set_param("bytes", [b"a", {"b": b"c"}])
+rospy.set_param("date", datetime.datetime(2020, 1, 2))
+master = rosgraph.Master("/tool")
+for name in ("/bytes", "/date"):
+    show(deep(master.getParam(name)), deep(rosparam.get_param(name)), deep(rospy.get_master().getParam(name)))
+    show(deep(master.subscribeParam("http://localhost:1/", name)), deep(rospy.get_master()[name]))
