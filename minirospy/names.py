@@ -22,6 +22,7 @@ __all__ = [
     "join",
     "namespace_of",
     "parse_arguments",
+    "parse_launch_arguments",
     "resolve",
 ]
 
@@ -140,3 +141,13 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
         else:
             parsed.remappings[key] = value
     return parsed
+
+
+def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
+    """Return name -> value of the arguments ``name:=value`` of launch files, among other words.
+
+    As in roslaunch, spaces around a value do not count, and one without a value leaves the argument at its default;
+    special names (``__ns``) and private parameters (``_name``) are not arguments.
+    """
+    pairs = (word.partition(":=") for word in words)
+    return {name: text for name, _, value in pairs if name and name[0] != "_" and (text := value.strip())}

@@ -58,6 +58,11 @@ def test_argument_with_two_values_is_reported() -> None:
     assert names.parse_arguments(["a:=b:=c", "_:=x"]) == ([], {"_": "x"}, {}, {}, ["a:=b:=c"])
 
 
+def test_launch_argument_without_a_value_has_no_effect() -> None:
+    words = ["file.launch", "a:=1", "b:=", "c:= ", "d:= x y ", "_e:=1", "__ns:=n", ":=1", "f:=g:=h"]
+    assert names.parse_launch_arguments(words) == {"a": "1", "d": "x y", "f": "g:=h"}
+
+
 @pytest.mark.parametrize(
     ("name", "legal"),
     [("a", True), ("/a/b", True), ("~a", True), ("", True), ("1a", False), ("a b", False), ("a//b", False), ("/", True),

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from minirospy import names
 from minirospy.errors import UsageError, did_you_mean
 
 if TYPE_CHECKING:
@@ -267,9 +268,7 @@ class AssignmentParser(Parser):
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """Return the words without NAME:=VALUE, and those by name; without special names such as __ns, which a node reads."""
-    assigned = [word for word in words if ":=" in word]
-    values = dict(word.split(":=", 1) for word in assigned if not word.startswith("__"))
-    return [word for word in words if ":=" not in word], values
+    return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 
 def integer(name: str) -> Callable[[str], int]:

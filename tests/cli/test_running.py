@@ -310,7 +310,6 @@ def test_a_node_that_dies_is_reported(master: str, package: Path) -> None:
             1,
             "or a path; did you mean rpi_led.launch",
         ),
-        (["rpi_feros_bringup", "rpi_led.launch", "x:=1"], 2, "arg [x] not found"),
         (["--nonsense"], 2, "unrecognized arguments: --nonsense"),
     ],
 )
@@ -351,6 +350,15 @@ def test_tests_without_a_name_are_not_listed(package: Path, capsys: pytest.Captu
     out, err = capsys.readouterr()
     assert out == "/q\n"
     assert "there are: /q" in err
+
+
+def test_undeclared_launch_argument_is_a_warning(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = package / "a.launch"
+    file.write_text('<launch><arg name="speed" default="1"/><param name="p" value="$(arg speed)"/></launch>')
+    assert roslaunch.main(["--dump-params", str(file), "sped:=2", "speed:="]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == "/p: 1\n\n"
+    assert captured.err.startswith("WARNING: arg [sped] not found; did you mean speed?")
 
 
 def test_the_line_of_a_node_where_no_master_is_named(

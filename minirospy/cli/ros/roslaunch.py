@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy import private_files
-from minirospy.cli.command import RosText, WordedError
+from minirospy.cli.command import RosText, WordedError, warn
 from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
@@ -116,7 +116,7 @@ def _launch(options: LaunchOptions) -> int:
     if options.check:
         return _check(sources, packages)
     spec = load_sources(sources, packages)
-    _refuse_unknown(options.args, spec)
+    _warn_of_unknown(options.args, spec)
     for name, show in _SHOWS.items():
         if (asked := getattr(options, name)) not in (None, False):
             show(spec, asked, packages)
@@ -301,11 +301,11 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def _refuse_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Refuse an argument that no file declares: real roslaunch ignores it, most often it is a typing error."""
-    unknown = [name for name in args if name not in spec.args]
-    if unknown:
-        raise UsageError("; ".join(_unknown(name, spec) for name in unknown))
+def _warn_of_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
+    """Warn of arguments that no file declares: real roslaunch ignores them, most often they are typing errors."""
+    for name in args:
+        if name not in spec.args:
+            warn(_unknown(name, spec))
 
 
 def _unknown(name: str, spec: LaunchSpec) -> str:

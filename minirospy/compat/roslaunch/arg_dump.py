@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from minirospy import names
 from minirospy.compat.roslaunch.config import LaunchFile
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.compat.roslaunch.xmlloader import assignments
 from minirospy.launch.load import resolved_arg_docs
 
 __all__ = ["get_args"]
@@ -17,6 +17,6 @@ def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | Non
     packages, found = chosen_packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each
-        for arg in resolved_arg_docs(file, assignments(argv), packages):
+        for arg in resolved_arg_docs(file, names.parse_launch_arguments(argv), packages):
             found[arg.name] = (arg.doc, arg.default)
     return found

@@ -54,7 +54,7 @@ class ROSLaunchConfig:
     @property
     def resolved_node_names(self) -> list[str]:
         """The global names of the nodes."""
-        return [node.spec.name for node in (*self.nodes, *self.nodes_core, *self.tests) if node.name]
+        return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
         """Add a node. Raises RLException where there is one of its name."""
@@ -101,16 +101,24 @@ class ROSLaunchConfig:
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
-        """Add a parameter."""
+        """Add a parameter; one below another is an error of the configuration."""
+        for parent in namespaces_of(p.key):
+            if parent in self.params:
+                self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
         self.params[p.key] = p
 
     def add_clear_param(self, param: str) -> None:
         """Delete a namespace before the parameters are set."""
         self.clear_params.append(param)
 
-    def add_machine(self, m: Machine, verbose: bool = True) -> None:
-        """Add a machine."""
-        self.machines[m.name] = m
+    def add_machine(self, m: Machine, verbose: bool = True) -> bool:
+        """Add a machine; False where the same is there already. Raises RLException where another of its name is."""
+        if m.name not in self.machines:
+            self.machines[m.name] = m
+            return True
+        if m != self.machines[m.name]:
+            raise RLException(f"Machine [{m.name}] already added and does not match duplicate entry")
+        return False
 
     def add_config_error(self, msg: str) -> None:
         """Add a warning."""
@@ -123,7 +131,7 @@ class ROSLaunchConfig:
         for node in spec.nodes:
             self.add_node(Node.of(node))
         self.tests += map(Test.of_test, spec.tests)
-        self.params.update({name: Param(name, value) for name, value in spec.params.items()})
+        self.params.update({name: Param(name, _as_read(value)) for name, value in spec.params.items()})
         for each in spec.machines.values():
             self.machines[each.name] = Machine(
                 each.name, each.address, each.env_loader or None, each.ssh_port, each.user or None, each.password or None,
@@ -138,7 +146,7 @@ class ROSLaunchConfig:
         """All of it, as it is run."""
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
-            params={name: param.value for name, param in self.params.items()},
+            params={name: _as_sent(param.value) for name, param in self.params.items()},
             clear=[name.rstrip("/") or "/" for name in self.clear_params],
             commands=self._spec.commands,
             files=self.roslaunch_files,
@@ -179,6 +187,20 @@ def load_config_default(
 def get_roscore_filename() -> str | None:
     """Return the launch file of the master's own nodes: None, as there are none."""
     return None
+
+
+def _as_read(value: object) -> object:
+    """Return a parameter's value as programs see it: the content of a file is an xmlrpc.client.Binary."""
+    if not isinstance(value, bytes):
+        return value
+    from xmlrpc.client import Binary
+
+    return Binary(value)
+
+
+def _as_sent(value: object) -> object:
+    data = getattr(value, "data", None)
+    return data if isinstance(data, bytes) else value
 
 
 def namespaces_of(name: str) -> list[str]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import socket
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 from xml.sax.saxutils import escape
 
+from minirospy import names
 from minirospy.environment import Environment, is_own_host
 from minirospy.launch.command import node_environment
 from minirospy.launch.output import ERROR, Output
@@ -68,12 +72,12 @@ class Master:
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the host of its URI."""
-        return self.environment.master_address[0]
+        """Return the host of its URI. Raises ValueError on one that is not a URL."""
+        return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the port of its URI."""
-        return self.environment.master_address[1]
+        """Return the port of its URI, 80 where it has none. Raises ValueError on one that is not a URL."""
+        return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
         """Return an xmlrpc.client.ServerProxy for its calls."""
@@ -92,12 +96,18 @@ class Master:
         with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
             return proxy.is_online()
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Master) and (self.type, self.uri) == (other.type, other.uri)
+
+    def __hash__(self) -> int:
+        return hash(self.uri)
+
 
 class Param:
     """A parameter: its global name and value."""
 
     def __init__(self, key: str, value: object) -> None:
-        self.key = key
+        self.key = names.canonicalize(key)
         self.value = value
 
     def __eq__(self, other: object) -> bool:
@@ -143,6 +153,27 @@ class Machine:
             self.timeout,
         )  # fmt: skip
 
+    def config_key(self) -> str:
+        """Return a text that is the same for machines that are reached and set up alike."""
+        return (
+            f"Machine(address[{self.address}] env_loader[{self.env_loader}] ssh_port[{self.ssh_port}] "
+            f"user[{self.user or ''}] password[{self.password or ''}] timeout[{self.timeout}])"
+        )
+
+    def config_equals(self, m2: object) -> bool:
+        """Return whether another machine is reached and set up alike, whatever its name."""
+        return isinstance(m2, Machine) and self.config_key() == m2.config_key()
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Machine)
+            and (self.name, self.assignable) == (other.name, other.assignable)
+            and self.config_equals(other)
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
     def __str__(self) -> str:
         return (
             f"Machine(name[{self.name}] env_loader[{self.env_loader}] address[{self.address}] ssh_port[{self.ssh_port}] "
@@ -150,13 +181,18 @@ class Machine:
         )
 
 
+@functools.cache
 def local_machine() -> Machine:
-    """Return this machine."""
+    """Return this machine, the same object each time."""
     return Machine("", "localhost")
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one."""
+    """Return whether a machine is this one. Raises RLException on an address that is not found."""
+    try:
+        socket.getaddrinfo(machine.address or ".", None)
+    except (OSError, UnicodeError) as error:
+        raise RLException(f"cannot resolve host address for machine [{machine.address}]") from error
     return not machine.user and is_own_host(machine.address)
 
 
@@ -344,6 +380,13 @@ class Test(Node):
             spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
             node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
         )  # fmt: skip
+
+
+def _host_and_port(uri: str) -> tuple[str, int]:
+    parts = urlsplit(uri)
+    if not parts.hostname:
+        raise ValueError("not a valid URL")
+    return parts.hostname, parts.port or 80
 
 
 def _quoted(value: object) -> str:

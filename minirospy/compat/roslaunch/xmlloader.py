@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from minirospy import names
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.errors import MinirospyError
 from minirospy.launch.load import STDIN, LaunchSource, load_sources
 from minirospy.launch.spec import LaunchSpec
 
-__all__ = ["XmlLoader", "XmlParseException", "assignments"]
+__all__ = ["XmlLoader", "XmlParseException"]
 
 
 class XmlParseException(RLException):
@@ -42,7 +43,7 @@ class XmlLoader:
         verbose: bool = True,
     ) -> None:
         """Load a file, its args given as ``["name:=value", ...]``. Raises XmlParseException."""
-        self._load(LaunchSource(filename, None, assignments(argv or ())), ros_config)
+        self._load(LaunchSource(filename, None, names.parse_launch_arguments(argv or ())), ros_config)
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
@@ -55,8 +56,3 @@ class XmlLoader:
             config.add(load_sources([source], chosen_packages()))
         except MinirospyError as error:
             raise XmlParseException(str(error)) from error
-
-
-def assignments(argv: Sequence[str]) -> dict[str, str]:
-    """Return name -> value of ``["name:=value", ...]``."""
-    return {name: value for name, sep, value in (word.partition(":=") for word in argv) if sep}

@@ -1,5 +1,6 @@
 """roslaunch.substitution_args, provided by minirospy: `$(find ...)` and the other substitution arguments."""
 
+from minirospy.compat.roslaunch.loader import convert_value
 from minirospy.compat.roslaunch.substitution_args import (
     ArgException,
     SubstitutionException,
@@ -31,4 +32,4 @@ from minirospy.compat.roslaunch.substitution_args import (
     resolve_args,
 )
 
-__all__ = ["ArgException", "SubstitutionException", "resolve_args"]
+__all__ = ["ArgException", "SubstitutionException", "convert_value", "resolve_args"]

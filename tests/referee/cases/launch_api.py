@@ -403,3 +403,83 @@ unset = roslaunch.config.load_config_default([os.path.join(ROOT, "unset.launch")
 for node in unset.nodes:
     show(node.name, node.output, node.cwd, node.launch_prefix, node.machine_name, node.args)
 show(unset.clear_params)
+
+# Machines, masters and parameters, compared and added twice.
+Machine, Master, Param = roslaunch.core.Machine, roslaunch.core.Master, roslaunch.core.Param
+one = Machine("m", "a")
+show(one.config_key(), Machine("m", "a", "/e", 22, "u", "p", False, [], 3).config_key())
+for other in (
+    Machine("m", "a"),
+    Machine("n", "a"),
+    Machine("m", "b"),
+    Machine("m", "a", assignable=False),
+    Machine("m", "a", timeout=5),
+    Machine("m", "a", user="u"),
+    3,
+):
+    show(one == other, one != other, one.config_equals(other))
+show(Master() == Master(), Master("x") == Master(), Master(auto=1) == Master(auto=0), Master() == 3)
+show(Master(uri="http://a:1") == Master(uri="http://a:1/"))
+for uri in ("http://h:12/", "http://h/", "http://h", "bad", "http://[::1]:5"):
+    for ask in (Master.get_host, Master.get_port):
+        try:
+            show(uri, ask(Master(uri=uri)))
+        except ValueError as error:
+            show(uri, error)
+show([Param(key, 1).key for key in ("a//b", "//", "a/", "/a/b/", "/", "", "~a")])
+show(roslaunch.core.local_machine() is roslaunch.core.local_machine())
+for address in ("no.such.host.invalid", "", "1.2.3.4"):
+    try:
+        show(roslaunch.core.is_machine_local(Machine("m", address)))
+    except roslaunch.RLException as error:
+        show(error)
+config = roslaunch.ROSLaunchConfig()
+show(config.add_machine(one, verbose=False), config.add_machine(Machine("m", "a"), verbose=False))
+for machine in (Machine("m", "b"), Machine("", "b")):
+    try:
+        config.add_machine(machine, verbose=False)
+    except roslaunch.RLException as error:
+        show(error)
+for key in ("/a", "/a/b", "/a/b/c", "/d/e", "/d", "rel"):
+    config.add_param(Param(key, 1), verbose=False)
+show(config.config_errors, sorted(config.params))
+config.add_test(roslaunch.core.Test("t", "p", "x", "n"), verbose=False)
+config.add_test(roslaunch.core.Test("t", "p", "x", "n"), verbose=False)
+config.add_node(roslaunch.core.Node("p", "x", "n"), verbose=False)
+show(config.resolved_node_names, len(config.tests))
+show(roslaunch.substitution_args.convert_value("1", "auto"))
+
+# The content of a file as a parameter's value.
+with open(os.path.join(ROOT, "content"), "wb") as file:
+    file.write(b"\x00a")
+with open(os.path.join(ROOT, "binary.launch"), "w") as file:
+    file.write(f'<launch><param name="b" binfile="{ROOT}/content"/></launch>')
+binary = roslaunch.config.load_config_default([os.path.join(ROOT, "binary.launch")], None, verbose=False)
+show(type(binary.params["/b"].value).__name__, binary.params["/b"].value.data)
+sys.stdout = sys.stderr = open(os.devnull, "w")
+parent = roslaunch.parent.ROSLaunchParent("run", [os.path.join(ROOT, "binary.launch")])
+parent.start()
+parent.shutdown()
+sys.stdout, sys.stderr = out, sys.__stderr__
+show(rosgraph.Master("/case").getParam("/b").data)
+
+# Arguments of launch files, as a command line has them.
+with open(os.path.join(ROOT, "args.launch"), "w") as file:
+    file.write('<launch><arg name="a" default="1"/><param name="p" value="$(arg a)"/></launch>')
+for argv in (
+    [],
+    ["a:=2"],
+    ["a:="],
+    ["a:= "],
+    ["a:= x y "],
+    [" a :=3"],
+    ["a:=2", "a:=4"],
+    ["_a:=5"],
+    ["a"],
+    [":=6"],
+    ["b:=7"],
+):
+    given = roslaunch.config.load_config_default(
+        [(os.path.join(ROOT, "args.launch"), argv)], None, verbose=False
+    )
+    show(argv, repr(given.params["/p"].value))
