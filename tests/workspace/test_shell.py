@@ -393,6 +393,8 @@ def test_zsh_tab(tmp_path: Path) -> None:
     tab() { words=("$@"); CURRENT=${#words}; _ros_complete_zsh }
     tab roscd my_; tab rosrun my_robot ''; tab roslaunch my_robot all.launch rate:=
     tab rostopic pub /t geometry_msgs/Point ''; tab rostopic pub /t std_msgs/Bool '"'
+    # Without a candidate the word stays as it was typed.
+    tab rosrun my_robot zzz
     print ${_comps[roscd]} ${_comps[rostopic]}
     """
     assert zsh.run(script) == (

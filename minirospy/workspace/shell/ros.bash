@@ -234,7 +234,8 @@ _ros_candidates() {
     _ros_found=()
     # Thousands of candidates in one step: a loop over them would take longer than to find them.
     IFS=$'\n' read -r -d '' "$into" _ros_found < <(command minirospy complete "$@" 2>/dev/null) || :
-    [ ${#_ros_found[@]} -gt 0 ] || return 0
+    # zsh reads nothing as one empty candidate, which would take the place of the word.
+    [ -n "${_ros_found[*]-}" ] || { _ros_found=(); return 0; }
     _ros_found=("${_ros_found[@]%"$return"}")
     _ros_found=("${_ros_found[@]//$vertical_tab/$line_feed}")
 }
