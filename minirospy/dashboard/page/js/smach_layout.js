@@ -11,6 +11,26 @@ export function roots(structures) {
   return [...structures.keys()].filter((path) => !inside.has(path)).sort();
 }
 
+/** Return the active states of a status; smach publishes "None" where a container has ended. */
+export function activeOf({ active_states: names }) {
+  return names.filter((name) => name !== "None" && name !== "");
+}
+
+/** Return the paths of the active states: a container's last status counts while the container is active itself. */
+export function activeStates(structures, statuses) {
+  const found = new Set();
+  const visit = (path) => {
+    for (const name of statuses.has(path) ? activeOf(statuses.get(path)) : []) {
+      const inner = `${path}/${name}`;
+      if (found.has(inner)) continue;
+      found.add(inner);
+      visit(inner);
+    }
+  };
+  for (const path of roots(structures)) visit(path);
+  return found;
+}
+
 /** Return {path, width, height, states, outcomes, edges} of a container; states have x, y (centers), width, height, and `inner` where they are containers that are open. */
 export function layoutContainer(path, structures, { Graph, layout, widthOf, isFolded = () => false }, around = new Set()) {
   const { children, internal_outcomes: labels, outcomes_from: from, outcomes_to: to, container_outcomes: ends } = structures.get(path);

@@ -2,8 +2,9 @@
 
 import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
 import { fill, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
+import { PanZoom } from "../panzoom.js";
 import { userdataOf } from "../pickle.js";
-import { layoutContainer, roots } from "../smach_layout.js";
+import { activeOf, activeStates, layoutContainer, roots } from "../smach_layout.js";
 import { language, t } from "../texts.js";
 
 const STRUCTURE = "smach_msgs/SmachContainerStructure";
@@ -47,20 +48,16 @@ export class Smach {
     this.empty = h("p", { class: "empty" });
     this.details = h("aside", { class: "panel details side" });
     this.problem = h("p", { class: "error", role: "alert" });
-    main.append(h("div", { class: "bar" }, this.choice, this.now, h("span", { class: "spring" }), h("button", { type: "button", onclick: () => this.fit() }, "Fit")), this.problem,
+    main.append(h("div", { class: "bar" }, this.choice, this.now, h("span", { class: "spring" }), h("button", { type: "button", onclick: () => this.panzoom.fit() }, "Fit")), this.problem,
       h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details));
-    this.view = { x: 0, y: 0, scale: 1 };
-    this.isFitted = true;
-    this.listen();
-    this.observer = new ResizeObserver(() => { if (this.isFitted) this.fit(); });
-    this.observer.observe(this.picture);
+    this.panzoom = new PanZoom(this.picture, this.drawing);
     this.ending = link.watch(["channels", "state"], () => this.update());
   }
 
   close() {
     this.isClosed = true;
     this.ending();
-    this.observer.disconnect();
+    this.panzoom.close();
     for (const end of this.ends.values()) end();
   }
 
@@ -89,7 +86,7 @@ export class Smach {
     this.selected = null;
     this.server = server;
     this.signature = null;
-    this.isFitted = true;
+    this.panzoom.isFitted = true;
     this.drawing.replaceChildren();
     if (isRemembered) this.place.remember(server ? { server } : {});
     this.update();
@@ -152,8 +149,7 @@ export class Smach {
       x += found.width + GAP;
       height = Math.max(height, found.height);
     }
-    this.size = { width: x - GAP + 10, height: height + 20 };
-    if (this.isFitted) this.fit();
+    this.panzoom.resized(x - GAP + 10, height + 20);
   }
 
   container(found, x, y) {
@@ -198,12 +194,8 @@ export class Smach {
   }
 
   highlight() {
-    const active = new Set();
-    const initial = new Set();
-    for (const { path, active_states: now, initial_states: first } of this.statuses.values()) {
-      for (const name of now) active.add(`${path}/${name}`);
-      for (const name of first) initial.add(`${path}/${name}`);
-    }
+    const active = activeStates(this.structures, this.statuses);
+    const initial = new Set([...this.statuses.values()].flatMap(({ path, initial_states: names }) => names.map((name) => `${path}/${name}`)));
     for (const [key, part] of this.parts ?? []) {
       part.classList.toggle("active", active.has(key));
       part.classList.toggle("initial", initial.has(key));
@@ -278,50 +270,6 @@ export class Smach {
       await new Promise((resolve) => { setTimeout(resolve, SEND_MS); });
     }
   }
-
-  // --- pan and zoom
-
-  fit() {
-    this.isFitted = true;
-    const { clientWidth, clientHeight } = this.picture;
-    if (!this.size || !clientWidth) return;
-    const scale = Math.min(1.25, clientWidth / this.size.width, clientHeight / this.size.height);
-    this.view = { scale, x: (clientWidth - this.size.width * scale) / 2, y: Math.max(0, (clientHeight - this.size.height * scale) / 2) };
-    this.move();
-  }
-
-  move() {
-    const { x, y, scale } = this.view;
-    this.drawing.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)}) scale(${scale.toFixed(4)})`);
-  }
-
-  listen() {
-    let drag = null;
-    this.picture.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      const box = this.picture.getBoundingClientRect();
-      const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-      const scale = Math.min(4, Math.max(0.05, this.view.scale * Math.exp(-event.deltaY * 0.0015)));
-      const real = scale / this.view.scale;
-      this.view = { scale, x: x - (x - this.view.x) * real, y: y - (y - this.view.y) * real };
-      this.isFitted = false;
-      this.move();
-    }, { passive: false });
-    this.picture.addEventListener("pointerdown", (event) => { drag = { x: event.clientX, y: event.clientY }; });
-    this.picture.addEventListener("pointermove", (event) => {
-      if (!drag || !event.buttons) return;
-      this.view.x += event.clientX - drag.x;
-      this.view.y += event.clientY - drag.y;
-      drag = { x: event.clientX, y: event.clientY };
-      this.isFitted = false;
-      this.move();
-    });
-    for (const name of ["pointerup", "pointerleave"]) this.picture.addEventListener(name, () => { drag = null; });
-  }
-}
-
-function activeOf({ active_states: names }) {
-  return names.filter((name) => name !== "None" && name !== "");
 }
 
 function pathOf(points) {
