@@ -443,11 +443,32 @@ def test_plot_takes_slices_and_waits_for_a_topic(
 
     served = serve()
     page = browse(address(served, "plot?path=/late/data[1:3]"))
-    page.wait_text(".error", "waiting for /late/data[1:3]")
+    page.wait_text(".series-missing .muted", "waiting for /late/data[1:3]")
     served.run(publisher(served, "/late", Float64MultiArray, latch=True).publish(data=[1.0, 2.0, 3.0, 4.0]))
     page.wait_text(".series[data-label='/late/data[1]'] .num", "2")
     page.wait_text(".series[data-label='/late/data[2]'] .num", "3")
     assert page.evaluate("document.querySelectorAll('.series').length") == 2
+
+
+@needs_chromium
+def test_paths_without_a_number_are_named_and_removed(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from std_msgs.msg import Bool
+
+    served = serve()
+    served.run(publisher(served, "/button", Bool, latch=True).publish(Bool(False)))
+    page = browse(address(served, "plot?path=/button&path=/missing"))
+    for number in range(4):
+        page.type("form input", f"/button/wrong{number}")
+        page.click("form button", "Plot")
+        page.wait_text(".series-missing .error", f"/button/wrong{number}: no number there")
+    page.wait_text(".series-missing .muted", "waiting for /missing")
+    for _ in range(5):
+        page.click(".series-missing button")
+    page.wait("return !document.querySelector('.series-missing') && !location.hash.includes('missing')")
+    assert "wrong" not in page.evaluate("location.hash")
+    page.wait_text(".series[data-label='/button/data'] .num", "0")
 
 
 @needs_chromium

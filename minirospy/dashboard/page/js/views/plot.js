@@ -2,7 +2,7 @@
 
 import { Axes, titleOf } from "../axes.js";
 import { KINDS, derivedOf, pairs, rangeOf } from "../derived.js";
-import { download, fill, h, number, setText, uniqueId } from "../dom.js";
+import { download, fill, h, number, refill, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 import { t } from "../texts.js";
@@ -20,7 +20,7 @@ export class Plot {
     this.place = place;
     this.ends = new Map(); // path -> what ends its subscription
     this.series = new Map(); // label -> {label, path, samples, color, axis, isHidden}
-    this.problems = new Map();
+    this.problems = new Map(); // path without a series -> why: an error, or "" while its topic is not there
     this.origin = null;
     this.zoom = null; // {min, max} of time, null: it follows
     this.isPaused = words.get("paused") === "1";
@@ -39,7 +39,7 @@ export class Plot {
 
     this.known = h("datalist", { id: uniqueId("paths") });
     this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
-    this.problem = h("span", { class: "error" });
+    this.waiting = h("div", { role: "status" });
     this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, t(name))));
     const wanted = words.get("window") ?? USUAL_WINDOW;
     this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
@@ -47,7 +47,7 @@ export class Plot {
     this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
     this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
-      this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"), this.problem);
+      this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"));
     this.area = h("div", { class: "panel chart", tabindex: 0, role: "group", "aria-label": "Chart: left and right pan, plus and minus zoom, Escape follows" });
     this.hint = h("p", { class: "empty" }, "Type a path above, choose “plot” next to a field in Topics, or drag the field here.");
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
@@ -57,7 +57,7 @@ export class Plot {
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
         h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow"))),
-      this.axes.element, this.area, this.legend);
+      this.axes.element, this.area, this.waiting, this.legend);
     this.area.append(this.hint);
     for (const element of [this.area, this.form, this.legend]) {
       element.addEventListener("dragover", (event) => { if (event.dataTransfer.types.includes("text/plain")) event.preventDefault(); });
@@ -112,7 +112,7 @@ export class Plot {
 
   add(path) {
     if (this.ends.has(path)) return;
-    this.problems.set(path, t("waiting for {path}", { path }));
+    this.problems.set(path, "");
     this.ends.set(path, this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)));
     this.remember();
     this.showProblems();
@@ -121,9 +121,7 @@ export class Plot {
   remove(series) {
     this.series.delete(series.label);
     if (![...this.series.values()].some((each) => each.path === series.path)) {
-      this.ends.get(series.path)?.();
-      this.ends.delete(series.path);
-      this.problems.delete(series.path);
+      this.forget(series.path);
     } else {
       series.isRemoved = true;
       (this.removed ??= new Set()).add(series.label);
@@ -135,6 +133,14 @@ export class Plot {
     this.showAxis();
     this.remember();
     this.rebuild();
+  }
+
+  /** Plot a path no longer. */
+  forget(path) {
+    this.ends.get(path)?.();
+    this.ends.delete(path);
+    this.problems.delete(path);
+    this.remember();
     this.showProblems();
   }
 
@@ -179,12 +185,14 @@ export class Plot {
   }
 
   showProblems() {
-    setText(this.problem, [...this.problems.values()].slice(0, 3).join(", "));
+    refill(this.waiting, [...this.problems].map(([path, error]) => h("div", { class: "series-missing" },
+      h("span", { class: error ? "error" : "muted" }, error ? `${path}: ${error}` : t("waiting for {path}", { path })),
+      h("button", { type: "button", class: "small", title: t("Remove {name}", { name: path }), onclick: () => this.forget(path) }, "×"))));
   }
 
   received(path, item) {
     if (item.error) {
-      this.problems.set(path, `${path}: ${item.error}`);
+      this.problems.set(path, item.error);
       this.showProblems();
     }
     for (const { label, times, values } of item.series ?? []) {
@@ -285,7 +293,7 @@ export class Plot {
       return;
     }
     const axes = this.axes.drawn(shown, styled);
-    const scale = ({ label }) => [this.axes.scaleOf(label), { range: (_, low, high) => this.axes.rangeOf(label, low === null ? [0, 1] : globalThis.uPlot.rangeNum(low, high, 0.1, true)) }];
+    const scale = ({ label }) => [this.axes.scaleOf(label), { range: (_, low, high) => this.axes.rangeOf(label, low === null || low === high ? rangeOf([[low ?? NaN]]) : globalThis.uPlot.rangeNum(low, high, 0.1, true)) }];
     this.chart = new globalThis.uPlot({
       width: this.area.clientWidth,
       height: this.area.clientHeight,
