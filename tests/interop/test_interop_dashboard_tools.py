@@ -59,7 +59,7 @@ def test_launch_file_is_started_watched_and_stopped(
     page.type(".launch-arg input[name='needed']", "yes")
     # Typed by a program: the form is notified as by a person's keys.
     page.evaluate("document.querySelector('.launch-form').dispatchEvent(new Event('input'))")
-    page.wait_text(".launch-form code", "roslaunch lamp launch/lamp.launch word:='good day' needed:=yes")
+    page.wait_text(".launch-form code", "roslaunch lamp lamp.launch word:='good day' needed:=yes")
     page.click(".launch-form button", "Start")
     page.wait_text("tr[data-node='/talker'] .badge", "running")
     page.wait_text("tr[data-node='/failing'] .badge", "exited: 3")
@@ -198,6 +198,18 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
     served.run(telling.publish(status))
     page.wait("return document.querySelector(\"[data-state='/ROOT/DOCK']\").classList.contains('active')")
     page.wait_text(".smach-events", "DOCK")
+    # The last status of a container that is left stays at its last state, or at the word None.
+    inside = SmachContainerStatus(path="/ROOT/DOCK", initial_states=["ALIGN"], active_states=["PUSH"])
+    served.run(telling.publish(inside))
+    page.wait_text(".smach-now", "now: /ROOT/DOCK/PUSH")
+    status.active_states = ["DRIVE"]
+    served.run(telling.publish(status))
+    page.wait("return document.querySelector('.smach-now').textContent === 'now: /ROOT/DRIVE'")
+    assert page.evaluate("document.querySelectorAll('.smach .active').length") == 1
+    inside.active_states, status.active_states = ["None"], ["DOCK"]
+    for message in (inside, status):
+        served.run(telling.publish(message))
+    page.wait("return document.querySelector('.smach-now').textContent === 'now: /ROOT/DOCK'")
     page.click("[data-state='/ROOT/DOCK/PUSH'] rect")
     page.wait_text(".side h2", "/ROOT/DOCK/PUSH")
     page.click(".side button", "start here next time")

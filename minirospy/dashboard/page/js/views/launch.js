@@ -109,7 +109,11 @@ export class Launch {
 
   showCommand() {
     const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-    setText(this.commandLine, ["roslaunch", ...this.chosen, ...Object.entries(this.given()).map(([name, value]) => `${name}:=${quoted(value)}`)].join(" "));
+    // roslaunch knows a file by its name, wherever it is in its package.
+    const [name, file] = this.chosen;
+    const base = file.slice(file.lastIndexOf("/") + 1);
+    const isOnly = this.files.filter(([each, other]) => each === name && `/${other}`.endsWith(`/${base}`)).length === 1;
+    setText(this.commandLine, ["roslaunch", name, isOnly ? base : file, ...Object.entries(this.given()).map(([name, value]) => `${name}:=${quoted(value)}`)].join(" "));
   }
 
   start() {
