@@ -124,3 +124,9 @@ def test_traffic_and_faults_are_shown_without_subscribing(
         page.wait("return [...document.querySelectorAll('.traffic')].every(e => !e.textContent)")
         assert "groups=1" in page.evaluate("location.hash")
         assert "rates=0" in page.evaluate("location.hash")
+        # The address is the same in every language.
+        page.click("#language")
+        page.wait_text(".bar label", "Raten")
+        assert page.evaluate("[...document.querySelectorAll('.bar label')].map(e => e.firstChild.checked)") == [
+            True, False, True, True,
+        ]  # fmt: skip

@@ -31,7 +31,7 @@ export class Graph {
         svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
     this.details = h("aside", { class: "panel details side", hidden: true });
     this.empty = h("p", { class: "empty" });
-    this.hasRates = h("input", { type: "checkbox", checked: words.get(t("rates")) !== "0", onchange: () => this.change() });
+    this.hasRates = h("input", { type: "checkbox", checked: words.get("rates") !== "0", onchange: () => this.change() });
     this.hasGroups = h("input", { type: "checkbox", checked: words.get("groups") === "1", onchange: () => this.change() });
     this.folds = h("input", { type: "checkbox", checked: words.get("fold") !== "0", onchange: () => this.change() });
     this.faults = h("span", { class: "error", role: "status" });
