@@ -188,7 +188,7 @@ export class Board {
     const distance = person ? Math.max(0, Math.hypot(...person) - REACH) : Infinity;
     if (!this.fields.children.length) {
       const names = [t("warning field"), t("protective field")];
-      fields.forEach((radius, index) => this.fields.append(svg("circle", { r: radius * METRES, class: `field f${index}` }), svg("text", { y: -radius * METRES + 14 }, names[index])));
+      fields.forEach((radius, index) => this.fields.append(svg("circle", { r: radius * METRES, class: `field f${index}` }), svg("text", { y: -radius * METRES - 5 }, names[index])));
     }
     fields.forEach((radius, index) => this.fields.children[index * 2].classList.toggle("hit", distance < radius));
     this.person.classList.toggle("away", !person);
