@@ -243,6 +243,7 @@ def test_series_have_axes_of_their_own_that_are_kept_in_the_address(
 
     page = browse(address(served, "plot?path=/path/x&path=/path/y&path=/path/z&window=all"))
     page.wait_text("#state", "connected")
+    served.run(moving.wait_for_subscribers(1))
     served.run(publish())
     page.wait_text(".series[data-label='/path/z'] .num", "-5")
     page.wait("return document.querySelectorAll('.u-axis.scaled').length === 1")
@@ -285,6 +286,7 @@ def test_axis_is_zoomed_and_panned_alone_by_the_wheel_and_by_dragging(
     words = "plot?path=/path/x&path=/path/y&axis=2+/path/y&range=1+-1+1&range=2+0+21&window=all"
     page = browse(address(served, words))
     page.wait_text("#state", "connected")
+    served.run(moving.wait_for_subscribers(1))
     served.run(publish())
     page.wait(f"return Math.abs({HEIGHT_OF % COLORS['y']} - 0.5) < 0.05")
     x, y = middle(page, 1)
