@@ -517,6 +517,8 @@ class _File:
         if not names.is_legal_base_name(name):
             if "/" in name:
                 raise tag.error(f"node name cannot contain a namespace: [{name}]: use ns")
+            if names.is_private(name):
+                raise tag.error(f"cannot turn [{name}] into a global name")
             self._spec.warnings.append(
                 tag.error(f"illegal <node> name '{name}': letters, digits and _ alone")
             )
@@ -531,6 +533,8 @@ class _File:
         name = tag.optional("name") or test_name
         if "/" in name:
             raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
+        if names.is_private(name):
+            raise tag.error(f"cannot turn [{name}] into a global name")
         node = self._process(tag, scope, name)
         seconds = tag.number_or_empty("time-limit", 60.0, float)
         if seconds <= 0:

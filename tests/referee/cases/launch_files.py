@@ -77,6 +77,8 @@ BODIES = [
     f'{N}><param name="~q" value="2"/><param name="/r" value="3"/><param name="a/b" value="4"/><rosparam param="/abs">1</rosparam></node>',
     f'<group ns="g"><param name="~p" value="1"/>{N} ns="a"/></group><param name="q" value="1"/>',
     '<group ns="/g"><group ns="h"><param name="p" value="1"/></group><group ns="/k"><param name="p" value="1"/></group></group>',
+    '<node pkg="robot" type="t" name="~a"/>', '<node pkg="robot" type="t" name="~a" ns="b"/>',
+    '<test pkg="robot" type="t" test-name="~a"/>', '<test pkg="robot" type="t" test-name="a" name="~b"/>',
     '<group ns=""/>', '<group ns="~a"><param name="p" value="1"/></group>', '<group clear_params="true"/>', '<group clear_params="true" ns="a/b"/>',
     f'{N} clear_params="true" ns="a"/>', include("arg", clear_params="true"), include("arg", clear_params="true", ns="q"),
     '<arg name="a" value="1"/><arg name="a" value="2"/>', '<arg name="a" value="1" default="2"/>', '<arg default="2"/>', '<arg name="a"/>',
