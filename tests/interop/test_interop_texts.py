@@ -178,6 +178,7 @@ def test_keys_of_the_page_show_help_and_other_views(
     page.wait_text("#state", "connected")
     press_key(page, "?", 191, "?")
     page.wait_text("dialog.help", "The view before and after this one")
+    page.wait_text("dialog.help", "3D: the tools, in the order of their buttons")
     page.click("dialog.help button", "Close")
     page.wait("return !document.querySelector('dialog')")
     following = VIEWS[VIEWS.index("topics") + 1]

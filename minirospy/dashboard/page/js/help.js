@@ -11,6 +11,9 @@ const KEYS = [
   ["← ↑ ↓ →  W A S D", "Teleop: drive while they are held"],
   ["1 2", "Board: press its buttons while they are held"],
   ["← ↑ ↓ →", "Layouts: move a pane (its dots) or a divider; Board: move the person"],
+  ["← →  + −  Escape", "Plot, with the focus on the chart: pan, zoom, follow"],
+  ["M C N P G U", "3D: the tools, in the order of their buttons"],
+  ["Space  ← →  Home End", "Bags: play and pause, step, go to the start and the end"],
   ["Escape", "Close what is open"],
 ];
 
