@@ -357,9 +357,29 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
     found: type[Message] = module.__dict__[name.partition("/")[2]]
     # As genpy calls it: programs that read bags look for `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
+    found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
+    _running[id(found)] = found
     # Its source goes with it: a publisher may send any number of definitions.
     weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found
+
+
+_running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
+"""The classes that were made at run time, by their ids: a message that is unpickled finds its own."""
+
+
+def _reduced(message: Any) -> tuple[Any, ...]:
+    """Return how pickle and copy make a message whose class no module has: from its class's text."""
+    kind = type(message)
+    return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
+
+
+def _unpickled(key: int, type_: str, text: str) -> Message:
+    """Return a new message of a class made at run time; in another process its class is made again."""
+    found = _running.get(key)
+    if found is None or (found._type, found._full_text) != (type_, text):
+        found = class_from_text(type_, text)
+    return found.__new__(found)
 
 
 def _imported(name: str, kind: str) -> Any:
