@@ -17,7 +17,7 @@ _V = TypeVar("_V", bound="TVal")
 class TVal:
     """The common part of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalised."""
 
-    __slots__ = ["nsecs", "secs"]
+    __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
         """``secs`` may be a float where ``nsecs`` is 0. Raises ValueError or TypeError."""
@@ -68,6 +68,19 @@ class TVal:
 
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
+
+    # Two times, or two durations, compare themselves; a TVal compares with both.
+    def __lt__(self, other: TVal) -> bool:
+        return self.to_nsec() < other.to_nsec() if isinstance(other, TVal) else NotImplemented
+
+    def __le__(self, other: TVal) -> bool:
+        return self.to_nsec() <= other.to_nsec() if isinstance(other, TVal) else NotImplemented
+
+    def __gt__(self, other: TVal) -> bool:
+        return self.to_nsec() > other.to_nsec() if isinstance(other, TVal) else NotImplemented
+
+    def __ge__(self, other: TVal) -> bool:
+        return self.to_nsec() >= other.to_nsec() if isinstance(other, TVal) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(("time" if isinstance(self, Time) else "duration", self.secs, self.nsecs))
@@ -128,16 +141,16 @@ class Time(TVal):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Time) and self.to_nsec() == other.to_nsec()
 
-    def __lt__(self, other: Time) -> bool:
+    def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __le__(self, other: Time) -> bool:
+    def __le__(self, other: TVal) -> bool:
         return self.to_nsec() <= other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __gt__(self, other: Time) -> bool:
+    def __gt__(self, other: TVal) -> bool:
         return self.to_nsec() > other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __ge__(self, other: Time) -> bool:
+    def __ge__(self, other: TVal) -> bool:
         return self.to_nsec() >= other.to_nsec() if isinstance(other, Time) else NotImplemented
 
     __hash__ = TVal.__hash__
@@ -215,19 +228,23 @@ class Duration(TVal):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Duration) and self.to_nsec() == other.to_nsec()
 
-    def __lt__(self, other: Duration) -> bool:
+    def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __le__(self, other: Duration) -> bool:
+    def __le__(self, other: TVal) -> bool:
         return self.to_nsec() <= other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __gt__(self, other: Duration) -> bool:
+    def __gt__(self, other: TVal) -> bool:
         return self.to_nsec() > other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __ge__(self, other: Duration) -> bool:
+    def __ge__(self, other: TVal) -> bool:
         return self.to_nsec() >= other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
     __hash__ = TVal.__hash__
+
+
+# As genpy's classes name them; the attributes themselves are TVal's.
+Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, NamedTuple, TextIO, TypeVar, cast
 
 from minirospy.errors import (
     DeserializationError,
@@ -44,6 +44,9 @@ _INTEGERS = {
     "char": (0, 256),
 }
 _SEQUENCES = (list, tuple)
+# The older name of the type is one of packages from before 2011.
+_HEADER_TYPES = ("std_msgs/Header", "roslib/Header")
+_TIME_SLOTS = ["secs", "nsecs"]
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.]*", re.ASCII)
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 # From this length on YAML folds a text with spaces in it.
@@ -113,7 +116,7 @@ class Message:
         return [getattr(self, name) for name in self.__slots__]
 
     def __setstate__(self, state: list[object]) -> None:
-        for name, value in zip(self.__slots__, state, strict=True):
+        for name, value in zip(self.__slots__, state, strict=False):
             setattr(self, name, value)
 
     def _get_types(self) -> list[str]:
@@ -121,8 +124,10 @@ class Message:
 
     def _check_types(self, exc: Exception | None = None) -> None:
         """Raise SerializationError on the first field whose value does not fit; else for ``exc`` itself."""
+        # Of an error it is the field that cannot be written; else all that genpy does not take.
+        checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
-            check_type(name, type_, getattr(self, name))
+            _check_field(name, type_, getattr(self, name), checks)
         if exc is not None:
             raise SerializationError(str(exc))
 
@@ -158,20 +163,11 @@ def number_header(message: protocols.Message, sequence: int) -> None:
 
 
 def check_type(field_name: str, field_type: str, field_val: object) -> None:
-    """Raise SerializationError unless the value fits a field of this type (``int8``, ``string[]``, ``pkg/Name``)."""
-    if field_type.endswith("]"):
-        _check_array(field_name, field_type.partition("[")[0], field_val)
-    elif field_type in _CHECKS:
-        _CHECKS[field_type](field_name, field_type, field_val)
-    elif not is_message(field_val) or not hasattr(field_val, "_check_types"):
-        raise SerializationError(
-            f"field {field_name} must be a [{field_type}] instance instead of a {type(field_val)}"
-        )
-    else:
-        if field_val._type != field_type:
-            raise SerializationError(f"field {field_name} must be of type [{field_type}]")
-        for name, type_ in zip(field_val.__slots__, field_val._slot_types, strict=True):
-            check_type(f"{field_name}.{name}", type_, getattr(field_val, name))
+    """Raise SerializationError unless the value fits a field of this type (``int8``, ``string[]``, ``pkg/Name``).
+
+    As genpy: it takes neither a bool for a number nor text beyond ASCII, which both can be sent.
+    """
+    _check_field(field_name, field_type, field_val, _STRICT_CHECKS)
 
 
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
@@ -205,7 +201,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
     ``keys`` are words that represent values ("now", "auto"). Raise MessageException where a name or a number
     of values does not fit, ValueError on values that cannot be fields.
     """
-    if not is_message(msg):
+    if not is_message(msg) or isinstance(msg, type):
         raise ValueError(f"msg must be a Message instance: {msg}")
     words = keys or {}
     if msg_args is None:
@@ -224,8 +220,8 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
         _fill(msg, list(msg_args), words, "")
 
 
-def get_printable_message_args(msg: protocols.Message, buff: object = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots."""
+def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
+    """Return the names of a message's fields in order, nested ones with dots; write them to ``buff``, too."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -237,6 +233,8 @@ def get_printable_message_args(msg: protocols.Message, buff: object = None, pref
                 found.append(path + name)
 
     walk(msg, prefix)
+    if buff is not None:
+        buff.write("".join(f"{name} " for name in found))
     return " ".join(found)
 
 
@@ -300,8 +298,8 @@ def _list_text(values: Sequence[object], indent: str, options: _Options) -> str:
         return "[]"
     first = values[0]
     if isinstance(first, int | float):
-        width = options.width
-        return "[" + ", ".join(_number(value, width) for value in values) + "]"
+        width = None if isinstance(first, bool) else options.width
+        return "[" + ", ".join(_number_or_text(value, width) for value in values) + "]"
     if isinstance(first, str):
         return "".join(f"\n{indent}{line}" for line in _items(values))
     if isinstance(first, TVal) or is_message(first):
@@ -323,6 +321,13 @@ def _number(value: object, width: int | None) -> str:
         text = f"{value:.{width}f}"
         return text[: max(width, text.find("."))]
     return f"{value:{width}d}"
+
+
+def _number_or_text(value: object, width: int | None) -> str:
+    """Return the text of an item of a list that starts with a number: the others may be strings."""
+    if isinstance(value, str):
+        return repr(value) if width is None else _quoted(value)
+    return _number(value, width)
 
 
 def _quoted(text: str) -> str:
@@ -347,14 +352,44 @@ def _items(texts: Sequence[object]) -> list[str]:
 # --- checks
 
 
+_Check = Callable[[str, str, object], None]
+
+
+def _check_field(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
+    """Raise SerializationError unless a value fits its field, and those of its fields theirs, by ``checks``."""
+    if type_.endswith("]"):
+        _check_array(name, type_.removesuffix("]"), value, checks)
+    elif type_ in checks:
+        checks[type_](name, type_, value)
+    elif not is_message(value) or not hasattr(value, "_check_types"):
+        raise SerializationError(f"field {name} must be of type [{type_}]")
+    else:
+        _check_message_type(name, type_, value._type)
+        for inner, inner_type in zip(value.__slots__, value._slot_types, strict=True):
+            _check_field(f"{name}.{inner}", inner_type, getattr(value, inner), checks)
+
+
+def _check_message_type(name: str, expected: str, found: str) -> None:
+    if found in _HEADER_TYPES:
+        if expected not in ("Header", *_HEADER_TYPES):
+            raise SerializationError(f"field {name} must be a Header instead of a {found}")
+    elif found != expected:
+        raise SerializationError(f"field {name} must be of type {expected} instead of {found}")
+
+
+def _is_array(value: object) -> bool:
+    """Return whether a value is an array of numpy's, not a number."""
+    return getattr(value, "ndim", 0) != 0
+
+
 def _check_bool(name: str, type_: str, value: object) -> None:
-    if value not in (True, False, 0, 1):
+    if _is_array(value) or value not in (True, False, 0, 1):
         raise SerializationError(f"field {name} is not a bool")
 
 
 def _check_integer(name: str, type_: str, value: object) -> None:
     low, high = _INTEGERS[type_]
-    if not hasattr(value, "__index__") or int(value) < 0 <= low:
+    if not hasattr(value, "__index__") or _is_array(value) or int(value) < 0 <= low:
         kind = "unsigned" if low == 0 else "an"
         raise SerializationError(f"field {name} must be {kind} integer type")
     if not low <= int(value) < high:
@@ -362,7 +397,7 @@ def _check_integer(name: str, type_: str, value: object) -> None:
 
 
 def _check_float(name: str, type_: str, value: object) -> None:
-    if not isinstance(value, int | float) and not hasattr(value, "__float__"):
+    if not isinstance(value, int | float) and (not hasattr(value, "__float__") or _is_array(value)):
         raise SerializationError(f"field {name} must be float type")
 
 
@@ -376,7 +411,7 @@ def _check_time(name: str, type_: str, value: object) -> None:
         raise SerializationError(f"field {name} must be of type {type_.capitalize()}")
 
 
-_CHECKS: dict[str, Callable[[str, str, object], None]] = {
+_CHECKS: dict[str, _Check] = {
     "bool": _check_bool,
     "string": _check_string,
     "float32": _check_float,
@@ -385,9 +420,47 @@ _CHECKS: dict[str, Callable[[str, str, object], None]] = {
     "duration": _check_time,
     **dict.fromkeys(_INTEGERS, _check_integer),
 }
+"""What can be written."""
 
 
-def _check_array(name: str, base: str, value: object) -> None:
+def _check_strict_integer(name: str, type_: str, value: object) -> None:
+    if type(value) is bool:
+        kind = "unsigned" if _INTEGERS[type_][0] == 0 else "an"
+        raise SerializationError(f"field {name} must be {kind} integer type")
+    _check_integer(name, type_, value)
+
+
+def _check_strict_float(name: str, type_: str, value: object) -> None:
+    if type(value) is bool:
+        raise SerializationError(f"field {name} must be float type")
+    _check_float(name, type_, value)
+
+
+def _check_strict_string(name: str, type_: str, value: object) -> None:
+    _check_string(name, type_, value)
+    if isinstance(value, str) and not value.isascii():
+        raise SerializationError(f"field {name} is a non-ascii string")
+
+
+def _check_strict_time(name: str, type_: str, value: object) -> None:
+    if not isinstance(value, Time if type_ == "time" else Duration):
+        raise SerializationError(f"field {name} must be of type {type_.capitalize()}")
+
+
+_STRICT_CHECKS: dict[str, _Check] = {
+    "bool": _check_bool,
+    "string": _check_strict_string,
+    "float32": _check_strict_float,
+    "float64": _check_strict_float,
+    "time": _check_strict_time,
+    "duration": _check_strict_time,
+    **dict.fromkeys(_INTEGERS, _check_strict_integer),
+}
+"""What genpy's check takes; numpy's numbers, too, which its messages can hold all the same."""
+
+
+def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
+    base = type_.partition("[")[0]
     if isinstance(value, bytes | bytearray | memoryview) and base in ("uint8", "char"):
         return
     if isinstance(value, str | bytes):
@@ -399,7 +472,7 @@ def _check_array(name: str, base: str, value: object) -> None:
     ):
         raise SerializationError(f"field {name} must be a list or tuple type")
     for item in cast("Iterable[object]", value):
-        check_type(f"{name}[]", base, item)
+        _check_field(f"{name}[]", base, item, checks)
 
 
 # --- filling
@@ -421,10 +494,7 @@ def _fill(message: protocols.Message, values: object, words: Mapping[str, object
     if not isinstance(values, list | tuple):
         raise ValueError(f"invalid msg_args type: {values}")
     if len(values) != len(message.__slots__):
-        what = "Too many" if len(values) > len(message.__slots__) else "Not enough"
-        raise MessageException(
-            f"{what} arguments:\n * Given: {list(values)}\n * Expected: {list(message.__slots__)}"
-        )
+        raise _wrong_number(values, message.__slots__)
     for name, type_, value in zip(message.__slots__, message._slot_types, values, strict=True):
         _fill_field(message, name, type_, value, words, path)
 
@@ -434,7 +504,7 @@ def _fill_field(
 ) -> None:
     current = getattr(message, name)
     if isinstance(current, TVal):
-        setattr(message, name, _filled_time(current, value, words))
+        setattr(message, name, _filled_time(current, value, words, f"{path}{name}."))
     elif is_message(current):
         if isinstance(value, str):
             setattr(message, name, _word(value, words))
@@ -460,7 +530,7 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
         )
     if base in ("time", "duration"):
         kind = Time if base == "time" else Duration
-        return [_filled_time(kind(), value, words) for value in values]
+        return [_filled_time(kind(), value, words, "") for value in values]
     if base in _CHECKS:
         return list(values)
     from minirospy.idl.load import message_class
@@ -469,15 +539,18 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
     filled = []
     for value in values:
         element = element_class()
-        _fill(element, value, words, f"{path}{name}[].")
+        # genpy counts the path from the element on.
+        _fill(element, value, words, "")
         filled.append(element)
     return filled
 
 
-def _filled_time(current: TVal, value: object, words: Mapping[str, object]) -> object:
+def _filled_time(current: TVal, value: object, words: Mapping[str, object], path: str) -> object:
     match value:
         case str():
             return _word(value, words)
+        case dict() if unknown := [name for name in value if name not in _TIME_SLOTS]:
+            raise MessageException(f"No field name [{path}{unknown[0]}]")
         case dict() if not value:
             return current
         case {"secs": int(secs), "nsecs": int(nsecs)}:
@@ -486,6 +559,8 @@ def _filled_time(current: TVal, value: object, words: Mapping[str, object]) -> o
             return type(current)(secs, current.nsecs)
         case {"nsecs": int(nsecs), **others} if not others:
             return type(current)(current.secs, nsecs)
+        case list() | tuple() if len(value) != len(_TIME_SLOTS):
+            raise _wrong_number(value, _TIME_SLOTS)
         case [int(secs), int(nsecs)]:
             return type(current)(secs, nsecs)
         case bool():
@@ -497,6 +572,11 @@ def _filled_time(current: TVal, value: object, words: Mapping[str, object]) -> o
             return value
 
     raise ValueError(f"invalid msg_args type: {value}")
+
+
+def _wrong_number(values: Sequence[object], names: Sequence[str]) -> MessageException:
+    what = "Too many" if len(values) > len(names) else "Not enough"
+    return MessageException(f"{what} arguments:\n * Given: {list(values)}\n * Expected: {list(names)}")
 
 
 def _word(word: str, words: Mapping[str, object]) -> object:

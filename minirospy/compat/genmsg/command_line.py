@@ -7,10 +7,10 @@ from collections.abc import Iterable
 __all__ = ["includepath_to_dict"]
 
 
-def includepath_to_dict(includepath: Iterable[str]) -> dict[str, list[str]]:
+def includepath_to_dict(includepath: Iterable[str] | None) -> dict[str, list[str]]:
     """Return package -> folders of the values ``package:folder`` of the option ``-I``; those without a package at ''."""
     found: dict[str, list[str]] = {}
-    for value in includepath:
+    for value in includepath or ():
         package, colon, folder = value.partition(":")
         if not colon:
             package, folder = "", value

@@ -17,9 +17,11 @@ from minirospy.compat.genmsg.msgs import (
     bare_msg_type,
     is_builtin,
     resolve_type,
+    why_invalid,
 )
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
+from minirospy.compat.roslib.names import package_resource_name
 from minirospy.errors import DefinitionError
 from minirospy.idl import digest
 from minirospy.idl.parse import parse_message, parse_service
@@ -156,7 +158,11 @@ def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> 
 
 def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> MsgSpec:
     """Add the message of a file to the context, and return it. Raises InvalidMsgSpec, OSError."""
-    spec = load_msg_from_string(msg_context, _text(file_path), full_name)
+    text = _text(file_path)
+    try:
+        spec = load_msg_from_string(msg_context, text, full_name)
+    except InvalidMsgSpec as error:
+        raise InvalidMsgSpec(f"{file_path}: {error}") from error
     msg_context.set_file(full_name, file_path)
     return spec
 
@@ -164,7 +170,7 @@ def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
     """Add a message to the context by its name, and return it. Raises InvalidMsgSpec, MsgNotFound."""
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
-    package, _, base = name.rpartition("/")
+    package, base = package_resource_name(name)
     return load_msg_from_file(msg_context, get_msg_file(package, base, search_path), name)
 
 
@@ -186,7 +192,7 @@ def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
     """Return a service by its name. Raises InvalidMsgSpec, MsgNotFound."""
-    package, _, base = srv_type.rpartition("/")
+    package, base = package_resource_name(srv_type)
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
 
@@ -232,15 +238,15 @@ def parsed_message(spec: MsgSpec) -> MessageSpec:
 
 
 def _parsed(text: str, full_name: str) -> MessageSpec:
-    package, _, name = full_name.rpartition("/")
+    package, name = package_resource_name(full_name)
     try:
         return parse_message(text, package, name)
     except DefinitionError as error:
-        raise InvalidMsgSpec(str(error)) from error
+        raise InvalidMsgSpec(why_invalid(text) or str(error)) from error
 
 
 def parsed_service(text: str, full_name: str) -> ServiceSpec:
-    package, _, name = full_name.rpartition("/")
+    package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
         # genmsg reads a text without the line between, and one with several, too.
@@ -248,7 +254,8 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     try:
         return parse_service(text, package, name)
     except DefinitionError as error:
-        raise InvalidMsgSpec(str(error)) from error
+        parts = (request, "\n".join(responses))
+        raise InvalidMsgSpec(next(filter(None, map(why_invalid, parts)), str(error))) from error
 
 
 def _msg_spec(parsed: MessageSpec) -> MsgSpec:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from typing import NamedTuple
+
+from minirospy.compat.genmsg.base import InvalidMsgSpec
 
 __all__ = [
     "BUILTIN_TYPES",
@@ -25,6 +28,7 @@ __all__ = [
     "is_valid_msg_type",
     "parse_type",
     "resolve_type",
+    "why_invalid",
 ]
 
 HEADER = "Header"
@@ -40,6 +44,12 @@ PRIMITIVE_TYPES = [
 ]  # fmt: skip
 
 BUILTIN_TYPES = [*PRIMITIVE_TYPES, "time", "duration"]
+_RANGES = {
+    **{f"int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, (1 << bits) - 1) for bits in (8, 16, 32, 64)},
+    "byte": (-128, 127),
+    "char": (0, 255),
+}
 _HEADERS = ("Header", HEADER_FULL_NAME, "roslib/Header")
 
 
@@ -99,6 +109,8 @@ class MsgSpec:
     ) -> None:
         if len(types) != len(names):
             raise ValueError(f"len of args must match: {len(types)} types, {len(names)} names")
+        if len(set(names)) != len(names):
+            raise InvalidMsgSpec(f"Duplicate field names in message: {names}")
 
         self.types = types
         self.names = names
@@ -153,7 +165,7 @@ def is_header_type(msg_type: str) -> bool:
 
 def is_valid_msg_type(x: str) -> bool:
     """Return whether a text is a type's name, with or without brackets."""
-    return bool(x) and re.match(r"[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
+    return bool(x) and re.match(r"(?!.*//)[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
 
 
 def is_valid_msg_field_name(x: str | None) -> bool:
@@ -193,3 +205,55 @@ def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
     if not rest.endswith("]") or (length and not length.isdecimal()):
         raise ValueError(f"Invalid array dimension: [{length}]")
     return base, True, int(length) if length else None
+
+
+def why_invalid(text: str) -> str | None:
+    """Return genmsg's words for the first fault of a definition; None where genmsg finds none."""
+    names: list[str] = []
+    for line in text.splitlines():
+        bare = line.split("#")[0].strip()
+        if not bare:
+            continue
+        why = _why_no_constant(bare) if "=" in bare else _why_no_field(bare, line, names)
+        if why:
+            return why
+    return f"Duplicate field names in message: {names}" if len(set(names)) != len(names) else None
+
+
+def _why_no_field(bare: str, line: str, names: list[str]) -> str | None:
+    words = bare.split()
+    if len(words) != 2:
+        return f"Invalid declaration: {line}"
+    type_, name = words
+    if not is_valid_msg_field_name(name):
+        return f"{name} is not a legal message field name"
+    if not is_valid_msg_type(type_):
+        return f"{type_} is not a legal message field type"
+    try:
+        parse_type(type_)
+    except ValueError as error:
+        return f"invalid field: {error}"
+    names.append(name)
+    return None
+
+
+def _why_no_constant(bare: str) -> str | None:
+    type_, _, declared = bare.partition(" ")
+    if not is_valid_constant_type(type_):
+        return f"{type_} is not a legal constant type"
+    try:
+        _check_value(type_, declared.partition("=")[2].strip())
+    except (ValueError, SyntaxError) as error:
+        return f"Invalid constant value: {error}"
+    return None
+
+
+def _check_value(type_: str, value: str) -> None:
+    if type_ in ("float32", "float64"):
+        float(value)
+    elif type_ == "bool":
+        ast.literal_eval(value)
+    elif type_ in _RANGES:
+        low, high = _RANGES[type_]
+        if not low <= int(value) <= high:
+            raise ValueError(f"cannot coerce [{value}] to {type_} (out of bounds)")

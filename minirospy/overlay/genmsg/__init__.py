@@ -1,6 +1,8 @@
 """genmsg, provided by minirospy: definitions of messages and services, as code generators read them."""
 
 from genmsg import base as base
+from genmsg import command_line as command_line
+from genmsg import deps as deps
 from genmsg import gentools as gentools
 from genmsg import msg_loader as msg_loader
 from genmsg import msgs as msgs
