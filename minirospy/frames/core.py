@@ -172,13 +172,17 @@ class BufferCore:
         header, where, turn = message.header, message.transform.translation, message.transform.rotation
         parent, child = header.frame_id, message.child_frame_id
         _check_names(parent, child)
+        if not isinstance(authority, str):
+            kind = None if authority is None else type(authority).__name__
+            raise TypeError(f"argument 2 must be str, not {kind}")
         with self._lock:
             self._tree.insert(
                 parent,
                 child,
                 nanoseconds(header.stamp),
-                (where.x, where.y, where.z),
-                (turn.x, turn.y, turn.z, turn.w),
+                # A lookup gives floats, whatever was set: integers, or numpy's numbers.
+                (float(where.x), float(where.y), float(where.z)),
+                (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
                 authority,
                 is_static=is_static,
             )

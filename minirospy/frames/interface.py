@@ -120,7 +120,8 @@ def convert(a: object, b_type: type[_T]) -> _T:
     except TypeException:
         if type(a) is b_type:
             return deepcopy(a)
-        return registration.get_from_msg(b_type)(registration.get_to_msg(type(a))(a))
+        to_msg = registration.get_to_msg(type(a))
+        return registration.get_from_msg(b_type)(to_msg(a))
     return directly(a)
 
 

@@ -71,7 +71,7 @@ def test_registered_types_are_transformed_and_converted() -> None:
     assert (type(result), result.x, result.header.frame_id) == (Thing, 5.0, "map")
     assert buffer.transform_full(thing, "odom", times.Time(6), "map").header.frame_id == "odom"
 
-    with pytest.raises(TypeException, match="Other'> if not loaded or supported"):
+    with pytest.raises(TypeException, match="Thing'> if not loaded or supported"):
         buffer.transform(thing, "map", new_type=Other)
     ConvertRegistration().add_convert((Thing, Other), lambda each: Other(-each.x))
     assert buffer.transform(thing, "map", new_type=Other).x == -5.0

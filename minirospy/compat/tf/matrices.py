@@ -282,7 +282,7 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]
     values, vectors = numpy.linalg.eig(m[:3, :3])
     (found,) = numpy.where(abs(numpy.real(values) - 1.0) < 1e-4)
     if len(found) < 2:
-        raise ValueError(f"no two linear independent eigenvectors found {values}")
+        raise ValueError(f"No two linear independent eigenvectors found {values}")
     in_plane = numpy.real(vectors[:, found]).squeeze().T
     normal = numpy.zeros(3)
     longest = -1.0
