@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from actionlib_msgs.msg import GoalStatus
+
 from minirospy.graph.goals import ClientState, GoalState, SimpleState
 
 __all__ = [
@@ -78,3 +80,7 @@ class SimpleGoalState:
     def to_string(cls, n: int) -> str:
         """Return the name of a state."""
         return get_name_of_constant(cls, n)
+
+
+# As ROS's actionlib does it: `GoalStatus.to_string(client.get_state())`.
+GoalStatus.to_string = classmethod(get_name_of_constant)  # type: ignore[attr-defined]
