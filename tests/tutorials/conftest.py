@@ -1,0 +1,3 @@
+from tests.robots.conftest import start
+
+__all__ = ["start"]
