@@ -155,6 +155,15 @@ def test_parameters_are_changed_and_corrected_by_the_server(
         f"return !document.querySelector({json.dumps(ROW.format('brightness') + 'input[type=range]')}).disabled"
     )
 
+    # Limits, slider and field are one line.
+    control = json.dumps(ROW.format("power") + ".control")
+    tops, bottoms = page.evaluate(
+        "(boxes => [boxes.map(e => e.top), boxes.map(e => e.bottom)])"
+        f"([...document.querySelector({control}).children].map(e => e.getBoundingClientRect()))"
+    )
+    assert len(tops) == 4
+    assert max(tops) < min(bottoms)
+
     enter(page, "brightness", "0.25")
     lines_until(program, "callback 1")
     enter(page, "power", "1000")
