@@ -184,6 +184,7 @@ def test_missing_frame_is_named_until_it_comes(serve: Serve, browse: Browse) -> 
         "Transform: No transform from [lost] to fixed frame [map]: Frame [lost] does not exist",
     )
     assert levels(page)["LaserScan /scan"] == "error"
+    page.wait("return document.querySelector(\"[data-name='LaserScan /scan'] .dot.error\").offsetWidth > 0")
     send("/tf", TFMessage([robot_scene.transform("odom", "lost", 0, 1)]))
     status(page, "LaserScan /scan", "Transform: Transform OK")
     page.choose("select[aria-label='Fixed frame']", "odom")
