@@ -448,12 +448,10 @@ def _check_strict_time(name: str, type_: str, value: object) -> None:
 
 
 _STRICT_CHECKS: dict[str, _Check] = {
-    "bool": _check_bool,
+    **_CHECKS,
     "string": _check_strict_string,
-    "float32": _check_strict_float,
-    "float64": _check_strict_float,
-    "time": _check_strict_time,
-    "duration": _check_strict_time,
+    **dict.fromkeys(("float32", "float64"), _check_strict_float),
+    **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
 }
 """What genpy's check takes; numpy's numbers, too, which its messages can hold all the same."""
