@@ -228,7 +228,7 @@ class _Run:
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
-        """Yield the commands of a function, in a scope of its own, or of a macro, in which arguments are no variables."""
+        """Yield the commands of a function, in a new scope, or of a macro, whose arguments are not variables."""
         macro = self._macros[name]
         values = {
             **dict(zip(macro.parameters, arguments, strict=False)),

@@ -267,7 +267,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # What is no bytes must fail before a part of it is in the chunk.
+            # A body that is not bytes must fail before a part of it is in the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))

@@ -168,7 +168,7 @@ for handle in handles[::-1]:
     handle.unregister()
     show(shared.ref_count, shared.closed)
 
-# Names that the master refuses: the program is told by a line, and goes on.
+# Names that the master refuses: a line is logged, and the program goes on.
 
 
 class Lines(logging.Handler):
