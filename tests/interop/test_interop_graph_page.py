@@ -130,3 +130,87 @@ def test_traffic_and_faults_are_shown_without_subscribing(
         assert page.evaluate("[...document.querySelectorAll('.bar label')].map(e => e.firstChild.checked)") == [
             True, False, True, True,
         ]  # fmt: skip
+
+
+def register_dead(name: str, topic: str) -> None:
+    """Register a subscriber that does not answer."""
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        answer = master.registerSubscriber(name, topic, "std_msgs/String", "http://127.0.0.1:1/")
+        assert answer[0] == 1, answer  # type: ignore[index]
+
+
+def key_of(topic: str) -> str:
+    return f".graph [data-key='t{topic}']"
+
+
+@needs_chromium
+def test_click_is_not_lost_while_the_graph_changes(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    for topic in ("/first", "/second", "/third"):
+        register_dead("/dead", topic)
+        publisher(served, topic, String)
+    page = browse(address(served, "graph"))
+    page.click(key_of("/first"))
+    page.wait_text(".side h2", "/first")
+    # The first topic loses the focus to what is pressed, and the graph changes before the release.
+    page.press(key_of("/second"))
+    register_dead("/late", "/second")
+    page.wait_text("[role=status].error", "2 dead nodes")
+    page.release(key_of("/second"))
+    page.wait_text(".side h2", "/second")
+    page.wait("return document.querySelector(\"[data-key='n/late']\")")
+    # The drawing is new: the keyboard stays where it was.
+    assert page.evaluate("document.activeElement.dataset.key") == "t/second"
+    # The page moves below the mouse.
+    page.press(key_of("/third"))
+    x, y = middle(page, key_of("/third"))
+    page.evaluate("document.querySelector('.bar').style.paddingBottom = '200px'")
+    mouse(page, "mouseReleased", x, y)
+    page.wait_text(".side h2", "/third")
+    assert page.evaluate("document.querySelectorAll('.side h2').length") == 1
+
+
+@needs_chromium
+def test_drag_of_a_node_moves_the_drawing_and_a_trembling_click_does_not(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    register_dead("/dead", "/words")
+    publisher(served, "/words", String)
+    page = browse(address(served, "graph"))
+    page.wait(f'return document.querySelector("{key_of("/words")}")')
+    where = "document.querySelector('.graph > g').getAttribute('transform')"
+    before = page.evaluate(where)
+    drag(page, key_of("/words"), 60)
+    assert page.evaluate(where) != before
+    assert page.evaluate("document.querySelector('.side').hidden")
+    page.click("button", "Fit")
+    assert page.evaluate(where) == before
+    drag(page, key_of("/words"), 2)
+    page.wait_text(".side h2", "/words")
+    # It is still fitted: the details take a part of the room.
+    page.wait(f"return {where} !== {before!r}")
+
+
+def middle(page: Page, find: str) -> tuple[float, float]:
+    x, y = page.evaluate(
+        f'{{ const r = document.querySelector("{find}").getBoundingClientRect();'
+        "[r.x + r.width / 2, r.y + r.height / 2] }"
+    )
+    return x, y
+
+
+def mouse(page: Page, kind: str, x: float, y: float) -> None:
+    held = {} if kind == "mouseReleased" else {"buttons": 1}
+    page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1, **held)
+
+
+def drag(page: Page, find: str, by: float) -> None:
+    """Drag an element to the right, as a mouse does."""
+    x, y = middle(page, find)
+    mouse(page, "mousePressed", x, y)
+    for part in (0.5, 1):
+        mouse(page, "mouseMoved", x + by * part, y)
+    mouse(page, "mouseReleased", x + by, y)

@@ -43,9 +43,13 @@ export function fill(element, ...children) {
   append(element, children);
 }
 
-// A button that is replaced between press and release loses its click.
+// A button that is replaced or moves away between press and release loses its click.
+const PRESSABLE = "a, button, summary, label, input[type=checkbox], [role=button]";
 const waiting = new Map(); // element -> what draws it
 let pressed = null;
+let press = null; // {element, x, y} of the last one, until its click
+
+export const SLOP = 5; // pixels that a pointer may move in a click
 
 /** Draw the contents of an element again for new data; where something in it is pressed, after its release. */
 export function redraw(element, draw) {
@@ -54,7 +58,15 @@ export function redraw(element, draw) {
     return;
   }
   waiting.delete(element);
+  const focused = element.contains(document.activeElement) ? document.activeElement : null;
+  const name = focused && identityOf(focused);
   draw();
+  if (focused && !focused.isConnected) [...element.querySelectorAll(focused.tagName)].find((each) => identityOf(each) === name)?.focus({ preventScroll: true });
+}
+
+// What was focused, and its successor in the new drawing.
+function identityOf(element) {
+  return JSON.stringify([{ ...element.dataset }, element.getAttribute("aria-label") ?? element.textContent]);
 }
 
 /** Replace what is in an element, as redraw() does. */
@@ -73,12 +85,28 @@ function drawWaiting() {
 
 /** Notice what is pressed in a window, for redraw(). */
 export function watchPresses(window) {
-  window.addEventListener("pointerdown", ({ target, button }) => {
-    pressed = button === 0 ? target.closest("a, button, summary, label, input[type=checkbox], [role=button]") : null;
+  window.addEventListener("pointerdown", ({ target, button, clientX: x, clientY: y }) => {
+    pressed = button === 0 ? target.closest(PRESSABLE) : null;
+    press = pressed && { element: pressed, x, y };
   }, true);
   // A list of choices or another window may take the release.
   window.addEventListener("pointermove", ({ buttons }) => { if (pressed && !buttons) release(); }, true);
-  for (const name of ["pointerup", "pointercancel", "blur"]) window.addEventListener(name, release, true);
+  for (const name of ["pointerup", "pointercancel"]) window.addEventListener(name, release, true);
+  // Elements lose the focus, too: the one before loses it to what is pressed.
+  window.addEventListener("blur", ({ target }) => { if (target === window) release(); }, true);
+  window.addEventListener("click", resend, true);
+}
+
+/** Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has got it. */
+function resend(event) {
+  const { element, x, y } = press ?? {};
+  press = null;
+  if (!element?.isConnected || !event.isTrusted || event.composedPath().includes(element) || !event.target.contains(element)) return;
+  if (Math.hypot(event.clientX - x, event.clientY - y) > SLOP) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const { clientX, clientY, detail, ctrlKey, shiftKey, altKey, metaKey } = event;
+  element.dispatchEvent(new MouseEvent("click", { bubbles: true, cancelable: true, view: window, clientX, clientY, detail, ctrlKey, shiftKey, altKey, metaKey }));
 }
 
 let uniqueIds = 0;

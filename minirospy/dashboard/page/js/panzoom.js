@@ -1,5 +1,7 @@
 // A drawing in an SVG that is moved by dragging, and zoomed by the wheel or two fingers.
 
+import { SLOP } from "./dom.js";
+
 export class PanZoom {
   /** ``picture`` is the svg, ``drawing`` the g in it; ``label`` names it for screen readers. */
   constructor(picture, drawing) {
@@ -9,6 +11,8 @@ export class PanZoom {
     this.view = { x: 0, y: 0, scale: 1 };
     this.isFitted = true;
     this.pointers = new Map();
+    this.pressedAt = null;
+    this.isDragged = false;
     this.listen();
     this.observer = new ResizeObserver(() => { if (this.isFitted) this.fit(); });
     this.observer.observe(picture);
@@ -52,7 +56,16 @@ export class PanZoom {
       const box = this.picture.getBoundingClientRect();
       this.zoom(Math.exp(-event.deltaY * 0.0015), event.clientX - box.left, event.clientY - box.top);
     }, { passive: false });
-    this.picture.addEventListener("pointerdown", (event) => this.pointers.set(event.pointerId, event));
+    this.picture.addEventListener("pointerdown", (event) => {
+      this.pointers.set(event.pointerId, event);
+      this.pressedAt = event;
+      this.isDragged = this.pointers.size > 1;
+    });
+    // What the drawing was dragged by is not clicked.
+    this.picture.addEventListener("click", (event) => {
+      if (this.isDragged && event.isTrusted && event.detail) event.stopPropagation();
+      this.isDragged = false;
+    }, true);
     this.picture.addEventListener("pointermove", (event) => this.moved(event));
     for (const name of ["pointerup", "pointercancel", "pointerleave"]) this.picture.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
   }
@@ -66,6 +79,9 @@ export class PanZoom {
       const box = this.picture.getBoundingClientRect();
       this.zoom(distance(event) / Math.max(1, distance(before)), (event.clientX + other.clientX) / 2 - box.left, (event.clientY + other.clientY) / 2 - box.top);
     } else if (this.pointers.size === 1) {
+      // The hand moves a little in a click, too.
+      this.isDragged ||= Math.hypot(event.clientX - this.pressedAt.clientX, event.clientY - this.pressedAt.clientY) > SLOP;
+      if (!this.isDragged) return;
       this.view.x += event.clientX - before.clientX;
       this.view.y += event.clientY - before.clientY;
       this.isFitted = false;
