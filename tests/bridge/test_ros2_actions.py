@@ -198,21 +198,22 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 @pytest.mark.usefixtures("master")
 def test_a_goal_waits_until_responses_of_the_server_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("minirospy.bridge.ros2.action_to_ros2._REACH_SECONDS", 0.01)
-    monkeypatch.setattr("minirospy.bridge.ros2.action_to_ros2._REACH_AGAIN", 0.01)
-    monkeypatch.setattr("minirospy.bridge.ros2.action_to_ros2._ACCEPT_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.bridge.ros2.reach._AGAIN_SECONDS", 0.01)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = SEND_GOAL
         side.has_found_client = False
         assert await bridge.look()
         there = side.action_clients["/fly"]
+        probe = there.prober
+        assert probe
         async with ActionClient(node, "/fly", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
             # One request after the other gets no response.
-            await until(lambda: len(there.reaching) >= 3 and goal.state is GoalState.PENDING)
+            await until(lambda: len(probe.reaching) >= 3 and goal.state is GoalState.PENDING)
             assert not there.goals
-            there.answers = True
+            probe.answers = True
             _, _, handle = await sent(side, 0)
             handle.ended.set_result((SUCCEEDED, cdr(1)))
             assert list((await goal).sequence) == [1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import struct
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -231,10 +232,40 @@ class FakeSubscription:
 
 
 @dataclass
-class FakeClient:
-    """A client whose server answers as ``response`` says, or never."""
+class FakeProbe:
+    """Requests without effect, which are answered while ``answers`` holds."""
+
+    answers: bool = True
+    is_ready: bool = True
+    reaching: list[Future[None]] = field(default_factory=list)
+    closed: int = 0
+
+    def reach(self) -> Future[None]:
+        self.reaching.append(Future())
+        if self.answers:
+            self.reaching[-1].set_result(None)
+        return self.reaching[-1]
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@dataclass
+class FakeReachable:
+    """A client of ``servers``: where they can lose responses, ``prober`` is what reaches them, None for nothing."""
 
     is_ready: bool = True
+    servers: frozenset[bytes] | None = frozenset({b"1"})
+    prober: FakeProbe | None = field(default_factory=FakeProbe)
+
+    def probe(self) -> FakeProbe | None:
+        return self.prober
+
+
+@dataclass
+class FakeClient(FakeReachable):
+    """A client whose server answers as ``response`` says, or never."""
+
     response: bytes | None = None
     requests: list[bytes] = field(default_factory=list)
     is_closed: bool = False
@@ -272,21 +303,12 @@ class FakeGoal:
 
 
 @dataclass
-class FakeActionClient:
+class FakeActionClient(FakeReachable):
     """A client whose server accepts each goal, or refuses it."""
 
-    is_ready: bool = True
-    answers: bool = True
     accepts: bool = True
     goals: list[tuple[bytes, Callable[[bytes], None], FakeGoal]] = field(default_factory=list)
     is_closed: bool = False
-    reaching: list[Future[None]] = field(default_factory=list)
-
-    def reach(self) -> Future[None]:
-        self.reaching.append(Future())
-        if self.answers:
-            self.reaching[-1].set_result(None)
-        return self.reaching[-1]
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         self.goals.append((goal, feedback, FakeGoal()))
@@ -302,8 +324,16 @@ class FakeActionClient:
 class FakeActionServer:
     accept: Accept
     is_closed: bool = False
+    closing: int = 0
+    may_close: threading.Event = field(default_factory=threading.Event)
+    """What closing it waits for."""
+
+    def __post_init__(self) -> None:
+        self.may_close.set()
 
     def close(self) -> None:
+        self.closing += 1
+        assert self.may_close.wait(20)
         self.is_closed = True
 
 
@@ -328,7 +358,7 @@ class FakeSide:
 
     domain = "0"
     has_found_client = True
-    """Whether a server's responses reach the clients of its action."""
+    """Whether a server's responses reach its clients."""
 
     def __init__(self) -> None:
         self.graph: dict[str, Ros2Topic] = {}
@@ -380,7 +410,7 @@ class FakeSide:
         return known[type_]
 
     def client(self, service: str, type_: str) -> FakeClient:
-        self.clients[service] = FakeClient()
+        self.clients[service] = FakeClient(prober=FakeProbe(self.has_found_client))
         return self.clients[service]
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> FakeServer:
@@ -394,7 +424,7 @@ class FakeSide:
         return {"order": "int32"}, sequence, sequence
 
     def action_client(self, action: str, type_: str) -> FakeActionClient:
-        self.action_clients[action] = FakeActionClient(answers=self.has_found_client)
+        self.action_clients[action] = FakeActionClient(prober=FakeProbe(self.has_found_client))
         return self.action_clients[action]
 
     def action_server(self, action: str, type_: str, accept: Accept) -> FakeActionServer:

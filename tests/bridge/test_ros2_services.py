@@ -138,6 +138,38 @@ def test_a_client_of_ros1_gets_the_reason_of_a_failure() -> None:
 
 
 @pytest.mark.usefixtures("master")
+def test_the_first_call_waits_until_responses_of_the_server_arrive() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        side.offered["/set"] = SET_BOOL
+        side.has_found_client = False
+        await bridge.look()
+        client = side.clients["/set"]
+        client.response = b"\0\1\0\0\1\0\0\0\3\0\0\0ok\0"
+        assert client.prober
+        await until(lambda: client.prober and client.prober.reaching)
+        calling = asyncio.ensure_future(call(node, "/set", b"\1"))
+        await until(lambda: len(client.prober.reaching) > 1 if client.prober else False)
+        assert not client.requests
+        client.prober.answers = True
+        client.prober.reaching[-1].set_result(None)
+        assert await calling == b"\1\2\0\0\0ok"
+
+        # Calls that wait end with the link.
+        client.servers = frozenset({b"2"})
+        client.prober.answers = False
+        calling = asyncio.ensure_future(call(node, "/set", b"\1"))
+        sent = len(client.prober.reaching)
+        await until(lambda: client.prober and len(client.prober.reaching) > sent)
+        side.offered.clear()
+        assert await bridge.look()
+        with pytest.raises(ServiceException, match="has no server in ROS 2 any more"):
+            await calling
+        assert len(client.requests) == 1
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
 def test_a_call_ends_with_the_server_of_ros2() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered["/set"] = SET_BOOL

@@ -1,5 +1,7 @@
 """A node of real ROS 2, run by a Python that has rclpy: does what lines of JSON on its input say, prints what came.
 
+An argument names it.
+
 {"op": "subscribe", "topic": ..., "type": "std_msgs/String", "reliable": true, "latched": false}
 {"op": "publish", "topic": ..., "type": ..., "data": hex of the CDR, "count": 1, "latched": false}: once a subscriber is there
 {"op": "serve", "topic": ..., "type": ..., "fields": {...}}: a service that answers so; {} in a text is the request's first
@@ -76,7 +78,7 @@ class Peer:
     """The node; a method for each operation, which gets the command."""
 
     def __init__(self):
-        self.node = rclpy.create_node("peer", enable_rosout=False)
+        self.node = rclpy.create_node(*(sys.argv[1:] or ["peer"]), enable_rosout=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.thread = threading.Thread(target=self.spin)

@@ -9,6 +9,7 @@ import json
 import os
 import queue
 import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -106,12 +107,12 @@ class Peer:
         found = self.wait(lambda each: each["op"] == "answer" and each["topic"] == service)
         return dict(found["fields"])
 
-    def wait(self, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    def wait(self, accepts: Callable[[dict[str, Any]], bool], limit: float = LIMIT) -> dict[str, Any]:
         for number, each in enumerate(self._kept):
             if accepts(each):
                 return self._kept.pop(number)
         while True:
-            each = self._said.get(timeout=LIMIT)
+            each = self._said.get(timeout=limit)
             if accepts(each):
                 return each
             assert each["op"] != "ended", "the peer has ended: see its error"
@@ -556,6 +557,38 @@ def test_a_server_of_ros2_is_called_from_ros1(scene: Scene) -> None:
     assert "md5sums do not match" in str(refused)
     scene.peer.do("close", "/there")
     scene.until(lambda graph: "/there" not in graph.services)
+
+
+def test_the_first_call_waits_until_the_server_has_found_the_bridge(scene: Scene, tmp_path: Path) -> None:
+    """rmw_fastrtps drops the response to a client whose reader it has not found."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("needs a C compiler")
+    library, hold = tmp_path / "late_discovery.so", tmp_path / "hold"
+    source = HERE / "late_discovery.c"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
+    late = {"LD_PRELOAD": library, "LATE_DISCOVERY": hold, "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+    environment = {**scene.environment, **{name: str(value) for name, value in late.items()}}
+    other = Peer(environment, [str(PYTHON), str(HERE / "ros2_peer.py"), "late_peer"])
+    try:
+        # The two processes know each other; what is new is the client of one more service.
+        other.do("serve", "/early", type=ADD, fields={"success": True})
+        scene.until(lambda graph: "/early" in graph.services)
+        assert scene.call("/early", ADD, text("a")) == [b"\1" + text("")]
+
+        hold.touch()
+        other.do("serve", "/late", type=ADD, fields={"success": True})
+        scene.until(lambda graph: "/late" in graph.services)
+        results: queue.Queue[list[bytes | BaseException]] = queue.Queue()
+        calling = threading.Thread(target=lambda: results.put(scene.call("/late", ADD, text("b"))))
+        calling.start()
+        with pytest.raises(queue.Empty):
+            other.wait(lambda each: each["op"] == "request" and each["topic"] == "/late", limit=3.0)
+        hold.unlink()
+        assert results.get(timeout=LIMIT) == [b"\1" + text("")]
+        calling.join()
+    finally:
+        other.close()
 
 
 def test_a_call_of_ros1_ends_with_the_server_of_ros2(scene: Scene) -> None:

@@ -16,6 +16,7 @@ from minirospy.bridge.ros2.action_messages import (
     statuses_message,
 )
 from minirospy.bridge.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
+from minirospy.bridge.ros2.reach import Reach
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import BridgeError, DeserializationError, ROSException
 from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
@@ -41,7 +42,6 @@ _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _REACH_SECONDS = 2.0
 """How long the opening of other links waits for a server."""
-_REACH_AGAIN, _REACH_SLOWEST = 0.5, 8.0
 _ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
 """actionlib in Python drops what comes before its send_goal has returned."""
@@ -104,23 +104,24 @@ class GoalsToRos2:
         ]
         self._faults = Faults(node.log, f"action {link.action}")
         self._telling = asyncio.ensure_future(keep_running(self._publish_statuses, self._faults))
-        self._reaching = asyncio.ensure_future(self._reach())
+        self._reach = Reach(self._client)
 
     async def open(self) -> None:
         """Wait for the server in ROS 2, then until the master knows it."""
-        await asyncio.wait([self._reaching], timeout=_REACH_SECONDS)
+        self._reach.start()
+        await self._reach.wait(_REACH_SECONDS)
         for end in (self._status, self._result, self._feedback, *self._subscriptions):
             await end
 
     async def close(self) -> None:
         """End it: goals that run are aborted."""
         self._ended.set()
-        self._reaching.cancel()
+        await self._reach.close()
         if self._tasks:
             await asyncio.wait(self._tasks, timeout=1.0)
         for task in (*self._tasks, self._telling):
             task.cancel()
-        await asyncio.gather(*self._tasks, self._telling, self._reaching, return_exceptions=True)
+        await asyncio.gather(*self._tasks, self._telling, return_exceptions=True)
         for end in (*self._subscriptions, self._status, self._result, self._feedback):
             await end.close()
         self._client.close()
@@ -177,8 +178,7 @@ class GoalsToRos2:
         try:
             await asyncio.sleep(_ACK_SECONDS)
             await self._become_ready()
-            # A server that is busy may not have answered yet: it gets the goal all the same.
-            await asyncio.wait([self._reaching], timeout=_ACCEPT_SECONDS)
+            await self._reach.wait()
             async with self._turns:
                 sending = self._client.send(request, lambda data: self._pass_feedback(goal, data))
                 goal.there = await asyncio.wait_for(self._watched(sending), _ACCEPT_SECONDS)
@@ -204,19 +204,6 @@ class GoalsToRos2:
         self._changed.set()
         with contextlib.suppress(ROSException):
             self._result.publish_raw(status_and_body(*self._now(), goal.status, body))
-
-    async def _reach(self) -> None:
-        """Send requests without effect until one is answered: before, the server's responses may be lost."""
-        pause = _REACH_AGAIN
-        while True:
-            if not self._client.is_ready:
-                await asyncio.sleep(0.02)
-                continue
-            # BridgeError: the goals that follow will have the same reason.
-            with contextlib.suppress(asyncio.TimeoutError, BridgeError):
-                await asyncio.wait_for(asyncio.wrap_future(self._client.reach()), pause)
-                return
-            pause = min(2 * pause, _REACH_SLOWEST)
 
     async def _become_ready(self) -> None:
         """Wait for the server: that of an action that was found a moment ago may not be connected yet."""

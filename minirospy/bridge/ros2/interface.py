@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from minirospy.bridge.ros2.links import Ros2Topic
 from minirospy.bridge.ros2.parameter_values import Value
+from minirospy.bridge.ros2.reach import Reachable
 
 if TYPE_CHECKING:
     from minirospy.bridge.ros2.rclpy_actions import Accept, Ros2Goal
@@ -22,6 +23,7 @@ __all__ = [
     "Ros2Client",
     "Ros2Handle",
     "Ros2Parameters",
+    "Ros2Probe",
     "Ros2Publisher",
     "Ros2Side",
 ]
@@ -45,12 +47,21 @@ class Ros2Handle(Protocol):
     def close(self) -> None: ...
 
 
-class Ros2Client(Protocol):
-    """A client of a service; its methods may be called from any thread."""
+class Ros2Probe(Protocol):
+    """Requests without effect to a client's servers; its methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
-        """Whether a server is connected."""
+        """Whether the servers are connected."""
+
+    def reach(self) -> Future[None]:
+        """Send one; return the future of its response: from then on no response to the client is lost."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Client(Reachable, Protocol):
+    """A client of a service; its methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
         """Send a request and return the future response, both as CDR. It fails with BridgeError."""
@@ -58,15 +69,8 @@ class Ros2Client(Protocol):
     def close(self) -> None: ...
 
 
-class Ros2ActionClient(Protocol):
+class Ros2ActionClient(Reachable, Protocol):
     """A client of an action; its methods may be called from any thread."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether a server is connected."""
-
-    def reach(self) -> Future[None]:
-        """Send a request without effect; return the future of its response: from then on no other response is lost."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return the future accepted goal, None where it is refused. It fails with BridgeError."""

@@ -12,12 +12,16 @@ import threading
 import uuid
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, InvalidStateError
-from typing import Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
+from minirospy.bridge.ros2.action_links import send_goal_service
 from minirospy.bridge.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
 from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos1", "GoalOfRos2", "Ros2Goal"]
+
+if TYPE_CHECKING:
+    from minirospy.bridge.ros2.interface import Ros2Probe
 
 _T = TypeVar("_T")
 
@@ -137,6 +141,7 @@ class ActionClient:
 
     def __init__(self, calls: Calls, name: str, class_: ActionClass) -> None:
         self._calls = calls
+        self._name = name
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
@@ -159,12 +164,17 @@ class ActionClient:
         """Return whether a server is connected. From any thread."""
         return bool(self._client.server_is_ready())
 
-    def reach(self) -> Future[None]:
-        """Cancel a goal that nobody has; return the future of the response. From any thread.
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """The ids of the servers. From any thread."""
+        return self._calls.servers(send_goal_service(self._name))
 
-        A server finds a client's ends later than the client finds the server, in the order in which they were made: feedback,
-        goals, cancels. Before, rmw_fastrtps drops its responses after 100 ms, and rclpy then runs a goal that counts as refused.
-        """
+    def probe(self) -> Ros2Probe:
+        """Return what cancels a goal that nobody has: cancels are the last of the client's ends that is made."""
+        return _CancelProbe(self)
+
+    def reach(self) -> Future[None]:
+        """Cancel a goal that nobody has; return the future of the response. From any thread."""
         reached: Future[None] = Future()
 
         def answered(_: object) -> None:
@@ -235,6 +245,23 @@ class ActionClient:
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
+
+
+class _CancelProbe:
+    """Reaches the servers of an action by its client, which stays open."""
+
+    def __init__(self, client: ActionClient) -> None:
+        self._client = client
+
+    @property
+    def is_ready(self) -> bool:
+        return self._client.is_ready
+
+    def reach(self) -> Future[None]:
+        return self._client.reach()
+
+    def close(self) -> None:
+        pass
 
 
 def _uuid_message(id: bytes) -> object:

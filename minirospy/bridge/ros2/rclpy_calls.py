@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Callable, Coroutine, Generator
+from collections.abc import Callable, Coroutine, Generator, Sequence
 from concurrent.futures import CancelledError, Future, InvalidStateError
 from types import TracebackType
 from typing import Protocol, TypeVar
 
+from minirospy.bridge.ros2.parameter_values import ParameterService
 from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Message",
     "MessageClass",
     "NotAnsweredError",
+    "ParameterProbe",
     "RclpyFuture",
     "RclpySubscription",
     "Server",
@@ -34,6 +36,8 @@ _REASONS = ("message", "status_message", "error_message", "error_string", "error
 
 _DEPTH = 1000
 """Requests or responses that may wait for the bridge."""
+
+_GUID_PREFIX = 12
 
 _T = TypeVar("_T")
 
@@ -110,6 +114,12 @@ class _RclpyClient(Protocol):
     def service_is_ready(self) -> bool: ...
 
 
+class _EndpointInfo(Protocol):
+    node_name: str
+    node_namespace: str
+    endpoint_gid: Sequence[int]
+
+
 class _Logger(Protocol):
     def error(self, text: str) -> object: ...
 
@@ -143,6 +153,8 @@ class ServiceNode(Protocol):
 
     def get_logger(self) -> _Logger: ...
 
+    def get_publishers_info_by_topic(self, topic: str, *, no_mangle: bool) -> Sequence[_EndpointInfo]: ...
+
 
 # --- clients and servers
 
@@ -161,6 +173,9 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
+        # In rmw_zenoh a response takes the path of its request.
+        rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
+        self._loses_responses = not rmw.startswith("rmw_zenoh")
         # A request that waits for its answer does not keep the others waiting.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
@@ -175,6 +190,30 @@ class Calls:
     def server(self, name: str, class_: ServiceClass, answer: Callable[[bytes], Future[bytes]]) -> Server:
         """Offer a service."""
         return Server(self, name, class_, answer)
+
+    def servers(self, service: str) -> frozenset[bytes] | None:
+        """Return the ids of a service's servers; None where no response can be lost. From any thread."""
+        if not self._loses_responses:
+            return None
+        return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
+
+    def parameter_probe(self, service: str) -> ParameterProbe | None:
+        """Return what reaches the nodes that serve; None where one has no parameters, or is not known yet. From any thread."""
+        names = set()
+        for server in self._writers(service):
+            name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
+            # Another process may have a node of the same name, whose answer would say nothing of this one.
+            if {_process(each) for each in self._writers(name)} != {_process(server)}:
+                return None
+            names.add(name)
+        if not names:
+            return None
+        class_ = importlib.import_module("rcl_interfaces.srv").GetParameters
+        return ParameterProbe([self.client(name, class_) for name in sorted(names)])
+
+    def _writers(self, service: str) -> Sequence[_EndpointInfo]:
+        """Return what is known of the publishers of a service's responses, whose topic DDS names so."""
+        return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
         """Destroy something in the executor's thread, which may be about to wait for it. From any thread.
@@ -211,6 +250,7 @@ class Client:
 
     def __init__(self, calls: Calls, name: str, class_: ServiceClass) -> None:
         self._calls = calls
+        self._name = name
         self._class = class_
         self._client = calls.node.create_client(class_, name, **calls.options)
 
@@ -219,12 +259,25 @@ class Client:
         """Return whether a server is connected. From any thread."""
         return bool(self._client.service_is_ready())
 
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """The ids of the servers; None where no response can be lost. From any thread."""
+        return self._calls.servers(self._name)
+
+    def probe(self) -> ParameterProbe | None:
+        """Return what reads no parameters of the nodes that serve."""
+        return self._calls.parameter_probe(self._name)
+
     def call(self, request: bytes) -> Future[bytes]:
         """Send a request and return the future response, both as CDR. From any thread."""
         answered: Future[bytes] = Future()
         # In the executor's thread: no response arrives before its request is noted.
         self._calls.executor.create_task(self._send, request, answered)
         return answered
+
+    def call_empty(self) -> Future[bytes]:
+        """Send a request that has the default values of its fields. From any thread."""
+        return self.call(self._calls.serialize(self._class.Request()))
 
     def close(self) -> None:
         """End the client."""
@@ -254,6 +307,46 @@ class Client:
 
         pending.add_done_callback(arrived)
         answered.add_done_callback(forget)
+
+
+class ParameterProbe:
+    """Reaches nodes by their parameter services: a request for no parameters has no effect."""
+
+    def __init__(self, clients: Sequence[Client]) -> None:
+        self._clients = clients
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether all nodes are connected. From any thread."""
+        return all(client.is_ready for client in self._clients)
+
+    def reach(self) -> Future[None]:
+        """Send a request to each; return the future of the last response. From any thread."""
+        reached: Future[None] = Future()
+        sent = [client.call_empty() for client in self._clients]
+
+        def answered(_: object) -> None:
+            try:
+                if all(each.done() and each.result() for each in sent):
+                    reached.set_result(None)
+            except InvalidStateError:
+                return
+            except (CancelledError, BridgeError) as error:
+                _fail(reached, BridgeError(_line(error)))
+
+        def forget(_: object) -> None:
+            for each in sent:
+                each.cancel()
+
+        for each in sent:
+            each.add_done_callback(answered)
+        reached.add_done_callback(forget)
+        return reached
+
+    def close(self) -> None:
+        """End the clients."""
+        for client in self._clients:
+            client.close()
 
 
 class Server:
@@ -296,7 +389,12 @@ class Server:
         return response
 
 
-def _fail(future: Future[bytes], error: Exception) -> None:
+def _process(info: _EndpointInfo) -> bytes:
+    """Return the part of an end's id that all ends of a process share. Source: RTPS 2.5, 9.3.1."""
+    return bytes(info.endpoint_gid)[:_GUID_PREFIX]
+
+
+def _fail(future: Future[bytes] | Future[None], error: Exception) -> None:
     with contextlib.suppress(InvalidStateError):
         future.set_exception(error)
 

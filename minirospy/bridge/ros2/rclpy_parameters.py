@@ -7,6 +7,7 @@ import functools
 import importlib
 import time
 from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Protocol, TypeVar, cast
 
@@ -17,6 +18,7 @@ from minirospy.errors import BridgeError, MinirospyError
 __all__ = ["NodeParameters", "ParameterServer", "ParameterStore"]
 
 _SECONDS = 5.0
+_AGAIN_SECONDS = 0.5
 _T = TypeVar("_T")
 _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
@@ -157,16 +159,40 @@ class NodeParameters:
                 if time.monotonic() >= end:
                     raise BridgeError(f"the node [{node}] of ROS 2 has no parameters, or is not there")
                 time.sleep(0.02)
+            end = time.monotonic() + _SECONDS
             request = type_.Request()
-            for name, value in fields.items():
-                _set(request, name, value)
+            empty = self._calls.serialize(request)
             try:
-                data = client.call(self._calls.serialize(request)).result(_SECONDS)
+                # The node may not have found the client yet, and its responses are lost: see reach.py.
+                data = _first(lambda: client.call(empty), end)
+                if fields:
+                    for name, value in fields.items():
+                        _set(request, name, value)
+                    data = _result(client.call(self._calls.serialize(request)), end)
             except FutureTimeoutError:
                 raise BridgeError(f"the node [{node}] of ROS 2 does not answer") from None
             return self._calls.deserialize(data, type_.Response)
         finally:
             client.close()
+
+
+def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
+    """Call until there is a response, and return it. Raise TimeoutError."""
+    pause = _AGAIN_SECONDS
+    while True:
+        try:
+            return _result(call(), min(end, time.monotonic() + pause))
+        except FutureTimeoutError:
+            if time.monotonic() >= end:
+                raise
+        pause *= 2
+
+
+def _result(future: Future[bytes], end: float) -> bytes:
+    try:
+        return future.result(max(0.0, end - time.monotonic()))
+    finally:
+        future.cancel()
 
 
 # --- objects of ROS 2, whose classes are not known here

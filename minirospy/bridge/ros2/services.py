@@ -13,6 +13,7 @@ from minirospy.aio.raw import RawService, call_raw, service_header
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction, is_bridge
+from minirospy.bridge.ros2.reach import Reach
 from minirospy.bridge.ros2.rules import Rules
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
 from minirospy.bridge.tasks import Faults
@@ -188,14 +189,17 @@ class _InRos1:
         self._ended = asyncio.Event()
         self._turns = asyncio.Semaphore(_MOST_UNDER_WAY)
         self._client: Ros2Client = side.client(link.service, link.ros2_type)
+        self._reach = Reach(self._client)
         self._server = RawService(node, link.service, codec.type, self._answer)
 
     async def open(self) -> None:
+        self._reach.start()
         await self._server
 
     async def close(self) -> None:
         # The calls under way are answered with the reason.
         self._ended.set()
+        await self._reach.close()
         await self._server.close()
         self._client.close()
 
@@ -217,6 +221,9 @@ class _InRos1:
         end = loop.time() + self._call_seconds
         name = self._link.service
         if not await self._becomes_ready():
+            raise BridgeError(f"service [{name}] has no server in ROS 2 any more")
+        await self._reach.wait(end - loop.time())
+        if self._ended.is_set():
             raise BridgeError(f"service [{name}] has no server in ROS 2 any more")
 
         answered = asyncio.wrap_future(self._client.call(request))

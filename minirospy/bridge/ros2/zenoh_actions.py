@@ -156,11 +156,12 @@ class ZenohActionClient:
         clients = (self._send_goal, self._get_result, self._cancel_goal)
         return bool(publishers) and all(each.is_ready for each in clients)
 
-    def reach(self) -> Future[None]:
-        """Return a future that is done: a response takes the path of its request, which the tokens show to be there."""
-        reached: Future[None] = Future()
-        reached.set_result(None)
-        return reached
+    @property
+    def servers(self) -> None:
+        """None: a response takes the path of its request, which the tokens show to be there."""
+
+    def probe(self) -> None:
+        """Return None: nothing has to be reached."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return the accepted goal, None where it is refused. It fails with BridgeError."""
