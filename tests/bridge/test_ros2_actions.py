@@ -309,6 +309,30 @@ def test_a_result_that_has_come_when_the_link_ends_is_not_lost() -> None:
 
 
 @pytest.mark.usefixtures("master")
+def test_the_loop_goes_on_while_an_action_leaves_ros2() -> None:
+    """A server of ROS 2 waits until it has sent what is known."""
+
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        async def execute(_: Any) -> dict[str, list[int]]:
+            return {}
+
+        server = await ActionServer(node, "/fly", FibonacciAction, execute)
+        await bridge.look()
+        await server.close()
+        there = side.action_servers["/fly"]
+        there.may_close.clear()
+        looking = asyncio.ensure_future(bridge.look())
+        await until(lambda: there.closing)
+        with pytest.raises(BridgeError, match="no longer bridged"):
+            await asyncio.wrap_future(there.accept(cdr()[:4] + bytes(4), lambda _: None))
+        there.may_close.set()
+        assert await looking
+        assert there.is_closed
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
 def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = {**SEND_GOAL, "/odd/_action/send_goal": "odd_msgs/Odd_SendGoal"}

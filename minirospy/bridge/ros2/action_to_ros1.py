@@ -90,6 +90,7 @@ class GoalsToRos1:
         self._faults = Faults(node.log, f"action {link.action}")
         self._heard = asyncio.Event()
         self._server: Ros2Handle | None = None
+        self._is_closed = False
 
         def publisher(name: str) -> Publisher[Message]:
             return node.advertise(f"{link.action}/{name}", codec.classes[name], tcp_nodelay=True)
@@ -112,13 +113,15 @@ class GoalsToRos1:
         """End it: goals that run are aborted, those whose result has come get it."""
         # A result that has come is taken in the next round.
         await asyncio.sleep(0)
+        self._is_closed = True
         for goal in list(self._goals.values()):
             self._end(goal, ABORTED, None)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._server:
-            self._server.close()
+            # It waits until what is known is sent.
+            await self._loop.run_in_executor(None, self._server.close)
         for end in (*self._subscriptions, self._goal, self._cancel):
             await end.close()
 
@@ -131,6 +134,9 @@ class GoalsToRos1:
     def _start(
         self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
     ) -> None:
+        if self._is_closed:
+            accepted.set_exception(BridgeError("it is no longer bridged"))
+            return
         # Those that are being accepted, and those that run.
         if len(self._tasks) + len(self._goals) >= MOST_GOALS:
             accepted.set_exception(BridgeError(f"the bridge passes on {MOST_GOALS} goals already"))
