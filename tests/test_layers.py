@@ -37,6 +37,7 @@ LAYERS = [
         "child_lifetime",
         "clock",
         "environment",
+        "installation",
         "keyboard",
         "log_levels",
         "names",

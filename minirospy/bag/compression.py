@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import TypeVar
 
 from minirospy.errors import BagCompressionError, BagFormatError
+from minirospy.installation import install_command
 
 __all__ = ["BZ2", "COMPRESSIONS", "LZ4", "NONE", "check_compression", "compress", "decompress"]
 
@@ -64,7 +65,7 @@ def _lz4_frame() -> ModuleType:
     try:
         import lz4.frame  # type: ignore[import-untyped]
     except ImportError as error:
-        raise BagCompressionError(LZ4, "install its library: pip install lz4") from error
+        raise BagCompressionError(LZ4, f"install its library: {install_command('lz4')}") from error
     frame: ModuleType = lz4.frame
     return frame
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO, cast
 
 from minirospy.bag.writer import Buffer
 from minirospy.errors import BagCompressionError, BagError, BagFormatError
+from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -43,7 +44,9 @@ def check_mcap() -> None:
         import mcap.records  # noqa: F401 - the rest is imported where it is needed
         import zstandard  # noqa: F401
     except ImportError as error:
-        raise BagError(f"MCAP files need the library {error.name}: pip install 'minirospy[mcap]'") from error
+        raise BagError(
+            f"MCAP files need the library {error.name}: {install_command('minirospy[mcap]')}"
+        ) from error
 
 
 def check_mcap_compression(name: str) -> None:

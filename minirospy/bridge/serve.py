@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
+from minirospy.installation import install_command
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.signal_dispatch import interrupt_signals
 
@@ -37,7 +38,7 @@ def require_libraries() -> None:
         import websockets.server  # noqa: F401 only whether it is there
     except ImportError as error:
         raise BridgeError(
-            f"the bridge needs the library {error.name}: python -m pip install 'minirospy[web]'"
+            f"the bridge needs the library {error.name}: {install_command('minirospy[web]')}"
         ) from error
 
 

@@ -14,6 +14,7 @@ from typing import Protocol
 
 from minirospy.errors import BridgeError
 from minirospy.escape import escaped, has_controls
+from minirospy.installation import install_command
 
 __all__ = [
     "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "Matching", "NetworkOptions", "Outlet", "Query", "Reply",
@@ -188,7 +189,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> No
     if has_many_links:
         # Before the import: Zenoh reads it once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
-    line = "python -m pip install --upgrade 'minirospy[fleet]'"
+    line = install_command("minirospy[fleet]", upgrade=True)
     try:
         importlib.import_module("zenoh.ext")
     except ImportError as error:

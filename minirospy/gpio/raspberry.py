@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from minirospy.installation import install_command
+
 __all__ = ["model_name", "warn_of_missing_library"]
 
 _MODEL_FILE = Path("/proc/device-tree/model")
@@ -24,7 +26,7 @@ def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
     name = model_name(file)
     if name is not None:
         print(
-            f"RPi.GPIO: this {name}'s own pins are not used, the virtual board is: "
-            "`pip install minirospy[pi]` brings the real library",
+            f"RPi.GPIO: this {name}'s own pins are not used, the virtual board is; "
+            f"for the real library: {install_command('minirospy[pi]')}",
             file=sys.stderr,
         )

@@ -13,6 +13,7 @@ from minirospy.errors import MinirospyError
 from minirospy.idl.arrays import arrays_from_bytes
 from minirospy.idl.message import Message as BaseMessage
 from minirospy.idl.protocols import Buffer, Message, Writer
+from minirospy.installation import install_command
 
 __all__ = ["NumpyMissingError", "numpy_class"]
 
@@ -23,7 +24,7 @@ class NumpyMissingError(MinirospyError, ImportError):
     """numpy is not installed."""
 
     def __str__(self) -> str:
-        return "numpy_msg needs numpy, which is not installed: pip install numpy"
+        return f"numpy_msg needs numpy, which is not installed: {install_command('numpy')}"
 
 
 @lru_cache(maxsize=256)

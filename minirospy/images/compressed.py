@@ -1,9 +1,11 @@
-"""Compressed images: by OpenCV where it is installed, else by Pillow (`pip install 'minirospy[images]'`)."""
+"""Compressed images: by OpenCV where it is installed, else by Pillow (`pip install "minirospy[images]"`)."""
 
 from __future__ import annotations
 
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     from minirospy.images.encodings import Pixels
@@ -132,6 +134,6 @@ def _pillow() -> Any:
         from PIL import Image
     except ImportError as error:
         raise ValueError(
-            "compressed images need OpenCV or Pillow: pip install 'minirospy[images]'"
+            f"compressed images need OpenCV or Pillow: {install_command('minirospy[images]')}"
         ) from error
     return Image

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from minirospy.errors import MinirospyError
+from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -107,7 +108,8 @@ def _read_by_pillow(data: bytes) -> Pixels:
         from PIL import Image, UnidentifiedImageError
     except ImportError:
         raise ImageError(
-            "only PGM, PPM and PBM images are read without Pillow: `pip install 'minirospy[images]'`, or convert it to PGM"
+            "only PGM, PPM and PBM images are read without Pillow; convert it to PGM, or install Pillow: "
+            f"{install_command('minirospy[images]')}"
         ) from None
     try:
         with Image.open(BytesIO(data)) as image:

@@ -8,6 +8,7 @@ import time
 from typing import Any, Protocol, runtime_checkable
 
 from minirospy.errors import MinirospyError
+from minirospy.installation import install_command
 
 __all__ = ["File", "FilePort", "Port", "PortError", "SerialPort", "SocketPort"]
 
@@ -57,7 +58,9 @@ class SerialPort:
         try:
             import serial  # type: ignore[import-not-found,import-untyped,unused-ignore]
         except ImportError as error:
-            raise ImportError("serial ports need pyserial: `pip install 'minirospy[serial]'`") from error
+            raise ImportError(
+                f"serial ports need pyserial: {install_command('minirospy[serial]')}"
+            ) from error
 
         self._errors: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
         try:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from minirospy.errors import MinirospyError
+from minirospy.installation import install_command
 from minirospy.teleop.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, LARGEST, Event
 from minirospy.teleop.rumble import Rumble, RumbleError, event_device
 
@@ -162,7 +163,7 @@ class PygameDevice:
             import pygame  # type: ignore[import-not-found,unused-ignore]
         except ImportError:
             raise DeviceError(
-                "joysticks need pygame-ce on this system: `pip install 'minirospy[joy]'`"
+                f"joysticks need pygame-ce on this system: {install_command('minirospy[joy]')}"
             ) from None
         self._pygame: Any = pygame
         pygame.init()

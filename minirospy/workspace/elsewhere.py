@@ -5,6 +5,8 @@ It is consulted where a package, a program or a module is not found: what a work
 
 from __future__ import annotations
 
+from minirospy.installation import install_command
+
 __all__ = ["IMPORTED", "SUBMODULES", "advice"]
 
 _RUN_IT_THERE = (
@@ -12,10 +14,7 @@ _RUN_IT_THERE = (
     "and run it there with the same ROS_MASTER_URI: it works with minirospy's nodes"
 )
 _DEFINITIONS = "it holds definitions: `git clone {repository}` in a workspace's src, `catkin_make`, and source devel/setup.bash"
-_QT = (
-    "`pip install PyQt5 pydot catkin_pkg`, clone {repository} into a workspace's src, `catkin_make`, and source "
-    "devel/setup.bash"
-)
+_QT = "{command}, clone {repository} into a workspace's src, `catkin_make`, and source devel/setup.bash"
 
 _NAVIGATION = "localization and navigation, in C++"
 _CPP = {
@@ -199,7 +198,9 @@ def advice(name: str) -> str:
         return f"minirospy does not have it: {_INSTEAD[name]}"
     if name in _QT_PLUGINS or name in _QT_LIBRARIES or name == "rqt":
         plugin = name if name in _QT_PLUGINS else "the plug-in"
-        return f"a window of Qt, from its source: {_QT.format(repository=_QT_REPOSITORIES.format(plugin=plugin))}"
+        command = install_command("PyQt5", "pydot", "catkin_pkg")
+        how = _QT.format(command=command, repository=_QT_REPOSITORIES.format(plugin=plugin))
+        return f"a window of Qt, from its source: {how}"
     if name in _MESSAGES:
         return f"minirospy does not bring it: {_DEFINITIONS.format(repository=_MESSAGES[name])}"
     return ""

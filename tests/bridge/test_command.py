@@ -20,6 +20,7 @@ from minirospy.bridge.tokens import kept_tokens, read_tokens
 from minirospy.cli import bridge as command
 from minirospy.environment import Environment
 from minirospy.errors import BridgeError
+from minirospy.installation import install_command
 from tests.bridge.conftest import Client
 from tests.conftest import free_port
 
@@ -207,7 +208,7 @@ def test_missing_library_is_named_with_the_command(
     monkeypatch.setitem(sys.modules, "websockets", None)
     monkeypatch.setitem(sys.modules, "websockets.server", None)
     assert command.main([]) == 1
-    assert "python -m pip install 'minirospy[web]'" in capsys.readouterr().err
+    assert install_command("minirospy[web]") in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -226,7 +227,7 @@ def test_missing_library_ends_a_node_in_one_line(package: str, program: str) -> 
     )
     assert done.returncode == 1
     assert done.stderr.startswith(f"{program}: ERROR: the bridge needs the library websockets")
-    assert "pip install 'minirospy[web]'" in done.stderr
+    assert install_command("minirospy[web]") in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -24,6 +24,7 @@ from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, in_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
 from minirospy.bridge.fleet.rules import GatewayRules, parse_rates
 from minirospy.errors import BridgeError, ServiceException
+from minirospy.installation import install_command
 from tests.bridge.fleet import SECONDS, Fleet, Place
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 from tests.conftest import free_port
@@ -499,7 +500,7 @@ def test_the_missing_library_is_named(
     found = importlib.import_module
     monkeypatch.setattr("minirospy.bridge.fleet.network.importlib.import_module", missing)
     assert main(["status"]) == 1
-    assert "python -m pip install --upgrade 'minirospy[fleet]'" in capsys.readouterr().err
+    assert install_command("minirospy[fleet]", upgrade=True) in capsys.readouterr().err
 
 
 def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:

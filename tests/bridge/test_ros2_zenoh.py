@@ -24,6 +24,7 @@ from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
 from minirospy.cli.ros2_bridge import main
 from minirospy.errors import BridgeError
+from minirospy.installation import install_command
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_zenoh_keys import SERVICE_HASHES, STRING_HASH
 from tests.conftest import free_port
@@ -490,7 +491,7 @@ def test_without_the_library_one_line_says_what_to_install(
     assert main(["--zenoh"]) == 1
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "python -m pip install --upgrade 'minirospy[fleet]'" in error
+    assert install_command("minirospy[fleet]", upgrade=True) in error
 
 
 @pytest.mark.parametrize("version", ["0.11.0", "1.3.9", "2.0.0"])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
 from minirospy.cli.ros.rosdep import main
+from minirospy.installation import install_command
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_as_tutorials_type_it(source: Path, capsys: pytest.CaptureFixture[str]) 
     said = capsys.readouterr()
     assert said.out.splitlines() == [
         "libopencv-dev (of room): no package of Python or of ROS here",
-        f"python3-no-such-thing (of lamp, room): {sys.executable} -m pip install no-such-thing",
+        f"python3-no-such-thing (of lamp, room): {install_command('no-such-thing')}",
     ]
     assert said.err.startswith("rosdep: not installed")
     assert main(words) == 1

@@ -10,6 +10,8 @@ import pytest
 from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
+from minirospy.installation import install_command
+
 bridge = CvBridge()
 
 
@@ -88,7 +90,7 @@ def without(module: str, code: str) -> str:
 )
 def test_colors_that_need_opencv_say_so(source: str, wanted: str, size: int) -> None:
     code = f"CvBridge().imgmsg_to_cv2(Image(height=2, width=2, encoding={source!r}, data=bytes({size})), {wanted!r})"
-    text = f"converting [{source}] to [{wanted}] needs OpenCV: pip install opencv-python-headless\n"
+    text = f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}\n"
     assert without("cv2", code) == text
 
 
@@ -99,7 +101,7 @@ def test_brightness_of_yuv_needs_no_opencv() -> None:
 
 def test_compressed_images_without_pillow_say_what_to_install() -> None:
     text = without("PIL", "CvBridge().cv2_to_compressed_imgmsg(np.zeros((2, 2), np.uint8))")
-    assert text == "compressed images need OpenCV or Pillow: pip install 'minirospy[images]'\n"
+    assert text == f"compressed images need OpenCV or Pillow: {install_command('minirospy[images]')}\n"
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"not an image", b"\x89PNG\r\n\x1a\n" + bytes(40)])

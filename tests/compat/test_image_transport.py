@@ -26,6 +26,7 @@ from minirospy.compat.image_transport.codecs import (
     uncompressed_depth,
 )
 from minirospy.compat.image_transport.republish import settings_of
+from minirospy.installation import install_command
 
 BRIDGE = CvBridge()
 PROGRAM = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "image_transport" / "nodes" / "republish"
@@ -274,7 +275,10 @@ def test_missing_library_is_logged_before_any_image(master: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
-    assert done.stderr.count("compressed images need OpenCV or Pillow: pip install 'minirospy[images]'") == 1
+    assert (
+        done.stderr.count(f"compressed images need OpenCV or Pillow: {install_command('minirospy[images]')}")
+        == 1
+    )
     assert "Traceback" not in done.stderr
 
 

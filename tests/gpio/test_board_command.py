@@ -19,6 +19,7 @@ from minirospy.cli.board import main, render
 from minirospy.gpio.board import Board
 from minirospy.gpio.raspberry import model_name, warn_of_missing_library
 from minirospy.gpio.rpigpio import BCM, IN, OUT, PUD_UP, Gpio
+from minirospy.installation import install_command
 
 
 def test_press_get_release(capsys: pytest.CaptureFixture[str]) -> None:
@@ -141,7 +142,7 @@ def test_real_raspberry_pi_is_warned_of_the_missing_library(
     file.write_bytes(b"Raspberry Pi 4 Model B Rev 1.4\0")
     assert model_name(file) == "Raspberry Pi 4 Model B Rev 1.4"
     warn_of_missing_library(file)
-    assert "`pip install minirospy[pi]`" in capsys.readouterr().err
+    assert install_command("minirospy[pi]") in capsys.readouterr().err
 
 
 def test_the_person(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import MinirospyError, UsageError
+from minirospy.installation import install_command
 from minirospy.maps.grid import (
     MapError,
     Mode,
@@ -133,7 +135,7 @@ def test_any_text_is_a_map_or_one_error(text: str) -> None:
 
 def test_image_without_pillow_names_what_to_install(images: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "PIL", None)
-    with pytest.raises(ImageError, match=r"pip install 'minirospy\[images\]'"):
+    with pytest.raises(ImageError, match=re.escape(install_command("minirospy[images]"))):
         read_image((images / "grey.png").read_bytes())
     assert read_image((images / "grey.pgm").read_bytes()).values.size == 16
 

@@ -26,6 +26,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from minirospy.errors import SerializationError
 from minirospy.idl.load import class_from_text
+from minirospy.installation import install_command
 
 
 def wire(message: Any) -> bytes:
@@ -152,7 +153,7 @@ def test_without_numpy_it_says_so() -> None:
         "except ImportError as error: print(error)"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout == "numpy_msg needs numpy, which is not installed: pip install numpy\n"
+    assert out.stdout == f"numpy_msg needs numpy, which is not installed: {install_command('numpy')}\n"
 
 
 NODE = """

@@ -11,6 +11,7 @@ import pytest
 
 from minirospy.bag import records
 from minirospy.bag.writer import BagWriter
+from minirospy.installation import install_command
 from tests.recording.conftest import (
     GUARD,
     STRING,
@@ -459,7 +460,7 @@ def test_a_missing_extra_is_named(start: Start) -> None:
     _, errors = process.communicate(timeout=GUARD)
 
     assert process.returncode == 1
-    assert "pip install 'minirospy[mcap]'" in errors
+    assert install_command("minirospy[mcap]") in errors
 
 
 def test_launch_files_start_both_programs(talker: Talker, tmp_path: Path) -> None:

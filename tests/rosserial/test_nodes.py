@@ -16,6 +16,7 @@ from rosserial_msgs.msg import TopicInfo
 from std_msgs.msg import String
 
 from minirospy import Node
+from minirospy.installation import install_command
 from minirospy.rosserial.endpoints import to_bytes
 from minirospy.rosserial.packets import Decoder, Packet, encode
 from minirospy.rosserial.ports import SerialPort
@@ -241,7 +242,7 @@ def test_missing_pyserial_names_what_to_install(master: str) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 1
-    assert "serial ports need pyserial: `pip install 'minirospy[serial]'`" in done.stderr
+    assert f"serial ports need pyserial: {install_command('minirospy[serial]')}" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Joy
 
 from minirospy import Node
+from minirospy.installation import install_command
 from minirospy.teleop import devices
 from minirospy.teleop.devices import DeviceError, PygameDevice, find_by_name, open_device
 from minirospy.teleop.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, Event
@@ -258,5 +260,5 @@ def test_pygame_gives_the_events_of_linux(monkeypatch: pytest.MonkeyPatch) -> No
 def test_missing_pygame_names_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     monkeypatch.setattr(devices.sys, "platform", "darwin")
-    with pytest.raises(DeviceError, match=r"pip install 'minirospy\[joy\]'"):
+    with pytest.raises(DeviceError, match=re.escape(install_command("minirospy[joy]"))):
         open_device(str(tmp_path / "js0"))

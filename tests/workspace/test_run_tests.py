@@ -15,6 +15,7 @@ import pytest
 from minirospy.cli.catkin.make import catkin_make
 from minirospy.cli.catkin.test_results import main as catkin_test_results
 from minirospy.cli.catkin.tool import catkin
+from minirospy.installation import install_command
 from minirospy.workspace.plan import Test as PlannedTest
 from minirospy.workspace.plan import read_plan
 from tests.waiting import wait_until
@@ -150,7 +151,7 @@ def test_commands_that_cannot_be_run_are_errors(
     scene.package("q", "catkin_add_nosetests(test)", "", {"test/test_q.py": ""})
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert catkin_make(["-C", str(scene.root), "run_tests_q"]) == 1
-    assert "tests need pytest: pip install pytest" in capsys.readouterr().err
+    assert f"tests need pytest: {install_command('pytest')}" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal")

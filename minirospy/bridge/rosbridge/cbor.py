@@ -12,6 +12,7 @@ from io import BytesIO
 from typing import Any
 
 from minirospy.errors import BridgeProtocolError
+from minirospy.installation import install_command
 
 __all__ = ["TYPED_ARRAYS", "decode_cbor", "encode_cbor", "typed_array"]
 
@@ -107,6 +108,6 @@ def _library() -> Any:
         import cbor2
     except ImportError as error:
         raise BridgeProtocolError(
-            "compression cbor needs the library cbor2 on the server: pip install 'minirospy[web]'"
+            f"compression cbor needs the library cbor2 on the server: {install_command('minirospy[web]')}"
         ) from error
     return cbor2

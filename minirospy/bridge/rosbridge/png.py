@@ -12,6 +12,7 @@ from io import BytesIO
 from typing import Any
 
 from minirospy.errors import BridgeProtocolError
+from minirospy.installation import install_command
 
 __all__ = ["decode", "encode"]
 
@@ -50,6 +51,6 @@ def _pillow() -> Any:
         from PIL import Image
     except ImportError as error:
         raise BridgeProtocolError(
-            "compression png needs Pillow on the server: pip install 'minirospy[images]'"
+            f"compression png needs Pillow on the server: {install_command('minirospy[images]')}"
         ) from error
     return Image

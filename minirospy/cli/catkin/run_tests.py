@@ -16,6 +16,7 @@ from pathlib import Path
 from minirospy.child_lifetime import guard_children
 from minirospy.cli.catkin.test_results import Counts, results_below
 from minirospy.errors import BuildError, MinirospyError, NotFoundError
+from minirospy.installation import install_command
 from minirospy.testing.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
@@ -123,7 +124,7 @@ def _flat(name: str) -> str:
 
 def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
     if importlib.util.find_spec("pytest") is None:
-        raise BuildError(str(plan.cmake_lists), test.line, "tests need pytest: pip install pytest")
+        raise BuildError(str(plan.cmake_lists), test.line, f"tests need pytest: {install_command('pytest')}")
     path = plan.folder / test.path
     name = f"pytest-{path.stem}.xml"
     return [sys.executable, "-m", "pytest", "-q", str(path), f"--junitxml={results / name}"]

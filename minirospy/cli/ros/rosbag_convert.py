@@ -7,6 +7,7 @@ import os
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Verb
 from minirospy.errors import BagError, BagUnindexedError, NotFoundError
+from minirospy.installation import install_command
 
 __all__ = ["VERB"]
 
@@ -15,7 +16,7 @@ def _parser() -> Parser:
     parser = Parser(
         "rosbag convert",
         "Write the messages of a bag into an MCAP file, or those of an MCAP file into a bag, without loss. Which of the two, "
-        "the ends of the names say: .bag, .mcap. MCAP files need `pip install 'minirospy[mcap]'`.",
+        f"the ends of the names say: .bag, .mcap. MCAP files need a library: {install_command('minirospy[mcap]')}",
     )
     parser.add_argument("source", metavar="FROM", help="a bag or an MCAP file", completer="bag_files")
     parser.add_argument("target", metavar="TO", help="the file that is written", completer="files")

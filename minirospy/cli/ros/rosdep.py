@@ -19,6 +19,7 @@ from pathlib import Path
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
+from minirospy.installation import install_command
 
 __all__ = ["FAMILY", "main"]
 
@@ -148,11 +149,7 @@ def _says(keys: dict[str, list[str]]) -> Iterator[str]:
     """Yield a line for each key: the packages that need it, and how to install it."""
     for key, packages in keys.items():
         module = _module(key)
-        how = (
-            f"{sys.executable} -m pip install {module[1]}"
-            if module
-            else "no package of Python or of ROS here"
-        )
+        how = install_command(module[1]) if module else "no package of Python or of ROS here"
         yield f"{key} (of {', '.join(packages)}): {how}"
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from minirospy.cli.command import run
 from minirospy.errors import MinirospyError, NotFoundError
+from minirospy.installation import install_command
 
 __all__ = ["main"]
 
@@ -32,7 +33,9 @@ def _xacro(words: Sequence[str]) -> int:
     try:
         import xacro  # type: ignore[import-untyped]
     except ImportError as error:
-        raise MinirospyError(f"the package xacro cannot be imported ({error}): pip install xacro") from error
+        raise MinirospyError(
+            f"the package xacro cannot be imported ({error}): {install_command('xacro')}"
+        ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
         # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as such.

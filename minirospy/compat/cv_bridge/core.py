@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 from minirospy.images.compressed import decode, encode, opencv
 from minirospy.images.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
 from minirospy.images.view import pixels
+from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     import numpy
@@ -149,7 +150,7 @@ def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
     cv2 = opencv()
     if cv2 is None:
         raise ValueError(
-            f"converting [{source}] to [{wanted}] needs OpenCV: pip install opencv-python-headless"
+            f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
     # OpenCV names a pattern by the pixels of the second row and column.

@@ -1,0 +1,111 @@
+"""How libraries are added to the environment that this minirospy runs in: a requirement in, a command line to type out.
+
+`python -m pip` is not there in an environment that pipx or uv made: their own commands are. Sources: https://pipx.pypa.io and
+https://docs.astral.sh/uv/concepts/tools.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+__all__ = ["install_command"]
+
+_IS_WINDOWS = os.name == "nt"
+_PIPX_FILE = "pipx_metadata.json"
+_UV_FILE = "uv-receipt.toml"
+
+_SHELLS_OWN = re.compile(r"[^\w./\\:~+-]")
+"""Characters that one of the shells reads as its own."""
+
+
+def install_command(*requirements: str, upgrade: bool = False) -> str:
+    """Return the command line that installs requirements (``minirospy[web]``, ``lz4``) next to the running minirospy.
+
+    It can be typed in sh, cmd.exe and PowerShell. ``upgrade``: a version that is too old is replaced.
+    """
+    # Only where an error is described: commands that find all their libraries do not wait for these modules.
+    import importlib.util
+    import sysconfig
+
+    prefix = Path(sys.prefix)
+    words = " ".join(_quoted(each) for each in requirements)
+    option = " --upgrade" if upgrade else ""
+    if (prefix / _PIPX_FILE).is_file():
+        # Not `pipx inject`: pipx 1.7 takes minirospy itself for injected already, and does nothing.
+        return f"pipx runpip {_quoted(prefix.name)} install{option} {words}"
+    if (prefix / _UV_FILE).is_file():
+        return _uv_tool_command(prefix / _UV_FILE, requirements, option)
+    if importlib.util.find_spec("pip") is None:
+        return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
+
+    # PEP 668: without the option pip refuses, as it did when minirospy was installed.
+    marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
+    if sys.prefix == sys.base_prefix and marker.is_file():
+        option += " --break-system-packages"
+    return f"{_python()} -m pip install{option} {words}"
+
+
+def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
+    """Return uv's command with all that was requested before: uv removes what a new one does not name."""
+    try:
+        text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
+    except OSError:
+        text = ""
+    extras: dict[str, None] = {}
+    others: dict[str, None] = {}
+    entries = re.findall(r'\{ name = "([^"]+)"(?:, extras = \[([^]]*)\])?(?:, specifier = "([^"]*)")?', text)
+    for name, extra, specifier in [*entries, *map(_parts, requirements)]:
+        names = dict.fromkeys(re.findall(r"[\w.-]+", extra))
+        if name == "minirospy":
+            extras |= names
+        else:
+            others[_requirement(name, names) + specifier] = None
+
+    words = [_requirement("minirospy", extras), *others]
+    return f"uv tool install{option} " + " --with ".join(_quoted(word) for word in words)
+
+
+def _parts(requirement: str) -> tuple[str, str, str]:
+    """Return the name of a requirement, what is between its brackets, and its range of versions."""
+    name, has_extras, rest = requirement.partition("[")
+    if not has_extras:
+        return name, "", ""
+    extras, _, specifier = rest.partition("]")
+    return name, extras, specifier
+
+
+def _requirement(name: str, extras: dict[str, None]) -> str:
+    return f"{name}[{','.join(extras)}]" if extras else name
+
+
+def _python() -> str:
+    """Return "python" or "python3" where that is the running interpreter, else the interpreter's path."""
+    import shutil
+
+    for name in ("python", "python3"):
+        found = shutil.which(name)
+        # Not os.path.samefile: the interpreter of a venv may be a link to that of the system.
+        if found is not None and os.path.normcase(found) == os.path.normcase(sys.executable):
+            return name
+    return _quoted_path(sys.executable)
+
+
+def _quoted(word: str) -> str:
+    """Return a word without quotes in it for any shell: to cmd.exe single quotes are a part of the word."""
+    return f'"{word}"' if _SHELLS_OWN.search(word) else word
+
+
+def _quoted_path(path: str) -> str:
+    """Return the path of a program for the system's shells.
+
+    On Windows only the parts that need quotes have them: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
+    and PowerShell takes a line that starts with a quote for an expression.
+    """
+    if not _IS_WINDOWS:
+        import shlex
+
+        return shlex.quote(path)
+    return "\\".join(_quoted(part) for part in path.split("\\"))

@@ -1,0 +1,129 @@
+"""The command that installs a missing library: for pip, pipx, uv and the system's Python, in any shell."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import os
+import shlex
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from minirospy import installation
+from minirospy.installation import install_command
+
+ROOT = Path(__file__).parents[1]
+
+RECEIPT = """\
+[tool]
+requirements = [
+    { name = "minirospy", extras = ["web", "mcap"], path = "/tmp/minirospy-0.1.0-py3-none-any.whl" },
+    { name = "zstandard", specifier = ">=0.20" },
+    { name = "minirospy", extras = ["serial"] },
+    { name = "mcap", extras = ["all"] },
+]
+entrypoints = [
+    { name = "catkin", install-path = "/home/me/.local/bin/catkin", from = "minirospy" },
+]
+"""
+"""As uv 0.13 writes it."""
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of an environment that this process seems to run in."""
+    folder = tmp_path / "minirospy"
+    folder.mkdir()
+    monkeypatch.setattr(sys, "prefix", str(folder))
+    return folder
+
+
+def hide_pip(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = importlib.util.find_spec
+
+    def found(name: str, package: str | None = None) -> importlib.machinery.ModuleSpec | None:
+        return None if name == "pip" else real(name, package)
+
+    monkeypatch.setattr(importlib.util, "find_spec", found)
+
+
+def test_pip_of_the_interpreter_on_the_path(
+    prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "python.exe" if os.name == "nt" else "python"
+    program = tmp_path / name
+    program.touch(mode=0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(program))
+    assert install_command("minirospy[web]") == 'python -m pip install "minirospy[web]"'
+    assert install_command("lz4", "numpy", upgrade=True) == "python -m pip install --upgrade lz4 numpy"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="words of sh")
+def test_pip_of_an_interpreter_that_is_not_on_the_path(
+    prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", "/home/me/my robots/.venv/bin/python")
+    words = shlex.split(install_command("minirospy[web]"))
+    assert words == ["/home/me/my robots/.venv/bin/python", "-m", "pip", "install", "minirospy[web]"]
+
+
+def test_system_python_needs_the_option_of_pep_668(
+    prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "EXTERNALLY-MANAGED").touch()
+    monkeypatch.setattr(sysconfig, "get_path", lambda name: str(tmp_path))
+    assert install_command("lz4").endswith(" -m pip install lz4"), "a venv of it"
+    monkeypatch.setattr(sys, "base_prefix", sys.prefix)
+    assert install_command("lz4").endswith(" -m pip install --break-system-packages lz4")
+
+
+def test_pipx_runs_its_own_pip(prefix: Path) -> None:
+    (prefix / "pipx_metadata.json").write_text("{}")
+    assert install_command("minirospy[web]") == 'pipx runpip minirospy install "minirospy[web]"'
+    assert install_command("lz4", upgrade=True) == "pipx runpip minirospy install --upgrade lz4"
+
+
+def test_uv_tool_keeps_what_was_installed_with_it(prefix: Path) -> None:
+    receipt = prefix / "uv-receipt.toml"
+    receipt.write_text('[tool]\nrequirements = [{ name = "minirospy" }]\nentrypoints = []\n')
+    assert install_command("minirospy[web]") == 'uv tool install "minirospy[web]"'
+    assert install_command("numpy", "lz4") == "uv tool install minirospy --with numpy --with lz4"
+
+    receipt.write_text(RECEIPT)
+    assert install_command("minirospy[fleet]", upgrade=True) == (
+        'uv tool install --upgrade "minirospy[web,mcap,serial,fleet]" --with "zstandard>=0.20" --with "mcap[all]"'
+    )
+
+
+def test_environment_without_pip_is_one_of_uv(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hide_pip(monkeypatch)
+    monkeypatch.setattr(sys, "executable", "/home/me/.venv/bin/python")
+    expected = 'uv pip install --python /home/me/.venv/bin/python "minirospy[web]"'
+    assert install_command("minirospy[web]") == expected
+
+
+def test_path_of_windows_is_a_command_in_cmd_and_in_powershell(
+    prefix: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A line of PowerShell that starts with a quote is an expression.
+    monkeypatch.setattr(installation, "_IS_WINDOWS", True)
+    monkeypatch.setattr(sys, "executable", r"C:\Program Files\Python (x86)\python.exe")
+    expected = r'C:\"Program Files"\"Python (x86)"\python.exe -m pip install "minirospy[web]"'
+    assert install_command("minirospy[web]") == expected
+
+
+def test_no_module_has_a_command_of_its_own() -> None:
+    own = [
+        str(path.relative_to(ROOT))
+        for path in sorted((ROOT / "minirospy").rglob("*.py"))
+        if "overlay" not in path.parts and path.name != "installation.py"
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if "pip install" in line
+        and not line.lstrip().startswith(('"""', "``", "#"))
+        and "--target" not in line
+    ]
+    assert own == []
