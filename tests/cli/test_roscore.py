@@ -375,7 +375,7 @@ def test_silent_master_at_the_port_is_known_by_its_journal(
     is_held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It reads for long, or is stopped; without the lock it is another program."""
-    monkeypatch.setattr(commands, "_RECOVERY_SECONDS", 0.05)
+    monkeypatch.setattr(commands, "_ANSWER_SECONDS", 0.05)
     path = tmp_path / "journal-1"
     journal = Journal(path, list)
     journal.lock()
@@ -388,3 +388,25 @@ def test_silent_master_at_the_port_is_known_by_its_journal(
     journal.close()
     assert ("another roscore/master is already running" in said) == is_held
     assert (f"port {port} is taken by another program" in said) != is_held
+    reason = "it is suspended, or reads a large journal" if is_held else "or by a suspended master (no answer"
+    assert reason in said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no program of Windows is suspended by a signal")
+@pytest.mark.parametrize("options", [(), ("--no-journal",)])
+def test_roscore_next_to_a_suspended_master(options: tuple[str, ...], start: Start) -> None:
+    core = start(*options)
+    core.process.send_signal(signal.SIGSTOP)
+    try:
+        done = subprocess.run([str(BIN / "roscore"), *options], capture_output=True, text=True, check=False)
+    finally:
+        core.process.send_signal(signal.SIGCONT)
+    port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1].rstrip("/")
+    expected = (
+        f"port {port} is taken by another program or by a suspended master (no answer within 4 s): choose one with "
+        "`roscore -p PORT`\n"
+        if options
+        else f"; it (pid {core.process.pid}) does not answer: it is suspended, or reads a large journal\n"
+    )
+    assert done.returncode == 1
+    assert done.stderr.endswith(expected)

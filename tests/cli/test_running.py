@@ -145,7 +145,8 @@ def test_roscore_on_a_port_of_somebody_else() -> None:
         )
     assert (done.returncode, done.stderr) == (
         1,
-        f"roscore: ERROR: port {number} is taken by another program: choose one with `roscore -p PORT`\n",
+        f"roscore: ERROR: port {number} is taken by another program or by a suspended master (no answer within 4 s): "
+        "choose one with `roscore -p PORT`\n",
     )
 
 

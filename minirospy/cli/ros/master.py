@@ -24,7 +24,7 @@ from minirospy.cli.command import warn
 from minirospy.cli.parser import Misuse, Parser, attach_completer, split_assignments
 from minirospy.cli.verbs import Command
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host, wrong_address
-from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
+from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcLate, RpcUnreachable
 from minirospy.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.master.log_file import LogFile
@@ -40,8 +40,8 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 
-_RECOVERY_SECONDS = 15.0
-"""Within this a master that was just started answers, also on a busy machine with much to recover."""
+_ANSWER_SECONDS = 4.0
+"""Within this a master answers, also on a busy machine; one that recovers for longer holds the lock of its journal."""
 
 
 class _Options(NamedTuple):
@@ -429,36 +429,42 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
     if not is_address_in_use(error):
         return MinirospyError(f"cannot listen on port {port}: {error.strerror or error}")
     uri = f"http://{host}:{port}"
+    silence = ""
     try:
-        # It may be reading its journal.
-        RpcClient(f"http://127.0.0.1:{port}", timeout=_RECOVERY_SECONDS).call("getPid", "/roscore")
-    except (RpcUnreachable, RpcError) as failure:
-        # One that reads for longer, or is stopped, holds the lock of its journal.
-        if not (isinstance(failure, RpcUnreachable) and journal and _is_held(journal)):
+        RpcClient(f"http://127.0.0.1:{port}", timeout=_ANSWER_SECONDS).call("getPid", "/roscore")
+    except RpcError as failure:
+        pid = _holder(journal) if journal and isinstance(failure, RpcUnreachable) else None
+        if pid is None:
+            late = f" or by a suspended master (no answer within {_ANSWER_SECONDS:g} s)"
             return MinirospyError(
-                f"port {port} is taken by another program: choose one with `{name} -p PORT`"
+                f"port {port} is taken by another program{late if isinstance(failure, RpcLate) else ''}: "
+                f"choose one with `{name} -p PORT`"
             )
+        # It is alive, and holds the lock of its journal all the while.
+        silence = (
+            f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
+        )
     return MinirospyError(
         f"{name} cannot run as another roscore/master is already running. "
-        f"Please kill other roscore/master processes before relaunching. The ROS_MASTER_URI is {uri}"
+        f"Please kill other roscore/master processes before relaunching. The ROS_MASTER_URI is {uri}{silence}"
     )
 
 
-def _is_held(path: Path) -> bool:
-    """Return whether another master holds a journal."""
+def _holder(path: Path) -> int | None:
+    """Return the pid of the master that holds a journal, 0 where it is not known, None where no master does."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():
-        return False
+        return None
     journal = Journal(path, list)
     try:
         journal.lock()
-    except JournalBusyError:
-        return True
+    except JournalBusyError as error:
+        return error.pid
     except OSError:
-        return False
+        return None
     journal.close()
-    return False
+    return None
 
 
 def _quiet(line: str) -> None:
