@@ -66,9 +66,6 @@ _IN_ARCHIVE = (
     "install it into a venv, or by pipx"
 )
 
-_SLIP = 0.85
-"""How similar two names are, by difflib's ratio, where one letter or two are missing, wrong or too many."""
-
 INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
 
@@ -239,7 +236,7 @@ def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
     where /robot1/scan has subscribers.
     """
     others = [each for each in subscribed if _without_digits(each) != _without_digits(topic)]
-    if near := did_you_mean(topic, others, cutoff=_SLIP):
+    if near := did_you_mean(topic, others, only_slips=True):
         warn(f"topic [{topic}] has no subscribers yet{near}")
 
 

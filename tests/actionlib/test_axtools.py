@@ -107,7 +107,7 @@ class TestClient:
         for answers, words, wrong in [
             ("x\n", ["/count"], "field goal must be an integer type"),
             ("", ["/count", "{goals: 1}"], "goals"),
-            ("", ["/count", "actionlib/Tes"], "message type [actionlib/TesAction] not found; did you mean"),
+            ("", ["/count", "actionlib/Tes"], "message type [actionlib/TesAction] not found"),
             ("", ["-t", "0.2", "/nobody"], "no action server at /nobody"),
             ("", ["-t", "0.2", "/nobody", "actionlib/Test", "{}"], "no action server at /nobody"),
         ]:

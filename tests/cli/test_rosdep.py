@@ -67,7 +67,7 @@ def test_there_is_no_database(capsys: pytest.CaptureFixture[str]) -> None:
         (["install"], 2, "which packages?"),
         (["install", "--from-paths", "nowhere"], 2, "folder nowhere does not exist"),
         (["check", "lmap"], 1, "package [lmap] not found"),
-        (["instal"], 2, "did you mean install or init?"),
+        (["instal"], 2, "did you mean install?"),
     ],
 )
 def test_typed_wrong(

@@ -162,7 +162,7 @@ def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "talker.py" in fails(capsys, "my")[1]
     assert fails(capsys, "mi", "x") == (
         2,
-        "package [mi] not found; did you mean my? (ROS_PACKAGE_PATH names the folders that are searched)",
+        "package [mi] not found: ROS_PACKAGE_PATH names the folders that are searched",
     )
     assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
     # The package forgotten, or not set off by a blank.

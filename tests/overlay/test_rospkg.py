@@ -59,7 +59,7 @@ def test_missing_names_raise(rospack: rospkg.RosPack, tree: Path) -> None:
         assert caught.value.args == ("nope",)
         assert str(caught.value) == f"nope\nROS path [0]={tree}"
     assert rospack.get_depends_on("nope") == []
-    with pytest.raises(rospkg.common.ResourceNotFound, match=r"circle \(did you mean circle2 or circle1"):
+    with pytest.raises(rospkg.common.ResourceNotFound, match=r"circle \(did you mean circle1 or circle2"):
         rospack.get_path("circle")
 
 
