@@ -57,6 +57,20 @@ def test_request_that_is_too_long_for_the_server_is_answered() -> None:
     assert found == ["it is too large", 0, 0]
 
 
+@needs_node
+def test_rate_of_one_latched_message_is_unknown_and_of_more_is_without_the_first() -> None:
+    found = run_script(
+        "Rate",
+        "js/rates.js",
+        """const latched = new Rate();
+        latched.add(0, 1, 460);
+        const steady = new Rate();
+        for (let index = 0; index <= 10; index++) steady.add(index / 10, 1, 50);
+        return [latched.at(0.6), latched.at(9), steady.at(1)];""",
+    )
+    assert found == [None, None, {"hz": 10, "bytes": 500}]
+
+
 DOCK = """(async () => {
   const [{ Dock }, { Layout }] = await Promise.all([import("/js/dock.js"), import("/js/layout.js")]);
   window.endedViews = [];
