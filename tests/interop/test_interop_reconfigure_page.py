@@ -147,8 +147,14 @@ def test_parameters_are_changed_and_corrected_by_the_server(
 ) -> None:
     served, uri, program = lamp(stack)
     page = browse(address(served, "reconfigure"))
-    # The only server is opened; what it is called is on the left, too.
+    # The only server is opened; what it is called is on the left, too. The first click there keeps it open.
     page.wait_text("button.server[aria-pressed=true]", "/lamp")
+    page.click("button.server", "/lamp")
+    page.wait("return location.hash.includes('node=')")
+    page.wait_text("button.server[aria-pressed=true]", "/lamp")
+    page.click("button.server", "/lamp")
+    page.wait_text("button.server[aria-pressed=false]", "/lamp")
+    page.click("button.server", "/lamp")
     wait_value(page, "angle", "100")
     assert "How bright it is" in page.wait_text(ROW.format("brightness"), "How")
     page.wait(

@@ -56,17 +56,27 @@ export class Reconfigure {
     for (const name of servers) {
       let row = this.rows.get(name);
       if (!row) {
-        row = h("button", { type: "button", class: "server", "aria-pressed": "false", onclick: () => this.toggle(name) }, name || "/");
+        row = h("button", { type: "button", class: "server", "aria-pressed": "false", onclick: () => this.choose(name) }, name || "/");
         this.rows.set(name, row);
       }
       const next = before ? before.nextSibling : this.list.firstChild;
       if (row !== next) this.list.insertBefore(row, next);
       before = row;
-      const isWanted = this.wanted.has(name) || (servers.length === 1 && !this.wasAsked);
-      if (isWanted && !this.panels.has(name)) this.open(name);
+      if (this.panels.has(name)) continue;
+      const opensItself = servers.length === 1 && !this.wasAsked && !this.wanted.has(name);
+      if (opensItself) this.openedItself = name;
+      if (opensItself || this.wanted.has(name)) this.open(name);
     }
     for (const [name, panel] of this.panels) panel.showState(servers.includes(name));
     this.showFiltered();
+  }
+
+  choose(name) {
+    // The first click on the server that has opened by itself is meant to open it.
+    if (this.openedItself === name && !this.wasAsked && this.panels.has(name)) {
+      this.wasAsked = true;
+      this.remember();
+    } else this.toggle(name);
   }
 
   toggle(name) {
