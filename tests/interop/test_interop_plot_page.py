@@ -315,7 +315,8 @@ def test_chart_is_panned_and_zoomed_by_keys_and_fingers(
     served.run(publisher(served, "/path", Vector3, latch=True, queue_size=None).publish(1.0, 2.0, 3.0))
     page = browse(address(served, "plot?path=/path/x"))
     page.wait_text(".series[data-label='/path/x']", "1 points")
-    shown = "[...document.querySelectorAll('button')].some(e => e.textContent === 'Follow' && !e.hidden)"
+    follow = "[...document.querySelectorAll('button')].find(e => e.textContent === 'Follow')"
+    shown = f"{follow}.checkVisibility({{visibilityProperty: true}})"
     assert not page.evaluate(shown)
     for key in ("-", "ArrowLeft"):
         page.evaluate("document.querySelector('.chart').focus()")
@@ -334,3 +335,37 @@ def test_chart_is_panned_and_zoomed_by_keys_and_fingers(
         page.wait(f"return {shown}")
         page.click("button", "Follow")
         page.wait(f"return !{shown}")
+
+
+@needs_chromium
+def test_buttons_of_the_plot_keep_their_places_when_follow_comes_and_goes(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/path", Vector3, latch=True, queue_size=None).publish(1.0, 2.0, 3.0))
+    page = browse(address(served, "plot?path=/path/x&range=1+0+2"))
+    page.wait_text(".series[data-label='/path/x']", "1 points")
+    place = "[...document.querySelectorAll('button')].find(e => e.textContent === 'Clear').getBoundingClientRect().x"
+    before = page.evaluate(place)
+    page.evaluate("document.querySelector('.chart').focus()")
+    press_key(page, "-")
+    page.wait("return !document.querySelector('.keeps-place').classList.contains('unused')")
+    assert page.evaluate(place) == before
+    page.click("button", "Auto range")
+    page.click("button", "Follow")
+    page.wait("return document.querySelectorAll('.keeps-place.unused').length === 2")
+    assert page.evaluate(place) == before
+
+
+@needs_chromium
+def test_path_that_leads_to_no_number_is_reported_in_german(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/path", Vector3, latch=True, queue_size=None).publish(1.0, 2.0, 3.0))
+    page = browse(address(served, "topics"))
+    page.evaluate("localStorage.setItem('language', 'de')")
+    page.open(address(served, "plot?path=/path/nope&path=/path["))
+    page.reload()
+    page.wait_text(".series-missing", "dort ist keine Zahl; es gibt /path/x, /path/y, /path/z")
+    page.wait_text("main", "„[“ ist kein Feld, kein Index und kein Filter wie {id==1}")

@@ -34,7 +34,7 @@ export class Axes {
       this.element.hidden = !this.element.hidden;
       this.button.setAttribute("aria-expanded", String(!this.element.hidden));
     } }, "Y axes");
-    this.autoButton = h("button", { type: "button", class: "primary", hidden: true, title: "All y axes follow their values again", onclick: () => {
+    this.autoButton = h("button", { type: "button", class: "primary keeps-place", title: "All y axes follow their values again", onclick: () => {
       this.ranges.clear();
       this.showRanges();
       this.changed(false);
@@ -185,6 +185,6 @@ export class Axes {
       const range = this.ranges.get(axis) ?? [null, null];
       limits.forEach((input, index) => { input.value = range[index] === null ? "" : number(range[index]); });
     }
-    this.autoButton.hidden = !this.ranges.size;
+    this.autoButton.classList.toggle("unused", !this.ranges.size);
   }
 }

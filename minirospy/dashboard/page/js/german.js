@@ -53,6 +53,8 @@ export const GERMAN = {
   "Auto range": "Bereich automatisch", "All y axes follow their values again": "Alle y-Achsen folgen wieder ihren Werten", "wheel: zoom · drag: pan · double click: follow the values": "Rad: zoomen · ziehen: schieben · Doppelklick: den Werten folgen",
   "Chart: left and right pan, plus and minus zoom, Escape follows": "Diagramm: links und rechts schieben, Plus und Minus zoomen, Escape folgt",
   "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",
+  "\"{rest}\" is not a field, nor an index, nor a filter as {id==1}": "„{rest}“ ist kein Feld, kein Index und kein Filter wie {id==1}",
+  "no number there; there is {paths}": "dort ist keine Zahl; es gibt {paths}", "no number there; there is none in this topic": "dort ist keine Zahl; in diesem Topic gibt es keine",
   // graph
   "Nodes and topics (active)": "Nodes und Topics (aktive)", "Nodes and topics (all)": "Nodes und Topics (alle)", "Nodes only": "Nur Nodes", "What is shown": "Was gezeigt wird", "Filter names": "Namen filtern",
   "Graph of nodes and topics": "Graph der Nodes und Topics", "hide debug": "Debug verbergen", "Fit": "Einpassen", "No nodes yet. Start one: it appears here.": "Noch kein Node. Einen starten: er erscheint hier.",

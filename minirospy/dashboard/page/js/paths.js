@@ -21,13 +21,22 @@ export function topicOf(path, topics) {
   return found;
 }
 
-/** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws Error. */
+/** A path that leads to no number; its text and the values in it can be translated. */
+export class PathError extends Error {
+  constructor(text, values) {
+    super(text.replace(/\{(\w+)\}/g, (all, name) => values[name] ?? all));
+    this.text = text;
+    this.values = values;
+  }
+}
+
+/** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws PathError. */
 export function parseSteps(text) {
   const steps = [];
   let rest = text;
   while (rest) {
     const match = /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(rest);
-    if (!match) throw new Error(`"${rest}" is not a field, nor an index, nor a filter as {id==1}`);
+    if (!match) throw new PathError("\"{rest}\" is not a field, nor an index, nor a filter as {id==1}", { rest });
     if (match[1] !== undefined) steps.push(match[1]);
     else if (match[2] !== undefined) steps.push(Number(match[2]));
     else if (match[5] !== undefined) steps.push({ test: testOf(match), text: match[0] });

@@ -3,7 +3,7 @@
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
 import { decode, encode, parseDefinition } from "./ros1.js";
-import { numericPaths, parseSteps, select, topicOf } from "./paths.js";
+import { PathError, numericPaths, parseSteps, select, topicOf } from "./paths.js";
 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
@@ -194,7 +194,7 @@ function resolvePath(entry) {
   try {
     entry.steps = parseSteps(entry.path.slice(topic.length));
   } catch (error) {
-    entry.error = error.message;
+    entry.error = error;
     schedule();
     return;
   }
@@ -271,7 +271,7 @@ function give(topic, entry, seconds, bytes, decoded) {
     if (!topic.definition) throw new Error(topic.failure);
     message ??= decode(topic.definition, bytes);
   } catch (error) {
-    entry.error = error.message;
+    entry.error = error;
     return undefined;
   }
   if (entry.mode === "all") {
@@ -287,7 +287,7 @@ function give(topic, entry, seconds, bytes, decoded) {
   entry.isFound ||= isFound;
   if (!entry.isFound) {
     const known = numericPaths(topic.definition, 3).map((path) => topic.name + path);
-    entry.error = `no number there; there is ${known.join(", ") || "none in this topic"}`;
+    entry.error = known.length ? new PathError("no number there; there is {paths}", { paths: known.join(", ") }) : new PathError("no number there; there is none in this topic", {});
   }
   return message;
 }
@@ -365,7 +365,8 @@ function itemOf(entry, transfer) {
     return item;
   }
   if (entry.error) {
-    item.error = entry.error;
+    const { message, text, values } = entry.error;
+    Object.assign(item, { error: message, errorText: text, errorValues: values });
     entry.error = null;
     return item;
   }

@@ -198,7 +198,7 @@ class Panel {
       // A topic that nobody publishes has the name that was typed; the type says what its field is.
       if (!found && !spec.isService && spec.type) found = [spec.path.replace(/\/data$/, ""), spec.path.endsWith("/data") ? ["data"] : []];
     } catch (error) {
-      setText(this.note, error.message);
+      setText(this.note, error.text ? t(error.text, error.values) : error.message);
       return;
     }
     if (!found) {

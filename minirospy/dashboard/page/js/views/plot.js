@@ -45,7 +45,7 @@ export class Plot {
     this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
     this.axis = h("select", { "aria-label": "The x axis", onchange: () => this.setOver(this.axis.value) });
     this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
-    this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
+    this.liveButton = h("button", { type: "button", class: "primary keeps-place", onclick: () => this.live() }, "Follow");
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
       this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"));
     this.area = h("div", { class: "panel chart", tabindex: 0, role: "group", "aria-label": "Chart: left and right pan, plus and minus zoom, Escape follows" });
@@ -192,7 +192,7 @@ export class Plot {
 
   received(path, item) {
     if (item.error) {
-      this.problems.set(path, item.error);
+      this.problems.set(path, item.errorText ? t(item.errorText, item.errorValues) : item.error);
       this.showProblems();
     }
     for (const { label, times, values } of item.series ?? []) {
@@ -414,7 +414,7 @@ export class Plot {
   draw() {
     if (!this.isDirty || document.hidden) return;
     this.isDirty = false;
-    this.liveButton.hidden = !this.zoom && !this.isPaused;
+    this.liveButton.classList.toggle("unused", !this.zoom && !this.isPaused);
     if (this.chart) {
       const [from, to] = this.range();
       if (this.over) {
