@@ -123,7 +123,8 @@ class Recording:
         status = self._process.exit_code
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
-        if status and self._process.is_ending and not size:
+        # An interpreter that starts may also end without a fault.
+        if status is not None and self._process.is_ending and not size:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:
             error = next(

@@ -357,6 +357,24 @@ def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
 
 
+def test_recorder_that_ends_without_a_file_has_saved_nothing(
+    tmp_path: Path, master: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = (
+        "import signal, sys, time; signal.signal(signal.SIGINT, lambda *_: sys.exit(0));"
+        "print('up'); time.sleep(600)"
+    )
+
+    def early(name: str, command: list[str], **options: Any) -> Process:
+        return start_process(name, [sys.executable, "-c", program], **options)
+
+    monkeypatch.setattr(recording, "start_process", early)
+    started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
+    wait_until(lambda: "up" in started._lines)
+    asyncio.run(started.stop())
+    assert started.state().error == "it was stopped before it had started: nothing was recorded"
+
+
 def test_bag_is_closed_where_its_page_closes_while_it_opens(
     serve: Callable[..., Served],
     client: Callable[..., Client],
@@ -466,7 +484,9 @@ def test_stop_waits_for_a_recording_that_is_being_started(
     starting.opened.set()
     done = other.next("recording", lambda found: found and found["is_ended"])
     assert done["name"] == "run.bag"
-    assert done["error"] in ("", "it was stopped before it had started: nothing was recorded")
+    has_file = (folder / "run.bag").exists()
+    error = "" if has_file else "it was stopped before it had started: nothing was recorded"
+    assert done["error"] == error
 
 
 def test_session_goes_on_after_a_fault(

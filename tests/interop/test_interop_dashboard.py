@@ -177,6 +177,24 @@ def publisher(served: Served, topic: str, cls: type, **options: Any) -> Any:
 
 
 @needs_chromium
+def test_topic_of_a_link_is_scrolled_to(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    served = serve()
+    many = [f"/topic_{number:02d}" for number in range(40)]
+    node = served.node("talker")
+
+    async def advertise() -> None:
+        for topic in many:
+            await node.advertise(topic, String)
+
+    served.run(advertise())
+    page = browse(address(served, "topics?open=/topic_39"))
+    page.wait(
+        "const box = document.querySelector(\".row[data-topic='/topic_39']\")?.getBoundingClientRect();"
+        "return box && document.querySelectorAll('.row').length >= 40 && box.top >= 0 && box.bottom <= innerHeight"
+    )
+
+
+@needs_chromium
 def test_topics_show_live_values_and_hostile_text_as_text(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
@@ -330,6 +348,41 @@ def test_log_files_of_each_kind_are_read() -> None:
     stamps = run_script("linesOf", "js/logs.js", body)
     assert stamps[1:3] + stamps[5:] == [1795414411.5, 1795414412.25, 1795414413.1, 1795414413.2]
     assert run_script("linesOf", "js/logs.js", "return linesOf('\\n\\n', 'a.log');") == []
+
+
+@needs_chromium
+def test_console_keeps_long_texts_in_their_rows(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from rosgraph_msgs.msg import Log
+
+    served = serve()
+    page = browse(address(served, "console"))
+    text = "Traceback:\n  line 1\r\n  line 2\n" + "x" * 100_000
+    log = publisher(served, "/rosout_agg", Log, latch=True)
+    served.run(log.publish(Log(level=8, name="/n" + "n" * 2000, msg=text)))
+    page.wait_text(".line .text", "Traceback: ↵   line 1 ↵   line 2 ↵ xxx")
+    # All of it comes with a click.
+    page.click(".line")
+    page.wait(f"return document.querySelector('.details pre').textContent === {json.dumps(text)}")
+    widths = "['.bar select', '.bar'].map(find => document.querySelector(find).getBoundingClientRect().width)"
+    select, bar = page.evaluate(widths)
+    assert select < bar / 2
+    # The newest line is followed also where the list becomes lower before the event of its own scrolling comes.
+    for number in range(60):
+        served.run(log.publish(Log(level=2, name="/n", msg=f"line {number}")))
+    page.wait_text(".line .text", "line 59")
+    page.evaluate(
+        "{ document.querySelector('.lines').style.maxHeight = '9rem';"
+        "document.querySelector('.virtual').dispatchEvent(new Event('scroll')); }"
+    )
+    served.run(log.publish(Log(level=2, name="/n", msg="newest")))
+    page.wait_text(".bar", "62 of 62 lines")
+    page.wait(
+        "const box = [...document.querySelectorAll('.line')].find(e => e.textContent.includes('newest'))"
+        "?.getBoundingClientRect();"
+        "return box && box.bottom <= document.querySelector('.virtual').getBoundingClientRect().bottom + 1"
+    )
 
 
 @needs_chromium

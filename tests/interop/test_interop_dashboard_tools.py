@@ -176,7 +176,7 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
     inner = structure(
         "/ROOT/DOCK",
         ["ALIGN", "PUSH"],
-        [("ALIGN", "aligned", "PUSH"), ("PUSH", "in", "docked")],
+        [("ALIGN", "aligned", "PUSH"), ("ALIGN", "again", "ALIGN"), ("PUSH", "in", "docked")],
         ["docked", "failed"],
     )
     for message in (root, inner):
@@ -185,6 +185,17 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
         page.wait(
             f"return [...document.querySelectorAll('.smach-title')].some(e => e.textContent === {path})"
         )
+    # A transition of a state to itself starts and ends at its right side.
+    at = page.evaluate(
+        """{
+        const edge = [...document.querySelectorAll('.edge')].find(e => e.lastChild.textContent === 'again');
+        const path = edge.querySelector('path'), box = edge.parentNode.querySelector("[data-state='/ROOT/DOCK/ALIGN'] rect");
+        const ends = [0, path.getTotalLength()].map(at => path.getPointAtLength(at).x);
+        const side = box.parentNode.transform.baseVal[0].matrix.e + box.width.baseVal.value;
+        ends.map(x => Math.abs(x - side) < 0.2)
+        }"""
+    )
+    assert at == [True, True]
     data = base64.b64encode(pickle.dumps({"goal": [1.5, 2], "name": HOSTILE}, 2)).decode()
     status = SmachContainerStatus(
         path="/ROOT", initial_states=["DRIVE"], active_states=["DRIVE"], local_data=data

@@ -106,3 +106,47 @@ def test_frames_that_are_their_own_ancestors_are_named(
     served.run(static.publish(transforms(("a", "b"), ("b", "a"))))
     page = browse(address(served, "tf?frame=a"))
     page.wait_text(".side .error", "It is its own ancestor")
+
+
+@needs_chromium
+def test_frames_of_any_name_leave_the_tree_readable(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    static = publisher(served, "/tf_static", TFMessage, latch=True)
+    long = "a" + "x" * 3000 + "_end"
+    strange = ("__proto__", "constructor", "", long)
+    served.run(static.publish(transforms(*(("map", each) for each in strange), ("__proto__", "child"))))
+    page = browse(address(served, "tf"))
+    page.wait_text("[role=status]", "6 frames, root map")
+    names = "[...document.querySelectorAll('.frame-box')].map(e => e.dataset.frame)"
+    assert set(page.evaluate(names)) == {"map", "child", *strange}
+    # A name that is too long is shown with its ends, and does not shrink the others to nothing.
+    assert page.wait_text(BOX.format(long) + "text", "…").endswith("_end")
+    assert (
+        page.evaluate("document.querySelector('[data-frame=map] rect').getBoundingClientRect().height") > 15
+    )
+    page.click(BOX.format("__proto__"))
+    page.wait_text(".side", "child")
+    assert page.evaluate("document.querySelectorAll('.edge.near').length") == 1
+
+
+@needs_node
+def test_long_names_in_drawings_keep_their_ends() -> None:
+    names = ["/robot/cmd_vel", "/" + "n" * 60, "/a" + "b" * 100_000 + "_end", "\U0001f600" * 61]
+    found = page_functions(*(("drawing", "brief", [name]) for name in names))
+    assert found[0] == names[0]
+    assert [len(each) for each in found[1:3]] == [60, 60]
+    assert found[2].startswith("/abb")
+    assert found[2].endswith("bb_end")
+    assert found[3] == "\U0001f600" * 30 + "…" + "\U0001f600" * 29
+
+
+@needs_node
+def test_loop_of_a_box_starts_and_ends_at_its_side() -> None:
+    box = {"x": 50, "y": 30, "width": 80, "height": 40}
+    calls = [("drawing", "loopOf", [box, label]) for label in ({"x": 120, "y": 30}, {"x": 50, "y": 80})]
+    assert page_functions(*calls) == [
+        "M90.0 21.0C130.0 12.0 130.0 48.0 90.0 39.0",
+        "M41.0 50.0C32.0 90.0 68.0 90.0 59.0 50.0",
+    ]

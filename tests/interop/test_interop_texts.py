@@ -15,6 +15,7 @@ from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher
+from tests.interop.test_interop_reconfigure_page import page_functions
 
 __all__ = ["browse", "serve"]
 
@@ -219,3 +220,11 @@ def test_whatever_can_be_used_has_a_name_for_screen_readers(
     page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
     found: Any = page.evaluate(NAMELESS)
     assert found == [], json.dumps(found)
+
+
+@needs_node
+def test_quoted_text_does_not_turn_what_is_around_it() -> None:
+    text = 'a"\u202eb\u2067\u200f\u05d0'
+    (found,) = page_functions(("dom", "quoted", [text]))
+    assert found == '"a\\"\\u202eb\\u2067\\u200f\u05d0"'
+    assert json.loads(found) == text

@@ -71,7 +71,7 @@ export function layoutContainer(path, structures, { Graph, layout, widthOf, isFo
     outcomes: ends.map((name) => ({ name, ...placed(`o${name}`) })),
     edges: graph.edges().map((id) => {
       const { points, label, x, y } = graph.edge(id);
-      return { from: id.v.slice(1), to: id.w.slice(1), label, x: x + shift, y: y + TITLE, points: points.map((point) => ({ x: point.x + shift, y: point.y + TITLE })) };
+      return { from: id.v.slice(1), to: id.w.slice(1), loop: id.v === id.w ? placed(id.v) : null, label, x: x + shift, y: y + TITLE, points: points.map((point) => ({ x: point.x + shift, y: point.y + TITLE })) };
     }),
   };
 }

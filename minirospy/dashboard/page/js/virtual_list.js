@@ -13,6 +13,7 @@ export class VirtualList {
     this.showRow = show;
     this.count = 0;
     this.isFollowing = true;
+    this.followed = 0; // where it last scrolled by itself
     this.pool = [];
     this.space = h("div", { class: "space" });
     this.element = h("div", { class: "virtual", tabindex: "0", onscroll: () => this.scrolled() }, this.space);
@@ -28,8 +29,13 @@ export class VirtualList {
   update(count) {
     this.count = count;
     this.space.style.height = `${count * this.rowHeight}px`;
-    if (this.isFollowing) this.element.scrollTop = count * this.rowHeight;
+    if (this.isFollowing) this.scrollToEnd();
     this.draw();
+  }
+
+  scrollToEnd() {
+    this.element.scrollTop = this.count * this.rowHeight;
+    this.followed = this.element.scrollTop - 1; // a browser rounds it
   }
 
   follow() {
@@ -50,7 +56,9 @@ export class VirtualList {
 
   scrolled() {
     const { scrollTop, clientHeight } = this.element;
-    this.isFollowing = scrollTop + clientHeight >= this.count * this.rowHeight - this.rowHeight;
+    // The end may have moved before the event of the list's own scrolling comes: a person who leaves it scrolls up.
+    if (scrollTop + clientHeight >= this.count * this.rowHeight - this.rowHeight) this.isFollowing = true;
+    else if (scrollTop < this.followed) this.isFollowing = false;
     this.draw();
   }
 

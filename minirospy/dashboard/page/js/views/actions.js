@@ -1,11 +1,13 @@
 // Actions: a form for the goal, its status, feedback and result, and every goal that the server knows.
 
+import { brief } from "../drawing.js";
 import { fill, h, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
 import { actionServers, isRunning, progressOf, stampOf, statusWord } from "../actions.js";
 import { t } from "../texts.js";
 import { yaml } from "./services.js";
 
+const MOST_IN_ROW = 300; // characters of a status
 const CANCEL_TYPE = "actionlib_msgs/GoalID";
 const CANCEL_TEXT = "time stamp\nstring id\n";
 const MOST_GOALS = 200; // of which feedback and results are kept
@@ -223,7 +225,7 @@ export class Actions {
       const status = goal.finalStatus ?? goal.status;
       const [, badgeCell, textCell] = goal.row.children;
       showBadge(badgeCell.firstChild, status);
-      setText(textCell, goal.text || (goal.isOwn ? t("sent here") : ""));
+      setText(textCell, brief(goal.text, MOST_IN_ROW) || (goal.isOwn ? t("sent here") : ""));
       goal.cancel.hidden = status === null ? !goal.isOwn : !isRunning(status);
       goal.cancel.disabled = !this.link.mayWrite;
       goal.row.classList.toggle("selected", goal.id === this.chosen);

@@ -356,8 +356,9 @@ class Player {
 
   key(event) {
     if (!this.bag || this.element.hidden || event.ctrlKey || event.altKey || event.metaKey) return;
-    const isField = event.target.closest("input, select, textarea, button, a");
-    if (isField) return;
+    // Buttons and switches have keys of their own: space and enter.
+    const isField = event.target.closest("input:not([type=checkbox]), select, textarea");
+    if (isField || (event.key === " " && event.target.closest("input, button, a"))) return;
     const action = { " ": () => this.toggle(), ArrowLeft: () => this.send({ op: "back" }), ArrowRight: () => this.send({ op: "step" }), Home: () => this.seek(0), End: () => this.seek(this.bag.length) }[event.key];
     if (!action) return;
     event.preventDefault();

@@ -36,6 +36,8 @@ function append(added) {
   for (const listener of listeners) listener(cut);
 }
 
+const MOST_IN_ROW = 1000; // characters
+
 export class Console {
   constructor(link, words, main, place) {
     this.link = link;
@@ -178,8 +180,8 @@ export class Console {
     const [time, word, node, text] = row.children;
     setText(time, timeText(line.stamp));
     setText(word, t(NAMES.get(line.level) ?? String(line.level)));
-    setText(node, line.node);
-    setText(text, line.text);
+    setText(node, oneLine(line.node));
+    setText(text, oneLine(line.text));
   }
 
   select(line) {
@@ -282,4 +284,9 @@ export class Console {
       fill(list, h("span", { class: "error" }, error.message));
     }
   }
+}
+
+/** Return a text that stays in its row: all of it is below after a click. */
+function oneLine(text) {
+  return text.slice(0, MOST_IN_ROW).replace(/[\r\n\v\f\u0085\u2028\u2029]+/g, (breaks, at) => (at + breaks.length < Math.min(text.length, MOST_IN_ROW) ? " ↵ " : ""));
 }

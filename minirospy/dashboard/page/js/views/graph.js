@@ -1,6 +1,7 @@
 // Who sends to whom: nodes and topics, laid out by dagre and drawn as SVG. A click shows the details.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
+import { brief, loopOf, pathOf } from "../drawing.js";
 import { bandwidth, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { elementsOf, groupsOf, trafficOf } from "../graph_elements.js";
 import { PanZoom } from "../panzoom.js";
@@ -107,7 +108,7 @@ export class Graph {
     const [{ graph, groups }] = layouts.sort((one, other) => this.fitOf(other.graph) - this.fitOf(one.graph));
     const boxes = [...groups.keys()].map((name) => this.makeGroup(name, graph.node(`g${name}`)));
     this.drawn = [];
-    const lines = graph.edges().map((id) => this.makeEdge(graph.edge(id), id, found.edges));
+    const lines = graph.edges().map((id) => this.makeEdge(graph.edge(id), id, found.edges, graph.node(id.v)));
     const parts = graph.nodes().filter((key) => SHAPES[key[0]]).map((key) => this.makePart(key, graph.node(key)));
     this.drawing.replaceChildren(...boxes, ...lines, ...parts);
     this.panzoom.resized(graph.graph().width, graph.graph().height);
@@ -128,7 +129,7 @@ export class Graph {
     measure.font = "600 14px system-ui, sans-serif";
     for (const [kind, names] of [["n", nodes], ["t", topics], ["a", actions]]) {
       for (const name of [...names].sort()) {
-        graph.setNode(kind + name, { width: measure.measureText(name).width + (kind === "t" ? 26 : 44), height: HEIGHT });
+        graph.setNode(kind + name, { width: measure.measureText(brief(name)).width + (kind === "t" ? 26 : 44), height: HEIGHT });
       }
     }
     const groups = this.hasGroups.checked ? groupsOf(graph.nodes()) : new Map();
@@ -139,7 +140,7 @@ export class Graph {
     measure.font = "12px system-ui, sans-serif";
     const room = this.hasRates.checked ? measure.measureText(RATE_TEXT).width : 0;
     edges.forEach(({ from, to, label }, index) => {
-      const width = Math.max(label ? measure.measureText(label).width : 0, room);
+      const width = Math.max(label ? measure.measureText(brief(label)).width : 0, room);
       graph.setEdge(from, to, width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index }, String(index));
     });
     layout(graph);
@@ -148,14 +149,14 @@ export class Graph {
 
   makeGroup(name, { x, y, width, height }) {
     return svg("g", { class: "namespace near" }, svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 8 }),
-      svg("text", { x: x - width / 2 + 8, y: y - height / 2 - 4 }, `/${name}`));
+      svg("text", { x: x - width / 2 + 8, y: y - height / 2 - 4 }, brief(`/${name}`)));
   }
 
-  makeEdge({ points, x, y, index }, id, edges) {
+  makeEdge({ points, x, y, index }, id, edges, box) {
     const edge = edges[index];
-    const path = points.map((point, number) => `${number ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
+    const path = id.v === id.w && x !== undefined ? loopOf(box, { x, y }) : pathOf(points);
     const hasText = x !== undefined;
-    const part = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), hasText && edge.label ? svg("text", { x, y: y - 4 }, edge.label) : null);
+    const part = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 4 }, brief(edge.label))] : null);
     if (hasText) {
       const above = svg("text", { class: "traffic", x, y: edge.label ? y + 12 : y - 4 });
       const below = svg("text", { class: "traffic", x, y: edge.label ? y + 26 : y + 13 });
@@ -172,8 +173,12 @@ export class Graph {
     const shape = { x: x - width / 2, y: y - height / 2, width, height, rx: key[0] === "n" ? height / 2 : key[0] === "a" ? 12 : 4 };
     const select = () => this.select(key);
     const part = svg("g", { class: kind, tabindex: 0, role: "button", "aria-label": `${t(kind)} ${key.slice(1)}`,
-      onclick: select, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") select(); } },
-    svg("rect", shape), svg("text", { x, y: y + 5 }, key.slice(1)));
+      onclick: select, onkeydown: (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault(); // the page would scroll
+        select();
+      } },
+    svg("title", {}, key.slice(1)), svg("rect", shape), svg("text", { x, y: y + 5 }, brief(key.slice(1))));
     part.dataset.key = key;
     return part;
   }

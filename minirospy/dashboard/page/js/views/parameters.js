@@ -1,6 +1,6 @@
 // Parameters: all that are set, live; set and deleted.
 
-import { h, setText } from "../dom.js";
+import { h, quoted, setText } from "../dom.js";
 import { t } from "../texts.js";
 
 export class Parameters {
@@ -39,7 +39,7 @@ export class Parameters {
         row = this.makeRow(name);
         this.rows.set(name, row);
       }
-      const text = JSON.stringify(this.link.parameters.get(name));
+      const text = quoted(this.link.parameters.get(name));
       // What a person is typing stays.
       if (row.text !== text && document.activeElement !== row.input) row.input.value = text;
       row.text = text;

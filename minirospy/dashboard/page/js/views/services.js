@@ -1,6 +1,6 @@
 // Services: a form for the request, and the response.
 
-import { fill, h, setText } from "../dom.js";
+import { fill, h, quoted, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
 import { t } from "../texts.js";
 
@@ -80,5 +80,5 @@ export function yaml(value, indent = "") {
 
 function plain(value) {
   if (value !== null && typeof value === "object") return JSON.stringify(Array.from(value), (_, each) => (typeof each === "bigint" ? String(each) : each));
-  return typeof value === "string" ? JSON.stringify(value) : String(value);
+  return typeof value === "string" ? quoted(value) : String(value);
 }

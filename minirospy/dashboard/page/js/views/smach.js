@@ -1,6 +1,7 @@
 // State machines of smach, as smach_viewer shows them: containers in containers, active states, userdata; and where they start the next time.
 
 import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
+import { brief, loopOf, pathOf } from "../drawing.js";
 import { fill, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { PanZoom } from "../panzoom.js";
 import { userdataOf } from "../pickle.js";
@@ -138,7 +139,7 @@ export class Smach {
   drawStructure() {
     const measure = h("canvas").getContext("2d");
     measure.font = "600 14px system-ui, sans-serif";
-    const tools = { Graph, layout, widthOf: (text) => measure.measureText(text).width, isFolded: (path) => this.folded.has(path) };
+    const tools = { Graph, layout, widthOf: (text) => measure.measureText(brief(text)).width, isFolded: (path) => this.folded.has(path) };
     this.parts = new Map(); // path of a state or container -> element
     this.drawing.replaceChildren();
     let x = 10;
@@ -156,9 +157,9 @@ export class Smach {
     const { path, width, height } = found;
     const name = path.slice(path.lastIndexOf("/") + 1) || path;
     const group = svg("g", { class: "smach-container", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` },
-      svg("rect", { width, height, rx: 10 }), svg("text", { class: "smach-title", x: 14, y: 21 }, name),
-      found.edges.map((edge) => svg("g", { class: "edge" }, svg("path", { d: pathOf(edge.points), "marker-end": `url(#${this.arrow})` }), svg("text", { x: edge.x, y: edge.y + 4 }, edge.label))),
-      found.outcomes.map((each) => svg("g", { class: "smach-outcome" }, svg("rect", { x: each.x - each.width / 2, y: each.y - each.height / 2, width: each.width, height: each.height, rx: 3 }), svg("text", { x: each.x, y: each.y + 4 }, each.name))));
+      svg("rect", { width, height, rx: 10 }), svg("title", {}, path), svg("text", { class: "smach-title", x: 14, y: 21 }, brief(name)),
+      found.edges.map((edge) => svg("g", { class: "edge" }, svg("path", { d: edge.loop ? loopOf(edge.loop, edge) : pathOf(edge.points), "marker-end": `url(#${this.arrow})` }), svg("title", {}, edge.label), svg("text", { x: edge.x, y: edge.y + 4 }, brief(edge.label)))),
+      found.outcomes.map((each) => svg("g", { class: "smach-outcome" }, svg("rect", { x: each.x - each.width / 2, y: each.y - each.height / 2, width: each.width, height: each.height, rx: 3 }), svg("title", {}, each.name), svg("text", { x: each.x, y: each.y + 4 }, brief(each.name)))));
     this.parts.set(path, group);
     this.makeButton(group.firstChild, path, null);
     for (const state of found.states) {
@@ -168,7 +169,7 @@ export class Smach {
         part = this.container(state.inner, state.x - state.width / 2, state.y - state.height / 2);
       } else {
         part = svg("g", { class: `smach-state${state.isContainer ? " folded" : ""}`, transform: `translate(${(state.x - state.width / 2).toFixed(1)} ${(state.y - state.height / 2).toFixed(1)})` },
-          svg("rect", { width: state.width, height: state.height, rx: state.height / 2 }), svg("text", { x: state.width / 2, y: state.height / 2 + 5 }, state.isContainer ? `${state.name} ▸` : state.name));
+          svg("rect", { width: state.width, height: state.height, rx: state.height / 2 }), svg("title", {}, key), svg("text", { x: state.width / 2, y: state.height / 2 + 5 }, state.isContainer ? `${brief(state.name)} ▸` : brief(state.name)));
         this.makeButton(part, path, state.name);
       }
       part.dataset.state = key;
@@ -187,7 +188,10 @@ export class Smach {
       this.showDetails();
     };
     element.addEventListener("click", select);
-    element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") select(event); });
+    element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") {
+        event.preventDefault(); // the page would scroll
+        select(event);
+      } });
     element.setAttribute("tabindex", 0);
     element.setAttribute("role", "button");
     element.setAttribute("aria-label", state === null ? t("container {path}", { path }) : t("state {state} of {path}", { state, path }));
@@ -270,8 +274,4 @@ export class Smach {
       await new Promise((resolve) => { setTimeout(resolve, SEND_MS); });
     }
   }
-}
-
-function pathOf(points) {
-  return points.map((point, index) => `${index ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
 }

@@ -1,6 +1,7 @@
 // The tree of frames: who is whose parent, how often and how lately each is published, and what is wrong.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
+import { brief, pathOf } from "../drawing.js";
 import { h, number, redraw, refill, setText, svg } from "../dom.js";
 import { Frames, eulerOf } from "../frames.js";
 import { PanZoom } from "../panzoom.js";
@@ -85,19 +86,19 @@ export class Tf {
     graph.setGraph({ rankdir: "TB", nodesep: 24, ranksep: 34, marginx: 12, marginy: 12 });
     const measure = h("canvas").getContext("2d");
     measure.font = "600 14px system-ui, sans-serif";
-    for (const name of names) graph.setNode(name, { width: Math.max(96, measure.measureText(name).width + 32), height: this.frames.frames.has(name) ? HEIGHT : 30 });
+    // The layout keeps its boxes in plain objects, where a frame may not be called "__proto__".
+    for (const name of names) graph.setNode(`f${name}`, { width: Math.max(96, measure.measureText(brief(name)).width + 32), height: this.frames.frames.has(name) ? HEIGHT : 30 });
     for (const name of names) {
       const parent = this.frames.frames.get(name)?.parent;
-      if (parent !== undefined) graph.setEdge(parent, name, {});
+      if (parent !== undefined) graph.setEdge(`f${parent}`, `f${name}`, {});
     }
     layout(graph);
     const edges = graph.edges().map((id) => {
-      const path = graph.edge(id).points.map(({ x, y }, index) => `${index ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
-      const edge = svg("g", { class: "edge" }, svg("path", { d: path }));
-      edge.dataset.to = id.w;
+      const edge = svg("g", { class: "edge" }, svg("path", { d: pathOf(graph.edge(id).points) }));
+      edge.dataset.to = id.w.slice(1);
       return edge;
     });
-    this.boxes = new Map(names.map((name) => [name, this.makeBox(name, graph.node(name))]));
+    this.boxes = new Map(names.map((name) => [name, this.makeBox(name, graph.node(`f${name}`))]));
     this.drawing.replaceChildren(...edges, ...[...this.boxes.values()].map(({ element }) => element));
     this.panzoom.resized(graph.graph().width, graph.graph().height);
     this.highlight();
@@ -108,8 +109,12 @@ export class Tf {
     const isRoot = !this.frames.frames.has(name);
     const text = svg("text", { x, y: y + 14, class: "measured" });
     const element = svg("g", { class: `frame-box${isRoot ? " root" : ""}`, tabindex: 0, role: "button", "aria-label": t("frame {name}", { name }),
-      onclick: choose, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") choose(); } },
-    svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 6 }), svg("text", { x, y: isRoot ? y + 5 : y - 3 }, name), isRoot ? null : text);
+      onclick: choose, onkeydown: (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault(); // the page would scroll
+        choose();
+      } },
+    svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 6 }), svg("title", {}, name), svg("text", { x, y: isRoot ? y + 5 : y - 3 }, brief(name)), isRoot ? null : text);
     element.dataset.frame = name;
     return { element, text };
   }

@@ -17,6 +17,7 @@ export class Topics {
     this.place = place;
     this.rows = new Map();
     this.opened = new Set(words.getAll("open"));
+    this.asked = words.get("open");
     this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
       this.showFiltered();
       this.remember();
@@ -58,6 +59,15 @@ export class Topics {
       before = row.element;
     }
     this.showFiltered();
+    this.showAsked();
+  }
+
+  /** Scroll to the topic of the link, once it is there. */
+  showAsked() {
+    const row = this.rows.get(this.asked);
+    if (!row) return;
+    this.asked = null;
+    row.element.scrollIntoView({ block: "nearest" });
   }
 
   toggled(topic, isOpen) {
