@@ -44,9 +44,12 @@ void untilInputEnds()
   while (std::getline(std::cin, line)) {}
 }
 
+// roscpp keeps the latched message after it has published it: a subscriber that connects between the two gets nothing.
+// The second call publishes to it.
 template <class M> void publish(ros::NodeHandle& node, std::map<std::string, ros::Publisher>& keep, const std::string& kind, const M& message)
 {
   keep[kind] = node.advertise<M>("/interop/" + kind, 1, true);
+  keep[kind].publish(message);
   keep[kind].publish(message);
   say(kind + " " + digest(message));
 }
