@@ -48,6 +48,7 @@ class Echo:
     ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
     such fields are shown. ``width``: of numbers. ``offset``: times as differences from ``now()``, which is
     the time in nanoseconds. ``header_times``: a plot has the time in a message's header, if it has one, not of its reception.
+    ``is_type_known``: of a field that is not a message, too, which a topic's is and a bag's is not.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class Echo:
         offset: bool = False,
         now: Callable[[], int] = time.time_ns,
         header_times: bool = True,
+        is_type_known: bool = True,
     ) -> None:
         self._path = field.path
         self._steps = parse_path(field.path)
@@ -71,6 +73,7 @@ class Echo:
         self._offset = offset
         self._now = now
         self._header_times = header_times
+        self._is_type_known = is_type_known
 
         self._type = ""
         self._classes = MessageClasses()
@@ -98,15 +101,23 @@ class Echo:
         stamp = received.nanoseconds
         if self._header_times and is_stamped(value):
             stamp = value.header.stamp.to_nsec()
+        strings, arrays = (True, True) if self._is_shown_whole(value) else (self._strings, self._arrays)
         header = ""
         if not self._header_written:
             self._header_written = True
-            header = plot_header(value, strings=self._strings, arrays=self._arrays) + "\n"
-        row = plot_row(value, stamp - origin, strings=self._strings, arrays=self._arrays, origin=origin)
+            header = plot_header(value, strings=strings, arrays=arrays) + "\n"
+        row = plot_row(value, stamp - origin, strings=strings, arrays=arrays, origin=origin)
         return header + row + "\n"
+
+    def _is_shown_whole(self, value: object) -> bool:
+        """Return whether a value is shown as it is: one of a bag's, whose type ROS looks up in messages alone."""
+        return not self._is_type_known and not is_message(value)
 
     def _block(self, value: object) -> str:
         from minirospy.idl.message import strify_message
+
+        if self._is_shown_whole(value):
+            return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"
 
         # ROS shows a field char[] as the bytes that it is, and fails on one of uint8[].
         if isinstance(value, bytes) and not self._type.startswith("char"):

@@ -54,6 +54,12 @@ def test_echo_prints_messages_fields_and_rows(command: Command, bag: str) -> Non
         command("rostopic", "echo", "-b", bag, "-a", "--filter", "topic == 'far/ids'").out.count("---") == 1
     )
     assert command("rostopic", "echo", "-b", bag, "-a").out.count("---") == 5
+    # ROS looks up types in messages, not that of the field.
+    assert command("rostopic", "echo", "-b", bag, "--noarr", "/far/ids/ids").out == "[0, 0]\n---\n"
+    assert command("rostopic", "echo", "-b", bag, "--nostr", "-n", "1", "/chatter/data").out == '"0"\n---\n'
+    assert "<array type" in command("rostopic", "echo", "-b", bag, "--noarr", "/far/ids").out
+    plotted = command("rostopic", "echo", "-b", bag, "-p", "--noarr", "/far/ids/ids").out
+    assert plotted == "%time,field0,field1\n5000000000,0,0\n"
     assert command("rostopic", "echo", "-b", bag, "/nothing") == (0, "", "")
     assert command("rostopic", "echo", "-b", bag, "-n", "0", "/chatter") == (0, "", "")
 

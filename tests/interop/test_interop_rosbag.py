@@ -169,6 +169,8 @@ def test_verbs_are_listed_the_same(tmp_path: Path, words: list[str]) -> None:
         "rostopic echo -b bz2.bag -p /joint_states",
         "rostopic echo -b bz2.bag -p /pose/pose --nostr",
         "rostopic echo -b none.bag /camera/image_raw --noarr -n 2",
+        "rostopic echo -b none.bag /camera/image_raw/data --noarr -n 1",
+        "rostopic echo -b none.bag -p --nostr --noarr /joint_states/name -n 2",
         "rostopic echo -b none.bag -a -n 12",
         "rostopic echo -b none.bag",
         "rostopic echo -b none.bag --offset /count",

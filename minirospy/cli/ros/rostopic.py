@@ -266,7 +266,7 @@ def _echo(
         from minirospy.cli.ros.bag_options import EchoOptions, echo_bag
 
         with Graph.open("rostopic", arguments=arguments) as graph:
-            make = partial(make, header_times=False)
+            make = partial(make, header_times=False, is_type_known=False)
             echo_bag(bag, graph.resolve(topic) if topic else None, EchoOptions(make, keep, count, prefix))
         return
     assert topic is not None
