@@ -53,6 +53,7 @@
     |   +-- TimeoutException            a buffer server that does not answer
     +-- MessageException                genpy's tree: values and bytes that do not fit a message
         +-- SerializationError
+        |   +-- SerializationOverflowError
         +-- DeserializationError
 """
 
@@ -106,6 +107,7 @@ __all__ = [
     "RpcUnreachable",
     "RvizFileError",
     "SerializationError",
+    "SerializationOverflowError",
     "ServiceException",
     "SourceError",
     "ThreadLimitError",
@@ -522,6 +524,10 @@ class MessageException(Exception):
 
 class SerializationError(MessageException):
     """A message holds a value that its definition does not allow."""
+
+
+class SerializationOverflowError(SerializationError, OverflowError):
+    """A number that a float32 does not hold: to programs for genpy an OverflowError, to ours an error like the others."""
 
 
 class DeserializationError(MessageException):

@@ -21,7 +21,12 @@ from minirospy.client.topic import (
     unregister_from_master,
 )
 from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import ROSException, ROSSerializationException, SerializationError
+from minirospy.errors import (
+    ROSException,
+    ROSSerializationException,
+    SerializationError,
+    SerializationOverflowError,
+)
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.workers import InOrder
@@ -306,6 +311,9 @@ class PublishedTopic(SharedTopic):
         pieces = Pieces()
         try:
             message.serialize(pieces)
+        except SerializationOverflowError:
+            # Not one of rospy's, which lets struct's own through.
+            raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
                 raise self._refused(message, error) from None

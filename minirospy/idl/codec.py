@@ -99,7 +99,9 @@ def write_serialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None:
                 else:
                     write = "buff.write"
                 _Writer(source, lookup, write).fields(spec.fields, "self")
-            with source.block("except (struct.error, TypeError, AttributeError, ValueError) as error:"):
+            with source.block(
+                "except (struct.error, TypeError, AttributeError, ValueError, OverflowError) as error:"
+            ):
                 source.line("self._check_types(error)")
 
 

@@ -47,8 +47,8 @@ _HELPERS = {
         "",
         "",
         "@lru_cache(maxsize=256)",
-        "def _numbers(letter: str, count: int) -> struct.Struct:",
-        '    return struct.Struct(f"{_NATIVE}{count}{letter}")',
+        "def _numbers(letter: str, count: int, order: str = _NATIVE) -> struct.Struct:",
+        '    return struct.Struct(f"{order}{count}{letter}")',
     ],
     "_packed": [
         "",
@@ -61,7 +61,9 @@ _HELPERS = {
         '        if values.dtype == f"<{letter}":',
         "            return _struct_I.pack(len(values)) + bytes(values.tobytes())",
         "        values = values.tolist()",
-        "    return _struct_I.pack(len(values)) + _numbers(letter, len(values)).pack(*values)",
+        "    # In the machine's own order a number that is too large for 32 bits would be written as infinity.",
+        '    numbers = _numbers(letter, len(values), "<" if letter == "f" else _NATIVE)',
+        "    return _struct_I.pack(len(values)) + numbers.pack(*values)",
     ],
     "_octets": [
         "",
@@ -332,9 +334,12 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Return whether ``struct`` puts no padding between these letters, some of which are floats."""
+    """Return whether ``struct`` puts no padding between these letters, some of which are floats.
+
+    Not those of 32 bits: in the machine's own order one that is too large would be infinity, not an OverflowError.
+    """
     kinds = {letter for letter in letters if letter.isalpha()}
-    return ("f" in kinds and kinds <= set("fiI")) or ("d" in kinds and kinds <= set("dqQ"))
+    return "d" in kinds and kinds <= set("dqQ")
 
 
 def _constant(value: object) -> str:

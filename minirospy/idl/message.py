@@ -14,6 +14,7 @@ from minirospy.errors import (
     DeserializationError,
     MessageException,
     SerializationError,
+    SerializationOverflowError,
 )
 from minirospy.idl.protocols import is_message, is_stamped
 from minirospy.times import Duration, Time, TVal
@@ -128,6 +129,8 @@ class Message:
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
+        if isinstance(exc, OverflowError):
+            raise SerializationOverflowError(str(exc))
         if exc is not None:
             raise SerializationError(str(exc))
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from minirospy.errors import DeserializationError
+from minirospy.errors import DeserializationError, SerializationOverflowError
 from minirospy.idl.load import class_from_text, specs_of_text
 from minirospy.times import Duration, Time
 
@@ -255,3 +255,24 @@ def test_lists_and_tuples_of_equal_items_are_equal() -> None:
     assert message_class(position=(1.0,)) == message_class(position=[1.0])
     assert message_class(position=(1.0,)) != message_class(position=[2.0])
     assert message_class(names="a") != message_class(names=["a"])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("float32 x", 1e39),
+        ("float32[] x", [1.0, 1e39]),
+        ("float32[] x", (-1e39,)),
+        ("float32[2] x", [1.0, 1e39]),
+        ("int32 count\nfloat32 x", 3.5e38),
+    ],
+)
+def test_number_beyond_32_bits_is_an_error_as_in_genpy(text: str, value: object) -> None:
+    message = class_from_text("test_msgs/Large", text)()
+    message.x = value
+    with pytest.raises(SerializationOverflowError, match=r"^float too large to pack with f format$") as error:
+        message.serialize(BytesIO())
+
+    assert isinstance(error.value, OverflowError)
+    message.x = math.inf if isinstance(value, float) else [math.inf] * len(value)  # type: ignore[arg-type]
+    message.serialize(BytesIO())

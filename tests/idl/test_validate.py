@@ -71,7 +71,7 @@ NAMES_OF_GENERATED_CODE = {
     "annotations", "struct", "sys", "lru_cache", "TYPE_CHECKING", "Any", "genpy", "object", "super", "bytes", "str", "len",
     "isinstance", "bool", "list", "tuple", "map", "range", "hasattr", "memoryview", "setattr", "type", "dict", "int", "float",
     "TypeError", "AttributeError", "ValueError", "self", "args", "kwds", "buff", "data", "end", "write", "error", "name",
-    "OverflowError", "value", "values", "view", "letter", "count", "raw", "_",
+    "OverflowError", "value", "values", "view", "letter", "count", "order", "raw", "_",
 }  # fmt: skip
 
 
