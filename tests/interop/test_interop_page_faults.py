@@ -71,6 +71,26 @@ def test_rate_of_one_latched_message_is_unknown_and_of_more_is_without_the_first
     assert found == [None, None, {"hz": 10, "bytes": 500}]
 
 
+@needs_node
+def test_values_that_a_type_does_not_hold_are_refused_with_their_fields() -> None:
+    found = run_script(
+        "encode, parseDefinition",
+        "js/ros1.js",
+        r"""const definition = parseDefinition("p/T", "uint8 small\nint64 large\nfloat32 real\nbool on\ntime stamp\nstring name\n"
+          + "P[] points\n" + "=".repeat(80) + "\nMSG: p/P\nfloat64 x\n");
+        const attempt = (value) => { try { return encode(definition, value).length; } catch (error) { return error.message; } };
+        return [{ small: 300 }, { small: 1.5 }, { small: null }, { large: 2n ** 63n }, { real: 1e39 },
+          { real: Infinity, large: -5 }, { on: "false" }, { name: 3 }, { stamp: { secs: -2, nsecs: 0 } },
+          { points: [{ x: 1 }, { y: 2 }] }, { points: [[1]] }].map(attempt);""",
+    )
+    assert found == [
+        "small: 300 does not fit into uint8", "small: 1.5 is not a whole number", "small: null is not a value",
+        "large: 9223372036854775808 does not fit into int64", "real: 1e+39 does not fit into float32", 30,
+        "on: neither true nor false", "name: not a text", "stamp: -2 does not fit into uint32",
+        "points[1].y: there is no such field; there is x", "points[0]: not an object",
+    ]  # fmt: skip
+
+
 DOCK = """(async () => {
   const [{ Dock }, { Layout }] = await Promise.all([import("/js/dock.js"), import("/js/layout.js")]);
   window.endedViews = [];
@@ -169,3 +189,92 @@ def test_console_keeps_no_lines_that_were_cut_when_stamps_go_back(
         })()"""
     )
     assert found <= 50_000
+
+
+@needs_chromium
+def test_form_offers_constants_and_takes_their_names(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(
+        """(async () => {
+          const [{ MessageForm }, { parseDefinition }] = await Promise.all([import("/js/form.js"), import("/js/ros1.js")]);
+          const text = ["int8 STATUS_FIX=0", "int8 STATUS_GBAS=2", "uint8 ADD=5", "int8 status", "int32 action"].join("\\n");
+          const form = new MessageForm(parseDefinition("p/T", text));
+          const choice = form.element.querySelector("select");
+          const [status, action] = form.element.querySelectorAll("input");
+          const offered = [...choice.options].map((each) => each.textContent);
+          const first = choice.value;
+          choice.value = "2";
+          choice.dispatchEvent(new Event("change"));
+          action.value = "ADD";
+          const chosen = form.value();
+          status.value = "STATUS_FIX";
+          status.dispatchEvent(new Event("input"));
+          return { offered, first, chosen, named: form.value().status, shown: choice.value };
+        })()"""
+    )
+    assert found["offered"] == ["constant …", "FIX = 0", "GBAS = 2"]
+    assert found["first"] == "0"
+    assert found["chosen"] == {"status": 2, "action": 5}
+    assert (found["named"], found["shown"]) == (0, "0")
+
+
+@needs_chromium
+def test_answer_of_a_service_is_not_shown_for_another_and_one_that_left_is_named(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(
+        """(async () => {
+          const [{ Services }, { parseDefinition }] = await Promise.all([import("/js/views/services.js"), import("/js/ros1.js")]);
+          const services = new Map(["/slow", "/fast"].map((name) => [name, { type: "p/S", request: "" }]));
+          let answer = null;
+          let changed = null;
+          const link = { services, state: "open", mayWrite: true, definition: parseDefinition,
+            watch(names, react) { changed = react; react(); return () => {}; },
+            call: () => new Promise((resolve) => { answer = resolve; }) };
+          const main = document.createElement("div");
+          document.body.append(main);
+          const view = new Services(link, new URLSearchParams("service=/slow"), main, { remember() {} });
+          const calling = view.call();
+          view.choose("/fast");
+          answer({ message: "at last" });
+          await calling;
+          const text = view.answer.textContent;
+          services.delete("/fast");
+          changed();
+          return { text, name: view.choice.value, about: view.about.textContent, isOff: view.button.disabled };
+        })()"""
+    )
+    assert found == {"text": "", "name": "/fast", "about": "p/S: it has left", "isOff": True}
+
+
+@needs_chromium
+def test_history_of_a_diagnostic_names_when_it_fell_silent_and_came_back(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    found = page.evaluate(
+        """(async () => {
+          const { Diagnostics } = await import("/js/views/diagnostics.js");
+          let received = null;
+          const link = { channels: new Map(), state: "open", watch(names, react) { react(); return () => {}; },
+            subscribe(entry, react) { received = react; return () => {}; } };
+          const main = document.createElement("div");
+          document.body.append(main);
+          const view = new Diagnostics(link, new URLSearchParams("name=/motor"), main, { remember() {} });
+          const line = { message: { status: [{ name: "motor", level: 0, message: "fine", hardware_id: "", values: [] }] } };
+          received({ lines: [line, line] });
+          view.statuses.get("/motor").at -= 60;
+          view.draw();
+          view.draw();
+          received({ lines: [line] });
+          view.close();
+          return [...view.side.querySelectorAll(".history li")].map((each) => each.textContent.replace(/^\\S+ /, ""));
+        })()"""
+    )
+    assert found == ["OK fine", "Stale no message for 5 seconds", "OK fine"]

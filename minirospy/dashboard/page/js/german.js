@@ -55,6 +55,11 @@ export const GERMAN = {
   "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",
   "\"{rest}\" is not a field, nor an index, nor a filter as {id==1}": "„{rest}“ ist kein Feld, kein Index und kein Filter wie {id==1}",
   "no number there; there is {paths}": "dort ist keine Zahl; es gibt {paths}", "no number there; there is none in this topic": "dort ist keine Zahl; in diesem Topic gibt es keine",
+  "{name}: \"{text}\" is not a whole number": "{name}: „{text}“ ist keine ganze Zahl", "{name}: \"{text}\" is not a number": "{name}: „{text}“ ist keine Zahl", "{name}: {text} does not fit into {type}": "{name}: {text} passt nicht in {type}",
+  "{name}: write an array, as {example}": "{name}: eine Liste schreiben, wie {example}", "An array, as {example}": "Eine Liste, wie {example}", "Constants of {name}": "Konstanten von {name}", "constant …": "Konstante …", "Seconds, or now": "Sekunden, oder now", "Seconds": "Sekunden",
+  ": it has left": ": er ist nicht mehr da",
+  "{name} is not a number": "{name} ist keine Zahl",
+  "no message for {seconds} seconds": "{seconds} Sekunden lang keine Nachricht",
   // graph
   "Nodes and topics (active)": "Nodes und Topics (aktive)", "Nodes and topics (all)": "Nodes und Topics (alle)", "Nodes only": "Nur Nodes", "What is shown": "Was gezeigt wird", "Filter names": "Namen filtern",
   "Graph of nodes and topics": "Graph der Nodes und Topics", "hide debug": "Debug verbergen", "Fit": "Einpassen", "No nodes yet. Start one: it appears here.": "Noch kein Node. Einen starten: er erscheint hier.",

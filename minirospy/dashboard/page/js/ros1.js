@@ -228,8 +228,31 @@ export function encode(definition, value) {
   return writer.bytes.slice(0, writer.size);
 }
 
+const INTEGER = /^(u?)int(\d+)$/;
+
+/** Return why a number is not one of a type; empty where it is. What does not fit would become another number. */
+function whyNot(type, value) {
+  if (type === "float32") return Number.isFinite(value) && !Number.isFinite(Math.fround(value)) ? `${value} does not fit into ${type}` : "";
+  const integer = INTEGER.exec({ byte: "int8", char: "uint8" }[type] ?? type);
+  if (!integer) return "";
+  if (typeof value === "number" && !Number.isInteger(value)) return `${value} is not a whole number`;
+  const bits = Number(integer[2]);
+  return BigInt(value) === (integer[1] ? BigInt.asUintN : BigInt.asIntN)(bits, BigInt(value)) ? "" : `${value} does not fit into ${type}`;
+}
+
+function whyNotTime(type, { secs, nsecs }) {
+  if (typeof secs !== "number" || typeof nsecs !== "number") return "not {secs, nsecs}";
+  const part = type === "time" ? "uint32" : "int32";
+  return whyNot(part, secs) || whyNot(part, nsecs);
+}
+
 function writeMessage(writer, definition, value, path) {
-  if (typeof value !== "object" || value === null) throw new MessageError(`${path || definition.name}: not an object`);
+  if (typeof value !== "object" || value === null || typeof value.length === "number") throw new MessageError(`${path || definition.name}: not an object`);
+  for (const name of Object.keys(value)) {
+    if (!definition.fields.some((field) => field.name === name)) {
+      throw new MessageError(`${path ? `${path}.` : ""}${name}: there is no such field; there is ${definition.fields.map((field) => field.name).join(", ") || "none"}`);
+    }
+  }
   for (const field of definition.fields) {
     const where = path ? `${path}.${field.name}` : field.name;
     const given = value[field.name];
@@ -248,9 +271,11 @@ function writeMessage(writer, definition, value, path) {
 }
 
 function writeOne(writer, field, value, where) {
+  if (value === null) throw new MessageError(`${where}: null is not a value`);
   if (field.message) {
     writeMessage(writer, field.message, value ?? {}, where);
   } else if (field.type === "string") {
+    if (value !== undefined && typeof value !== "string") throw new MessageError(`${where}: not a text`);
     const bytes = BYTES.encode(value ?? "");
     writer.length(bytes.length);
     const start = writer.room(bytes.length);
@@ -261,9 +286,10 @@ function writeOne(writer, field, value, where) {
     if (typeof zero === "number" && typeof checked !== "number" && typeof checked !== "bigint" && typeof checked !== "boolean") {
       throw new MessageError(`${where}: not a number`);
     }
-    if (typeof zero === "object" && (typeof checked.secs !== "number" || typeof checked.nsecs !== "number")) {
-      throw new MessageError(`${where}: not {secs, nsecs}`);
-    }
+    if (typeof zero === "boolean" && typeof checked !== "boolean" && checked !== 0 && checked !== 1) throw new MessageError(`${where}: neither true nor false`);
+    const why = typeof checked === "object" ? whyNotTime(field.type, checked) : whyNot(field.type, checked);
+    if (why) throw new MessageError(`${where}: ${why}`);
+    if (typeof zero === "object" && typeof checked !== "object") throw new MessageError(`${where}: not {secs, nsecs}`);
     const start = writer.room(size);
     try {
       set(writer.view, start, checked);

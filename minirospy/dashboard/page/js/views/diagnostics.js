@@ -79,7 +79,7 @@ export class Diagnostics {
         const path = `/${name.split("/").filter(Boolean).join("/")}`;
         if (this.statuses.size >= MOST && !this.statuses.has(path)) continue;
         const before = this.statuses.get(path);
-        const isSame = before?.level === level && before.message === text;
+        const isSame = before?.level === level && before.message === text && !before.isSilent;
         const changes = isSame ? before.changes : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MOST_CHANGES);
         this.statuses.set(path, { path, name, level, message: text, hardware, values, at, changes });
       }
@@ -91,6 +91,12 @@ export class Diagnostics {
   levelOf(status, now) {
     const level = Math.min(3, Math.max(0, status.level));
     return now - status.at > STALE_SECONDS ? 3 : level;
+  }
+
+  /** Note that the messages of a status have ended. */
+  silence(status) {
+    status.isSilent = true;
+    status.changes = [{ time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) }, ...status.changes].slice(0, MOST_CHANGES);
   }
 
   /** Return the nodes of the tree in order, each with its worst level; parents that nobody reports are added. */
@@ -110,6 +116,7 @@ export class Diagnostics {
       });
     }
     const ordered = [...nodes.values()].sort((one, other) => comparison(one.path.split("/"), other.path.split("/")));
+    for (const { status } of ordered) if (status && !status.isSilent && now - status.at > STALE_SECONDS) this.silence(status);
     for (const node of ordered) if (node.status) node.level = this.levelOf(node.status, now);
     // From the leaves up: a parent without a status has the worst of its children.
     for (const node of [...ordered].reverse()) {

@@ -95,6 +95,7 @@ export class Joints {
       if (row.input.value !== "" && Number.isFinite(value)) set(value / this.factor(row));
       else this.showRow(row);
     } });
+    row.input.addEventListener("blur", () => this.showRow(row, true));
     row.zero = h("button", { type: "button", class: "small", title: "To its zero", onclick: () => set(zero) }, "0");
     row.low = h("span", { class: "num muted" });
     row.high = h("span", { class: "num muted high" });
@@ -117,7 +118,7 @@ export class Joints {
     return this.inDegrees.checked && kind !== "prismatic" ? DEGREES : 1;
   }
 
-  showRow(row) {
+  showRow(row, isLeft = false) {
     const factor = this.factor(row);
     const shown = (value) => String(Number((value * factor).toFixed(factor === 1 ? 3 : 1)));
     setText(row.unit, row.kind === "prismatic" ? "m" : factor === 1 ? "rad" : "°");
@@ -131,7 +132,7 @@ export class Joints {
     row.slider.setAttribute("aria-valuetext", `${shown(position)} ${row.unit.textContent}`);
     setText(row.low, shown(lower));
     setText(row.high, shown(upper));
-    if (document.activeElement !== row.input) row.input.value = shown(position);
+    if (isLeft || document.activeElement !== row.input) row.input.value = shown(position);
   }
 
   /** Send what was moved, a few times a second. */

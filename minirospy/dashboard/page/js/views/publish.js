@@ -30,7 +30,7 @@ export class Publish {
     this.buttons = h("div", { class: "bar", hidden: true }, this.once, this.repeat, h("label", {}, this.rate, "times a second"));
     this.result = h("p", { role: "status" });
     main.append(h("div", { class: "bar" }, this.choice, this.about), this.fresh,
-      h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.send(); } }, this.fields, this.buttons), this.result);
+      h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.send(); } }, this.fields, h("div", { class: "form-foot" }, this.buttons, this.result)));
     this.ending = link.watch(["channels", "state", "graph"], () => this.update());
   }
 

@@ -10,6 +10,7 @@ export class Services {
     this.place = place;
     this.name = words.get("service") ?? "";
     this.type = null;
+    this.calls = 0; // the last one's number
     this.form = null;
     this.choice = h("select", { class: "grow", "aria-label": "Service", onchange: () => this.choose(this.choice.value) });
     this.about = h("span", { class: "muted" });
@@ -28,8 +29,11 @@ export class Services {
   update() {
     const names = [...this.link.services.keys()];
     fill(this.choice, h("option", { value: "" }, names.length ? t("choose a service ({count})", { count: names.length }) : t("no services")), names.map((name) => h("option", { value: name }, name)));
-    this.choice.value = this.link.services.has(this.name) ? this.name : "";
     const service = this.link.services.get(this.name);
+    if (!service && this.name) this.choice.append(h("option", { value: this.name }, this.name));
+    this.choice.value = this.name;
+    this.button.disabled = !service;
+    if (this.type) setText(this.about, `${this.type}${service || this.link.state !== "open" ? "" : t(": it has left")}`);
     if (service && service.type !== this.type) this.show(service);
     else if (!service && this.link.state === "open" && !this.type) fill(this.fields, h("p", { class: "muted" }, this.link.mayWrite ? "Choose a service: its request becomes a form." : "This token is read-only: it calls no services."));
   }
@@ -37,6 +41,7 @@ export class Services {
   choose(name) {
     this.name = name;
     this.type = null;
+    this.calls = this.calls + 1;
     this.button.hidden = true;
     fill(this.fields);
     setText(this.answer, "");
@@ -56,13 +61,16 @@ export class Services {
 
   async call() {
     this.answer.classList.remove("error");
-    let request;
+    // The answer to a call before this one, or of another service, is not that of this form.
+    const call = this.calls = this.calls + 1;
     try {
-      request = this.form.value();
+      const request = this.form.value();
       setText(this.answer, t("waiting for the answer …"));
       const response = await this.link.call(this.name, request);
+      if (call !== this.calls) return;
       setText(this.answer, yaml(response) || t("done: the answer has no fields"));
     } catch (error) {
+      if (call !== this.calls) return;
       this.answer.classList.add("error");
       setText(this.answer, error.message);
     }
