@@ -13,7 +13,7 @@ from std_msgs.msg import Bool, Float64, String
 
 from tests.dashboard.conftest import Served, serve
 from tests.dashboard.test_drive_door import listen
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import HOSTILE, address, browse, needs_chromium, publisher
 
@@ -265,3 +265,21 @@ def test_reader_sets_nothing(serve: Callable[..., Served], browse: Callable[...,
     page.wait_text("#state", "read-only")
     page.click(".widget button")
     page.wait_text(".widget .note", "This token is read-only.")
+
+
+@needs_chromium
+def test_button_sets_a_topic_that_is_only_subscribed_by_the_type_of_its_subscribers(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    node = served.node("robot")
+
+    async def subscribe() -> Any:
+        return await node.subscribe("/cmd_vel", Twist)
+
+    heard = served.run(subscribe())
+    page = browse(
+        address(served, panels({"kind": "button", "path": "/cmd_vel/angular/z", "label": "Turn", "on": "2"}))
+    )
+    page.click("button.push-button:not([disabled])", "Turn")
+    assert served.run(heard.next(PATIENCE)).angular.z == 2.0

@@ -21,7 +21,7 @@ export class Panels {
     this.empty = h("p", { class: "empty" }, t("Choose a kind of panel, and the field of a topic that it shows or sets."));
     this.form = this.makeForm();
     main.append(h("div", { class: "bar" }, this.editButton, this.problem), this.form, this.grid, this.empty);
-    this.ending = link.watch(["channels", "services", "state"], () => this.update());
+    this.ending = link.watch(["channels", "services", "state", "graph"], () => this.update());
     this.draw();
   }
 
@@ -160,6 +160,12 @@ function splitOrNull(path, names) {
   }
 }
 
+/** Return a number with these digits behind its point; one that is far beyond the range with four in all. */
+function readingOf(value, digits) {
+  const text = String(Number(value.toFixed(digits)));
+  return text.length > 8 ? String(Number(value.toPrecision(4))) : text;
+}
+
 /** One panel. */
 class Panel {
   constructor(link, spec) {
@@ -169,6 +175,7 @@ class Panel {
     this.name = null; // of the topic or service, once it is known
     this.steps = [];
     this.isAdvertised = false;
+    this.known = null; // {topic, type, schema} of a topic that is only subscribed
     this.tools = h("span", { class: "widget-tools" });
     this.note = h("p", { class: "muted note", role: "status" });
     this.title = spec.label || spec.path;
@@ -196,13 +203,14 @@ class Panel {
     try {
       found = splitPath(spec.path, spec.isService ? link.services.keys() : link.channels.keys());
       // A topic that nobody publishes has the name that was typed; the type says what its field is.
+      if (!found && !spec.isService && !spec.type && KINDS[spec.kind].isWriter) found = this.subscribed();
       if (!found && !spec.isService && spec.type) found = [spec.path.replace(/\/data$/, ""), spec.path.endsWith("/data") ? ["data"] : []];
     } catch (error) {
-      setText(this.note, error.text ? t(error.text, error.values) : error.message);
+      this.say(error.text ? t(error.text, error.values) : error.message, true);
       return;
     }
     if (!found) {
-      if (!this.name) setText(this.note, t("waiting for {path}", { path: spec.path }));
+      if (!this.name) this.say(t("waiting for {path}", { path: spec.path }));
       return;
     }
     const [name, steps] = found;
@@ -216,8 +224,32 @@ class Panel {
     this.name = name;
     for (const control of this.element.querySelectorAll("button, input")) control.disabled = false;
     this.steps = steps;
-    setText(this.note, "");
+    this.say("");
     if (!spec.isService) this.end = link.subscribe({ topic: name, mode: "latest" }, (item) => this.received(item));
+  }
+
+  /** Return the topic and the steps of a path to what nodes subscribe to and nobody publishes; null until its type is known. */
+  subscribed() {
+    const { link, spec } = this;
+    const found = splitPath(spec.path, link.graph.subscribed.keys());
+    if (!found) return null;
+    const [topic] = found;
+    if (this.known?.topic === topic) return this.known.schema === undefined ? null : found;
+    this.known = { topic };
+    link.tools.request({ do: "type", topic }).then(({ name, definition }) => {
+      this.known = { topic, type: name, schema: definition };
+      this.update();
+    }, (error) => {
+      this.known = null; // it is looked up again when the graph changes
+      if (!this.name) this.say(error.message, true);
+    });
+    return null;
+  }
+
+  /** Show a line below the panel, in red where something is wrong. */
+  say(text, isWrong = false) {
+    this.note.classList.toggle("error", isWrong);
+    setText(this.note, text);
   }
 
   /** Publish a topic that is to be set before its first message: those before its subscribers are connected are lost. */
@@ -230,14 +262,15 @@ class Panel {
 
   /** Return the type of a topic: {type, schema}, that of its publishers or the chosen one. */
   channel(name) {
-    return this.link.channels.get(name) ?? { type: this.spec.type, schema: TYPES[this.spec.type] };
+    return this.link.channels.get(name) ?? (this.known?.topic === name ? this.known : { type: this.spec.type, schema: TYPES[this.spec.type] });
   }
 
   received({ message, error }) {
-    if (error) setText(this.note, error);
+    if (error) this.say(error, true);
     if (!message) return;
     const value = valueAt(message, this.steps);
-    if (value === undefined) setText(this.note, t("{name} has no such field", { name: this.name }));
+    if (value === undefined) this.say(t("{name} has no such field", { name: this.name }), true);
+    else if (this.spec.kind === "gauge" && numberOf(value) === null) this.say(t("{name} is not a number", { name: this.spec.path }), true);
     else this.show(value);
   }
 
@@ -289,12 +322,13 @@ class Panel {
     const text = svg("text", { x: 60, y: 58, class: "reading" }, "–");
     const picture = svg("svg", { viewBox: "0 0 120 78", class: "meter", role: "meter", "aria-valuemin": min, "aria-valuemax": max, "aria-label": this.title },
       svg("path", { class: "track", d: arc(1) }), needle, text, svg("text", { x: 10, y: 75, class: "end" }, spec.min), svg("text", { x: 110, y: 75, class: "end" }, spec.max));
+    const digits = Math.min(6, Math.max(0, 3 - Math.floor(Math.log10(Math.abs(max - min) || 1)))); // a thousandth of its range
     this.show = (value) => {
       const found = numberOf(value) ?? NaN;
       const share = max === min ? 0 : Math.min(1, Math.max(0, (found - min) / (max - min)));
       needle.setAttribute("d", arc(Math.max(0.001, Number.isFinite(share) ? share : 0)));
       needle.classList.toggle("over", found > max || found < min);
-      setText(text, `${Number.isFinite(found) ? Number(found.toPrecision(4)) : "–"}${spec.unit ? ` ${spec.unit}` : ""}`);
+      setText(text, `${Number.isFinite(found) ? readingOf(found, digits) : "–"}${spec.unit ? ` ${spec.unit}` : ""}`);
       picture.setAttribute("aria-valuenow", String(found));
     };
     return picture;
@@ -344,7 +378,7 @@ class Panel {
     if (!this.name) return this.fail(t("waiting for {path}", { path: this.spec.path }));
     try {
       const sending = this.spec.isService ? this.call(text) : this.publish(text);
-      sending.then((answer) => setText(this.note, answer), (error) => this.fail(error.message));
+      sending.then((answer) => this.say(answer), (error) => this.fail(error.message));
       return true;
     } catch (error) {
       return this.fail(error.message);
@@ -352,7 +386,7 @@ class Panel {
   }
 
   fail(text) {
-    setText(this.note, text);
+    this.say(text, true);
     return false;
   }
 
