@@ -22,10 +22,12 @@ from minirospy.bridge.types import installed_type
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of, texts_of
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
-from minirospy.introspect.graph import Graph
+from minirospy.introspect.graph import Graph, why_illegal
 from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes
+from minirospy.introspect.parameters import set_parameter
 from minirospy.introspect.processes import ProcessLoads
 from minirospy.introspect.survey import Survey, describe, survey
+from minirospy.introspect.values import check_parameter, format_value, parse_value
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
@@ -37,6 +39,13 @@ SUBPROTOCOL = "minirospy.tools.v1"
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
+
+# bool first: it is an int, too.
+_TYPE_NAMES: Mapping[type, str] = {
+    bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
+}  # fmt: skip
+_MOST_PREVIEW = 200
+"""Characters of a value that are shown while it is typed."""
 
 _REPORT_SECONDS = 2.0
 _AT_ONCE = 4
@@ -135,6 +144,8 @@ class ToolsSession(JsonSession):
             "cleanup": self._cleanup,
             "type": self._type,
             "yaml": self._yaml,
+            "value": self._value,
+            "set": self._set,
         }
         super().__init__(client, handlers)
 
@@ -207,7 +218,9 @@ class ToolsSession(JsonSession):
 
         def kill() -> None:
             with self._door.graph() as graph:
-                kill_node(graph, find_node(graph, name), "requested in the dashboard")
+                node = find_node(graph, name)
+                ping_node(graph, node)  # of one that has exited already, the reason is reported
+                kill_node(graph, node, "requested in the dashboard")
 
         await self.in_thread(kill)
         return {}
@@ -257,6 +270,46 @@ class ToolsSession(JsonSession):
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
             for name, value in values.items()
         }
+
+    async def _value(self, fields: Fields) -> Fields:
+        """Return the type and the text of the value that `rosparam set` makes of ``text``."""
+        value = await self._parsed(fields)
+        return {"type": _type_name(value), "text": format_value(value)[:_MOST_PREVIEW]}
+
+    async def _set(self, fields: Fields) -> Fields:
+        """Set the parameter ``name`` to the value of ``text``, as `rosparam set` does."""
+        self._require_writing("sets no parameter")
+        name = text_of(fields, "name")
+        why = why_illegal(name)
+        if why:
+            raise UsageError(f"parameter [{name}]: {why}")
+        value = await self._parsed(fields)
+
+        def set_value() -> None:
+            with self._door.graph() as graph:
+                set_parameter(graph, graph.resolve(name), value)
+
+        await self.in_thread(set_value)
+        return {}
+
+    async def _parsed(self, fields: Fields) -> object:
+        text = text_of(fields, "text")
+
+        def parse() -> object:
+            # No text is the empty text, as on the command line; to YAML it would be null.
+            value = parse_value(text) if text.strip() else ""
+            check_parameter(value, "the value")
+            return value
+
+        return await asyncio.get_running_loop().run_in_executor(self._door.parser, parse)
+
+
+def _type_name(value: object) -> str:
+    """Return the name of a parameter's type, as roscpp and the wiki call it."""
+    for type_, name in _TYPE_NAMES.items():
+        if isinstance(value, type_):
+            return name
+    raise AssertionError(f"a {type(value).__name__} is not a parameter")
 
 
 def _report_of(fields: Fields) -> bytes:

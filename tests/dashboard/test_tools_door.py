@@ -153,6 +153,34 @@ def test_node_is_pinged_and_killed(serve: Callable[..., Served]) -> None:
     assert stopped.wait(60)
 
 
+def test_parameter_is_set_to_what_rosparam_reads_of_its_text(serve: Callable[..., Served]) -> None:
+    served = serve()
+    node = served.node("robot")
+    cases: dict[str, tuple[str, object]] = {
+        "5": ("int", 5), "5.0": ("double", 5.0), "yes": ("bool", True), "1e3": ("string", "1e3"), "": ("string", ""),
+        "[1, 2.0, a b]": ("list", [1, 2.0, "a b"]), "'5'": ("string", "5"), "{gain: 0.5}": ("dictionary", {"gain": 0.5}),
+    }  # fmt: skip
+    with Tools(served) as tools:
+        for text, (type_, value) in cases.items():
+            assert tools.request(do="value", text=text)["result"]["type"] == type_, text
+            assert tools.request(do="set", name="/p", text=text)["result"] == {}
+            found = served.run(node.get_param("/p"))
+            assert (found, type(found)) == (value, type(value))
+        assert "null" in tools.request(do="set", name="/p", text="null")["error"]
+        assert "32 bits" in tools.request(do="value", text="5000000000")["error"]
+        assert "error" in tools.request(do="value", text="[1")
+        assert "error" in tools.request(do="set", name="/a b", text="1")
+
+
+def test_kill_of_a_node_that_has_exited_is_an_error(serve: Callable[..., Served]) -> None:
+    served = serve()
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        answer = master.registerPublisher("/dead", "/nothing", "std_msgs/String", "http://127.0.0.1:1/")
+        assert answer[0] == 1, answer  # type: ignore[index]
+    with Tools(served) as tools:
+        assert "node [/dead] does not answer" in tools.request(do="kill", node="/dead")["error"]
+
+
 def test_cleanup_unregisters_nodes_that_do_not_answer_and_no_others(serve: Callable[..., Served]) -> None:
     served = serve()
     served.node("alive")
@@ -180,6 +208,7 @@ def test_reader_kills_and_removes_nothing(serve: Callable[..., Served]) -> None:
     with Tools(served, "read-token-00") as tools:
         assert "read-only" in tools.request(do="kill", node="/victim")["error"]
         assert "read-only" in tools.request(do="cleanup", nodes=["/victim"])["error"]
+        assert "read-only" in tools.request(do="set", name="/p", text="1")["error"]
         assert tools.request(do="ping", node="/victim")["result"]
 
 

@@ -3,6 +3,8 @@
 import { h, quoted, setText } from "../dom.js";
 import { t } from "../texts.js";
 
+const PREVIEW_MS = 150; // without another key
+
 export class Parameters {
   constructor(link, words, main, place) {
     this.link = link;
@@ -14,13 +16,15 @@ export class Parameters {
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "list", "aria-label": "Parameters" });
     this.name = h("input", { placeholder: "/name", "aria-label": "Name of a new parameter", autocomplete: "off" });
-    this.value = h("input", { placeholder: "value, as 5 or [1, 2] or text", "aria-label": "Its value", class: "grow", autocomplete: "off" });
+    this.value = h("input", { placeholder: "value, as 5 or [1, 2] or text", "aria-label": "Its value", class: "grow", autocomplete: "off", oninput: () => this.preview(this.value, this.typed) });
+    this.typed = h("span", { class: "muted preview-type", "aria-live": "polite" }); // what becomes of the text
     main.append(h("div", { class: "bar" }, this.filter, this.count), this.list,
-      h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.add(); } }, this.name, this.value, h("button", { type: "submit" }, "Set")));
+      h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.add(); } }, this.name, this.value, this.typed, h("button", { type: "submit" }, "Set")));
     this.ending = link.watch(["parameters"], () => this.update());
   }
 
   close() {
+    clearTimeout(this.timer);
     this.ending();
   }
 
@@ -51,15 +55,21 @@ export class Parameters {
   }
 
   makeRow(name) {
-    const input = h("input", { "aria-label": t("Value of {name}", { name }), autocomplete: "off" });
+    const typed = h("span", { class: "muted preview-type", "aria-live": "polite" });
+    const input = h("input", { "aria-label": t("Value of {name}", { name }), autocomplete: "off", oninput: () => this.preview(input, typed) });
     const row = { input, text: "" };
     const element = h("form", { class: "row parameter", role: "listitem", onsubmit: (event) => {
       event.preventDefault();
+      // What was not changed stays as it is: a double without a fraction is shown as an int.
+      const text = input.value;
       input.blur();
-      this.link.setParameter(name, parsed(input.value));
-    } }, h("span", { class: "name" }, name), input,
+      if (text !== row.text) this.set(name, text, typed);
+    } }, h("span", { class: "name" }, name), h("span", { class: "with-type" }, input, typed),
     h("button", { type: "button", class: "small", title: t("Delete {name}", { name }), onclick: () => this.link.setParameter(name, undefined) }, t("delete")));
-    input.addEventListener("blur", () => { if (!input.value.trim()) input.value = row.text; });
+    input.addEventListener("blur", () => {
+      say(typed, "");
+      if (!input.value.trim()) input.value = row.text;
+    });
     row.element = element;
     element.dataset.name = name;
     return row;
@@ -75,19 +85,51 @@ export class Parameters {
     setText(this.count, t("{count} of {all} parameters", { count, all: this.rows.size }));
   }
 
-  add() {
+  /** Set a parameter as rosparam does: the server reads the text as YAML. */
+  async set(name, text, shown) {
+    clearTimeout(this.timer);
+    say(shown, "");
+    try {
+      await this.link.tools.request({ do: "set", name, text });
+      return true;
+    } catch (error) {
+      say(shown, error.message, true);
+      return false;
+    }
+  }
+
+  /** Show beside a text that is being typed which value it becomes. */
+  preview(input, shown) {
+    const text = input.value;
+    clearTimeout(this.timer);
+    if (!text.trim()) {
+      say(shown, "");
+      return;
+    }
+    this.timer = setTimeout(async () => {
+      let found;
+      let isWrong = false;
+      try {
+        const value = await this.link.tools.request({ do: "value", text });
+        found = `${value.type}: ${value.text}`;
+      } catch (error) {
+        found = error.message;
+        isWrong = true;
+      }
+      if (input.value === text && (input === this.value || document.activeElement === input)) say(shown, found, isWrong);
+    }, PREVIEW_MS);
+  }
+
+  async add() {
     const name = this.name.value.trim();
     if (!name) return;
-    this.link.setParameter(name.startsWith("/") ? name : `/${name}`, parsed(this.value.value));
+    if (!await this.set(name.startsWith("/") ? name : `/${name}`, this.value.value, this.typed)) return;
     this.name.value = this.value.value = "";
   }
 }
 
-/** Return a value as rosparam reads it in the usual cases: JSON, else text. */
-function parsed(text) {
-  try {
-    return JSON.parse(text) ?? text;
-  } catch {
-    return text;
-  }
+function say(element, text, isWrong = false) {
+  element.classList.toggle("error", isWrong);
+  element.title = text; // it may be cut
+  setText(element, text);
 }
