@@ -1083,7 +1083,14 @@ def test_csv_and_png_of_a_plot_are_saved(
     assert head.replace('"', "").split(",") == ["time", "/odometry/x", "/odometry/y"]
     assert first.split(",")[1:] == ["1.5", "0"]
     page.wait("return document.querySelector('.chart canvas').width > 300")
+    # What is computed of a series is named in the picture, too.
+    page.choose(".series[data-label='/odometry/x'] select", "derivative")
+    page.evaluate(
+        """{ window.drawn = []; const draw = CanvasRenderingContext2D.prototype.fillText;
+        CanvasRenderingContext2D.prototype.fillText = function (text, ...at) { drawn.push(text); draw.call(this, text, ...at); }; }"""
+    )
     png = saved(page, tmp_path, "plot.png", "PNG")
+    assert page.evaluate("drawn.slice(-2)") == ["/odometry/x derivative", "/odometry/y"]
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
     assert struct.unpack(">I", png[16:20])[0] == page.evaluate(
         "document.querySelector('.chart canvas').width"

@@ -110,6 +110,12 @@ def test_bag_is_played_moved_through_and_published(
     ):
         page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
         page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}{text}")
+    # They go on after a click on a button.
+    page.click("button[aria-label^='To the next message']")
+    page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}message 1")
+    page.evaluate("document.querySelector('button[aria-label^=\"To the next message\"]').focus()")
+    page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
+    page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}message 2")
 
     # Played without being published, then with it.
     page.evaluate(

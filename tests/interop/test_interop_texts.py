@@ -200,7 +200,9 @@ def test_keys_of_the_page_show_help_and_other_views(
 
 
 NAMELESS = """[...document.querySelectorAll(
-    'a[href], button, input, select, textarea, [tabindex="0"], [role=button], [role=img], svg[role]')]
+    'a[href], button, input, select, textarea, [tabindex="0"], [role=button], [role=img],'
+    + ' #view svg:not([aria-hidden]), #view canvas:not([aria-hidden])')]
+  .filter(e => !e.closest('[aria-hidden], .uplot, .insets'))
   .filter(e => e.getClientRects().length)
   .filter(e => !(e.getAttribute('aria-label') || e.title || e.labels?.length || e.placeholder
     || (!/INPUT|SELECT/.test(e.tagName) && e.textContent.trim())))
@@ -220,6 +222,10 @@ def test_whatever_can_be_used_has_a_name_for_screen_readers(
     page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
     found: Any = page.evaluate(NAMELESS)
     assert found == [], json.dumps(found)
+    # The heading of the page is the view's name; a form is not an entry of a list.
+    title = page.evaluate("document.title").partition(" · ")[0]
+    assert page.evaluate("[...document.querySelectorAll('h1')].map(e => e.textContent)") == [title]
+    assert page.evaluate("document.querySelectorAll('form[role]').length") == 0
 
 
 @needs_node

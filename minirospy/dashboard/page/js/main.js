@@ -116,6 +116,7 @@ function route() {
   shown = placeOf(chosen);
   current = new View(link, words, main, shown);
   document.title = `${t(title)} · minirospy`;
+  setText(document.getElementById("title"), t(title));
   for (const tab of tabs.children) {
     if (tab.dataset.view === chosen) {
       tab.setAttribute("aria-current", "page");

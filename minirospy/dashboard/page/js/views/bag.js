@@ -591,7 +591,7 @@ class Card {
     this.time = h("span", { class: "num muted" });
     this.problem = h("p", { class: "error" });
     this.isImage = IMAGES.has(row.type);
-    this.canvas = this.isImage ? h("canvas", { class: "image", width: 0, height: 0, "aria-label": row.name }) : null;
+    this.canvas = this.isImage ? h("canvas", { class: "image", role: "img", width: 0, height: 0, "aria-label": row.name }) : null;
     this.tree = this.isImage ? null : new Tree(row.name);
     this.body = h("div", { class: this.isImage ? "card-image" : "fields" }, this.canvas ?? this.tree.element);
     this.waiting = h("p", { class: "muted" }, "No message yet at this time.");

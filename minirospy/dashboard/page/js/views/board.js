@@ -20,7 +20,7 @@ export class Board {
     this.problem = h("span", { class: "error", role: "alert" });
     this.others = h("div", { class: "muted pins" });
     this.picture = svg("svg", { class: "board", viewBox: "0 0 560 300", role: "group", "aria-label": "The board" });
-    this.room = svg("svg", { class: "room", viewBox: "-130 -220 260 260", role: "img", "aria-label": "The scanner's fields and a person" });
+    this.room = svg("svg", { class: "room", viewBox: "-130 -220 260 260", role: "group", "aria-label": "The scanner's fields and a person" });
     this.awayButton = h("button", { type: "button", onclick: () => this.send({ person: this.state?.person ? null : [0.6, 0] }) }, "Let a person come");
     main.append(h("div", { class: "bar" }, h("label", {}, "Board", this.boards), this.problem),
       h("div", { class: "boards" }, h("div", { class: "panel" }, this.picture, h("p", { class: "muted hint" }, "Hold a button with the mouse or a finger, or the keys 1 and 2.")),

@@ -31,8 +31,8 @@ export class Image {
     this.about = h("span", { class: "muted" });
     this.value = h("span", { class: "mono" });
     this.problem = h("p", { class: "error" });
-    this.canvas = h("canvas", { class: "image", width: 0, height: 0, onpointermove: (event) => this.point(event), onpointerleave: () => setText(this.value, "") });
-    this.overlay = h("canvas", { class: "overlay", width: 0, height: 0 });
+    this.canvas = h("canvas", { class: "image", role: "img", width: 0, height: 0, onpointermove: (event) => this.point(event), onpointerleave: () => setText(this.value, "") });
+    this.overlay = h("canvas", { class: "overlay", width: 0, height: 0, "aria-hidden": "true" });
     this.empty = h("p", { class: "empty" });
     this.frame = h("div", { class: "panel frame", ondblclick: () => this.unzoom() }, h("div", { class: "layers" }, this.canvas, this.overlay), this.empty, this.problem);
     this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
@@ -73,6 +73,7 @@ export class Image {
     this.end = null;
     this.pixels = this.next = null;
     for (const each of [this.canvas, this.overlay]) each.width = each.height = 0;
+    this.canvas.setAttribute("aria-label", topic);
     this.rate = new Rate();
     if (topic) this.subscribe();
     this.update();

@@ -14,7 +14,7 @@ export class Parameters {
       place.remember({ filter: this.filter.value });
     } });
     this.count = h("span", { class: "muted" });
-    this.list = h("div", { class: "topics", role: "list", "aria-label": "Parameters" });
+    this.list = h("div", { class: "topics", role: "group", "aria-label": "Parameters" });
     this.name = h("input", { placeholder: "/name", "aria-label": "Name of a new parameter", autocomplete: "off" });
     this.value = h("input", { placeholder: "value, as 5 or [1, 2] or text", "aria-label": "Its value", class: "grow", autocomplete: "off", oninput: () => this.preview(this.value, this.typed) });
     this.typed = h("span", { class: "muted preview-type", "aria-live": "polite" }); // what becomes of the text
@@ -58,7 +58,7 @@ export class Parameters {
     const typed = h("span", { class: "muted preview-type", "aria-live": "polite" });
     const input = h("input", { "aria-label": t("Value of {name}", { name }), autocomplete: "off", oninput: () => this.preview(input, typed) });
     const row = { input, text: "" };
-    const element = h("form", { class: "row parameter", role: "listitem", onsubmit: (event) => {
+    const element = h("form", { class: "row parameter", onsubmit: (event) => {
       event.preventDefault();
       // What was not changed stays as it is: a double without a fraction is shown as an int.
       const text = input.value;

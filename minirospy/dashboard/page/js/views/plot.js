@@ -465,7 +465,7 @@ export class Plot {
 
   saveCsv() {
     const all = [...this.series.values()].filter((each) => !each.isHidden);
-    download("plot.csv", new Blob([csv(all.map((each) => `${each.label}${each.kind ? ` ${each.kind}` : ""}`), all.map((each) => each.samples))], { type: "text/csv" }));
+    download("plot.csv", new Blob([csv(all.map(titleWithKind), all.map((each) => each.samples))], { type: "text/csv" }));
   }
 
   savePng() {
@@ -481,13 +481,20 @@ export class Plot {
     context.drawImage(source, 0, 0);
     context.font = `${13 * scale}px system-ui, sans-serif`;
     const isMany = new Set(rows.map(({ label }) => this.axes.of(label))).size > 1;
-    rows.forEach(({ label, color }, row) => {
+    rows.forEach((each, row) => {
+      const { label, color } = each;
+      const title = titleWithKind(each);
       const y = source.height + (row * 20 + 16) * scale;
       context.fillStyle = color;
       context.fillRect(16 * scale, y - 9 * scale, 14 * scale, 9 * scale);
       context.fillStyle = style.getPropertyValue("--text");
-      context.fillText(isMany ? `${label} (${titleOf(this.axes.of(label))})` : label, 38 * scale, y);
+      context.fillText(isMany ? `${title} (${titleOf(this.axes.of(label))})` : title, 38 * scale, y);
     });
     canvas.toBlob((blob) => download("plot.png", blob));
   }
+}
+
+/** Return what a file calls a series: its path, and what was computed of it. */
+function titleWithKind({ label, kind }) {
+  return kind ? `${label} ${kind}` : label;
 }

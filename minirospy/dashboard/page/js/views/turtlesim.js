@@ -20,9 +20,9 @@ export class Turtlesim {
     this.space = words.get("space"); // "" or the namespace of the simulator
     this.turtles = new Map();
     this.background = USUAL_BACKGROUND;
-    this.paper = h("canvas", { class: "paper", width: PIXELS, height: PIXELS, "aria-label": "The turtles' paper" });
+    this.paper = h("canvas", { class: "paper", width: PIXELS, height: PIXELS, "aria-hidden": "true" });
     this.context = this.paper.getContext("2d", { willReadFrequently: true });
-    this.animals = svg("svg", { class: "animals", viewBox: `0 0 ${PIXELS} ${PIXELS}`, onclick: (event) => this.aim(event) });
+    this.animals = svg("svg", { class: "animals", role: "img", "aria-label": "The turtles' paper", viewBox: `0 0 ${PIXELS} ${PIXELS}`, onclick: (event) => this.aim(event) });
     this.empty = h("p", { class: "empty" });
     this.choice = h("select", { "aria-label": "Simulator", hidden: true, onchange: () => this.choose(this.choice.value) });
     this.problem = h("p", { class: "error", role: "alert" });
