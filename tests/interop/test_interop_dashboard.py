@@ -1087,7 +1087,10 @@ def test_csv_and_png_of_a_plot_are_saved(
     page.choose(".series[data-label='/odometry/x'] select", "derivative")
     page.evaluate(
         """{ window.drawn = []; const draw = CanvasRenderingContext2D.prototype.fillText;
-        CanvasRenderingContext2D.prototype.fillText = function (text, ...at) { drawn.push(text); draw.call(this, text, ...at); }; }"""
+        CanvasRenderingContext2D.prototype.fillText = function (text, ...at) {
+          drawn.push(text);
+          draw.call(this, text, ...at);
+        }; }"""
     )
     png = saved(page, tmp_path, "plot.png", "PNG")
     assert page.evaluate("drawn.slice(-2)") == ["/odometry/x derivative", "/odometry/y"]
