@@ -37,7 +37,8 @@ MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 async def robots(endpoint, first, count):
     """Be so many robots, until the standard input ends."""
     # A thread of Zenoh waits 10 s when it closes a dead link. Of a robot that is one: here each has a thread, too.
-    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {count}))")
+    pools = ", ".join(f"{pool}: (worker_threads: {count})" for pool in ("rx", "tx", "net", "acc", "app"))
+    os.environ.setdefault("ZENOH_RUNTIME", f"({pools})")
     from minirospy.bridge.fleet.keys import (
         ROOT,
         Claim,

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int64, String
 
 from minirospy.bridge.fleet.gateway import Gateway
+from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inquiry import fleet_status
 from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, in_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
@@ -168,6 +170,65 @@ def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> N
         proxy.mend()
         # The subscriber gets the latched message again, as from a publisher that was started again.
         fleet.until(lambda: len(found) == 2)
+    finally:
+        fleet.run(proxy.close())
+
+
+async def _answers(importer: Importer) -> bool:
+    return set(await importer._answering()) >= importer.contents.gateways
+
+
+def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
+    fleet: Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from std_srvs.srv import Trigger
+
+    for name in ("presence._REGULAR_SECONDS", "presence._LOST_SECONDS", "presence._ROUND_SECONDS"):
+        monkeypatch.setattr(f"minirospy.bridge.fleet.{name}", 0.2)
+    monkeypatch.setattr("minirospy.bridge.fleet.importer._PING_SECONDS", 1.0)
+    slow = tmp_path / "slow.json5"
+    slow.write_text("{ transport: { link: { tx: { lease: 600000 } } } }")
+    robot, control = fleet.place(), fleet.place()
+    called = asyncio.Event()
+
+    async def never(_: object) -> None:
+        called.set()
+        await asyncio.sleep(3600)
+
+    node = robot.node("slow")
+
+    async def serving() -> None:
+        await node.serve("/slow", Trigger, never)
+
+    fleet.run(serving())
+    network = NetworkOptions(listen=(fleet.endpoint,), config=str(slow))
+    importer = gateway_of(control, "", network).importer
+    assert importer is not None
+    proxy = Proxy(fleet, fleet.endpoint)
+    try:
+        gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=str(slow)))
+        client = control.node("client")
+        fleet.run(client.wait_for_service("/robot1/slow", SECONDS))
+        fleet.until(lambda: importer._presence._answered)
+        # All are queried under one key, and each answers under its own.
+        fleet.until(partial(_answers, importer))
+
+        async def call() -> str:
+            calling = asyncio.ensure_future(client.call("/robot1/slow", Trigger))
+            await called.wait()
+            proxy._open.clear()
+            try:
+                await calling
+            except ServiceException as error:
+                return str(error)
+            return ""
+
+        assert "robot [robot1] has left during the call" in fleet.run(call())
+        fleet.until(lambda: not importer.robots)
+        assert importer.contents.robots()
+        proxy.mend()
+        fleet.until(lambda: importer.robots)
+        fleet.run(client.wait_for_service("/robot1/slow", SECONDS))
     finally:
         fleet.run(proxy.close())
 

@@ -171,7 +171,7 @@ def test_robot_that_cannot_be_shown_keeps_no_other_away(
             shown.append(robot.robot.claim.name)
 
         made._update = update  # type: ignore[method-assign]
-        made.contents.robots = lambda: robots  # type: ignore[method-assign]
+        made.contents.robots = lambda _lost: robots  # type: ignore[method-assign]
         await made._reconcile()
         assert shown == ["b"]
         # It is tried again without a new token.

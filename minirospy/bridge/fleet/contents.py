@@ -6,7 +6,7 @@ Tokens come and go one by one and in any order, those of a robot before its clai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -116,11 +116,16 @@ class FleetContents:
             del self._gateways[at]
         return True
 
-    def robots(self) -> dict[str, Robot]:
-        """Return the robots by name, each as the gateway that counts announces it."""
+    @property
+    def gateways(self) -> set[str]:
+        """The gateways that have tokens."""
+        return {gateway for _, gateway in self._gateways}
+
+    def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
+        """Return the robots by name, each as the gateway that counts announces it; those that are ``lost`` do not count."""
         claims: dict[str, list[Claim]] = {}
         for gateway in self._gateways.values():
-            if gateway.claim:
+            if gateway.claim and gateway.claim.gateway not in lost:
                 claims.setdefault(gateway.claim.name, []).append(gateway.claim)
         found = {}
         for name, named in sorted(claims.items()):

@@ -13,8 +13,9 @@ from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
 from minirospy.bridge.fleet.contents import FleetContents, Robot
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.imported_topic import ImportedTopic, Shared
-from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key
+from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.bridge.fleet.presence import Presence
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
@@ -39,6 +40,8 @@ _PINGS = 5
 _PING_SECONDS = 5.0
 _CALL_SECONDS = 3600.0
 _WARN_OFFSET = 100_000_000
+_AT_ONCE = 20
+"""Robots that are removed at a time."""
 _MOST_IMPORTED = 9_000
 """Names that the importer registers: a master keeps 10,000 for a node."""
 
@@ -53,6 +56,7 @@ class ImportedRobot:
         self.services: dict[str, tuple[ServiceToken, RawService]] = {}
         self.clock: ClockOffset | None = None
         self.measured = 0.0
+        self.left = asyncio.Event()
 
 
 class Importer:
@@ -86,7 +90,10 @@ class Importer:
         self._left_out = RateLimitedLogger(_log)
         self._is_closed = False
         self._faults = Faults(_log, "showing the fleet's robots")
-        self._watching: asyncio.Task[None] | None = None
+        self._presence = Presence(
+            self._answering, lambda: self.contents.gateways, lambda: self._soon(_SETTLE_SECONDS)
+        )
+        self._watching: list[asyncio.Task[None]] = []
         self._declared: list[Later] = []
 
     @property
@@ -100,17 +107,20 @@ class Importer:
             self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
             for kind in ("robot", "topic", "service")
         ]
-        self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
+        self._watching = [
+            asyncio.ensure_future(keep_running(watch, self._faults))
+            for watch in (self._watch, self._presence.watch)
+        ]
 
     async def close(self) -> None:
         """Remove all robots. Idempotent."""
         self._is_closed = True
         if self._reconciling:
             self._reconciling.cancel()
-        watching, self._watching = self._watching, None
-        if watching:
-            watching.cancel()
-            await asyncio.gather(watching, return_exceptions=True)
+        watching, self._watching = self._watching, []
+        for task in watching:
+            task.cancel()
+        await asyncio.gather(*watching, return_exceptions=True)
         for declared in self._declared:
             declared.undeclare()
         self._declared = []
@@ -124,6 +134,8 @@ class Importer:
             self._left_out.warning("what a gateway announces is not shown: %s", self.contents.refusal)
         if changed:
             self._soon(_SETTLE_SECONDS)
+            if not is_there and parse_claim(key):
+                self._presence.check_soon()
 
     def _soon(self, seconds: float) -> None:
         if self._reconciling is None and not self._is_closed:
@@ -140,7 +152,7 @@ class Importer:
         self._reconciling = None
         started = time.monotonic()
         try:
-            await self._show(self.contents.robots())
+            await self._show(self.contents.robots(self._presence.lost))
         finally:
             self._is_reconciling = False
         if time.monotonic() - started > _SETTLE_SECONDS and self._reconciling is not None:
@@ -150,14 +162,18 @@ class Importer:
             self._soon(2 * (time.monotonic() - started))
 
     async def _show(self, robots: dict[str, Robot]) -> None:
+        gone = []
         for name, shown in list(self.robots.items()):
             robot = robots.get(name)
             if robot is None or robot.claim != shown.robot.claim:
-                del self.robots[name]
+                gone.append(self.robots.pop(name))
                 _log.info("robot [%s] has left", name)
-                try:
-                    await self._remove(shown)
-                except Exception as error:  # noqa: BLE001 - of one robot: the others are removed
+        for first in range(0, len(gone), _AT_ONCE):
+            # One of them that fails does not keep the others.
+            for error in await asyncio.gather(
+                *map(self._remove, gone[first : first + _AT_ONCE]), return_exceptions=True
+            ):
+                if isinstance(error, Exception):
                     self._faults.report(error)
         for name, robot in robots.items():
             known = self.robots.get(name)
@@ -199,7 +215,7 @@ class Importer:
         for service, service_token in robot.services.items():
             name = f"/{robot.claim.name}{service}"
             if service not in shown.services and self._rules.services(name) and self._has_room():
-                shown.services[service] = service_token, self._serve(name, service_token)
+                shown.services[service] = service_token, self._serve(name, service_token, shown.left)
 
     def _has_room(self) -> bool:
         count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
@@ -214,19 +230,29 @@ class Importer:
         return False
 
     async def _remove(self, shown: ImportedRobot) -> None:
+        shown.left.set()
         await asyncio.gather(
             *(topic.close() for topic in shown.topics.values()),
             *(offered.close() for _, offered in shown.services.values()),
         )
 
-    def _serve(self, name: str, token: ServiceToken) -> RawService:
+    def _serve(self, name: str, token: ServiceToken, left: asyncio.Event) -> RawService:
         key = call_key(token.robot, token.gateway, token.service, token.md5sum)
 
         async def call(request: bytes, _: Header) -> bytes:
+            answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
+            leaving = asyncio.ensure_future(left.wait())
             try:
-                return await self._network.query(key, request, seconds=_CALL_SECONDS)
+                # Zenoh ends a query with the token of the robot, which may stay for minutes.
+                await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
+                if not answering.done():
+                    raise ServiceException(f"robot [{token.robot}] has left during the call")
+                return answering.result()
             except QueryFailed as error:
                 raise ServiceException(f"robot [{token.robot}]: {error}") from error
+            finally:
+                answering.cancel()
+                leaving.cancel()
 
         return RawService(self._node, name, InterfaceType(token.type, token.md5sum), call)
 
@@ -257,6 +283,16 @@ class Importer:
             for topic in list(shown.topics.values()):
                 topic.look(snapshot)
 
+    async def _answering(self) -> list[str]:
+        """Query all gateways of the fleet; return those that answer."""
+        start = f"{ROOT}/ping/"
+        try:
+            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS)
+        except QueryFailed as error:
+            _log.debug("the fleet cannot be queried: %s", error)
+            return list(self.contents.gateways)
+        return [key.removeprefix(start) for key in answers]
+
     async def _measure(self, shown: ImportedRobot) -> None:
         key = f"{ROOT}/ping/{shown.robot.claim.gateway}"
         pings = []
@@ -268,6 +304,8 @@ class Importer:
                     pings.append(Ping(sent, int.from_bytes(answer, "little", signed=True), self._clock()))
         except QueryFailed as error:
             _log.debug("%s does not answer: %s", shown.robot.claim.name, error)
+        if pings:
+            self._presence.answered(shown.robot.claim.gateway)
         before, found = shown.clock, offset_of(pings)
         shown.clock = found or before
         if found and abs(found.offset) > _WARN_OFFSET + found.round_trip and before is None:

@@ -255,9 +255,11 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
+        # A query of many keys gets the answers of each under its own.
+        key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
-            self._soon(self._start_answer, query, handler, share)
+            self._soon(self._start_answer, query, handler, share, key)
 
         return self._declare(
             lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True, **options)
@@ -338,15 +340,19 @@ class FleetNetwork:
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
-        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        task = asyncio.ensure_future(self._answer(query, handler, share))
+        task = asyncio.ensure_future(self._answer(query, handler, share, key))
         for tasks in (self._answering, share.tasks):
             tasks.add(task)
             task.add_done_callback(tasks.discard)
 
     async def _answer(
-        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share
+        self,
+        query: Query,
+        handler: Callable[[str, bytes], Awaitable[bytes]],
+        share: _Share,
+        own_key: str = "",
     ) -> None:
         key, payload = str(query.key_expr), query.payload
         reply: Callable[[], object] | None = None
@@ -356,7 +362,7 @@ class FleetNetwork:
             if payload is not None and len(payload) > MOST_TEXT:
                 raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
             body = await handler(key, payload.to_bytes() if payload is not None else b"")
-            reply = functools.partial(query.reply, query.key_expr, body)
+            reply = functools.partial(query.reply, own_key or query.key_expr, body)
         except MinirospyError as error:
             reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
         except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here

@@ -1,0 +1,79 @@
+"""Which gateways are there, whatever Zenoh's tokens say: tokens of robots that are lost together may stay for minutes.
+
+All gateways are queried at once, regularly, and a moment after a robot has left. One that has answered before, and does not
+twice, is lost until it answers again. One that has never answered, as where its access rights forbid it, is left alone.
+All on the node's loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Collection
+
+__all__ = ["Presence"]
+
+_REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
+"""From one check to the next; the second while a gateway is lost, which may be there again."""
+_SETTLE_SECONDS = 2.0
+"""Robots that are lost together leave one by one."""
+_ROUNDS, _ROUND_SECONDS = 2, 5.0
+
+
+class Presence:
+    """Knows the gateways that do not answer."""
+
+    def __init__(
+        self,
+        query: Callable[[], Awaitable[Collection[str]]],
+        gateways: Callable[[], Collection[str]],
+        changed: Callable[[], object],
+    ) -> None:
+        """``query`` all; it returns those that answered in time. ``gateways``: those that have tokens.
+
+        ``changed`` is called when one is lost, or there again.
+        """
+        self.lost: frozenset[str] = frozenset()
+        self._query = query
+        self._gateways = gateways
+        self._changed = changed
+        self._answered: set[str] = set()
+        self._soon = asyncio.Event()
+
+    def answered(self, gateway: str) -> None:
+        """Record that a gateway has answered."""
+        self._answered.add(gateway)
+
+    def check_soon(self) -> None:
+        """Check all a moment later: a robot has left."""
+        self._soon.set()
+
+    async def watch(self) -> None:
+        """Check again and again."""
+        while True:
+            pause = _LOST_SECONDS if self.lost else _REGULAR_SECONDS
+            waiting = asyncio.ensure_future(self._soon.wait())
+            try:
+                await asyncio.wait([waiting], timeout=pause)
+            finally:
+                waiting.cancel()
+            if self._soon.is_set():
+                await asyncio.sleep(_SETTLE_SECONDS)
+                self._soon.clear()
+            await self._check()
+
+    async def _check(self) -> None:
+        present = set(self._gateways())
+        self._answered &= present
+        missing = set(self._answered)
+        for number in range(_ROUNDS if present else 0):
+            if number:
+                await asyncio.sleep(_ROUND_SECONDS)
+            answers = set(await self._query())
+            self._answered |= answers & present
+            missing -= answers
+            if missing <= self.lost:
+                break
+        lost = frozenset(missing)
+        if lost != self.lost:
+            self.lost = lost
+            self._changed()
