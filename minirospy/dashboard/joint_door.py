@@ -160,25 +160,31 @@ class JointDoor(JsonDoor["JointSession"]):
         if values == self._values and self.generation and not is_forced:
             return
 
-        self._values = values
-        self.generation += 1
-        self.warnings = []
+        warnings: list[str] = []
         zeros = [values.get(key, {}) for key in ("~zeros", "zeros")]
+        parameters: JointParameters | None = None
+        joints: JointStates | None = None
+        robot, kinds, missing_because = self.robot, self.kinds, ""
         try:
-            self.parameters = read_parameters(
+            parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
             # A large description takes seconds.
             loop = asyncio.get_running_loop()
-            found = await loop.run_in_executor(None, _described, self.parameters, self.warnings.append)
-            self.joints, self.robot, self.kinds = found
-            self.why = ""
+            joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
         except (JointError, UrdfError) as error:
-            self.joints = self.parameters = None
-            self.why = str(error)
-        for topic in self.parameters.sources if self.parameters else []:
-            if why := why_illegal(topic):
-                self.warnings.append(f"The source_list parameter has [{topic[:200]}]: {why}")
+            parameters = None
+            missing_because = str(error)
+        warnings += [
+            f"The source_list parameter has [{topic[:200]}]: {why}"
+            for topic in (parameters.sources if parameters else [])
+            if (why := why_illegal(topic))
+        ]
+
+        # Clients are sent each generation once: it is complete before it is counted.
+        self._values, self.parameters, self.joints = values, parameters, joints
+        self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
+        self.generation += 1
         self._follow(self._legal_sources())
         self.changed()
 

@@ -123,6 +123,27 @@ def test_description_is_read_beside_the_loop(
     assert served.run(loops()) not in threads
 
 
+def test_description_that_is_read_slowly_is_sent_complete(
+    serve: Callable[..., Served], client: Callable[..., Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_reading, may_end = threading.Event(), threading.Event()
+
+    def read(*args: Any) -> Any:
+        is_reading.set()
+        assert may_end.wait(60)
+        return read_joints(*args)
+
+    monkeypatch.setattr("minirospy.dashboard.joint_door.read_joints", read)
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    page = client(served)
+    assert is_reading.wait(60)
+    page.send("publish", on=True)
+    page.next("state", lambda state: state["publishing"])
+    may_end.set()
+    assert page.next("joints")["robot"] == "crane"
+
+
 def test_positions_are_published_only_where_wanted(
     serve: Callable[..., Served], client: Callable[..., Client]
 ) -> None:
