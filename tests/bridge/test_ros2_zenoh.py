@@ -500,9 +500,9 @@ def test_a_library_of_another_protocol_is_refused(
 ) -> None:
     monkeypatch.setattr(importlib.metadata, "version", lambda _: version)
     assert main(["--zenoh"]) == 1
+    command = install_command("minirospy[fleet]", upgrade=True)
     assert (
-        f"eclipse-zenoh of version 1.5 or newer below 2, not {version}: python -m pip"
-        in capsys.readouterr().err
+        f"eclipse-zenoh of version 1.5 or newer below 2, not {version}: {command}" in capsys.readouterr().err
     )
 
 

@@ -56,6 +56,6 @@ def test_of_the_distribution(command: Command, monkeypatch: pytest.MonkeyPatch) 
 def test_what_cannot_be_told(command: Command) -> None:
     status, out, err = command("rosversion", "mi")
     assert (status, out) == (1, "Cannot locate [mi]\n")
-    assert err.startswith("rosversion: ERROR: package [mi] not found; did you mean my?")
+    assert err.startswith("rosversion: ERROR: package [mi] not found: ROS_PACKAGE_PATH names")
     assert command("rosversion").status == 2
     assert command("rosversion", "-d", "my").status == 2
