@@ -14,7 +14,7 @@ CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
   tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
   tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
 
-.PHONY: demo check test interop ros2 windows pythons lint guard bench fuzz mutants site release clean help
+.PHONY: demo check test interop ros2 ros2-core windows pythons lint guard bench fuzz mutants site release clean help
 
 help:
 	@echo "make demo     show the workshop's button and LED on the virtual board"
@@ -61,6 +61,11 @@ windows: $(STAMP)
 
 pythons: $(STAMP)
 	@$(BIN)/python tools/pythons.py $(PYTHONS) -- $(CHECKED)
+
+# Without the peers over Zenoh, whose installation takes minutes.
+ros2-core: $(STAMP)
+	@$(BIN)/python -m tests.interop.install_ros2
+	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py
 
 ros2: $(STAMP)
 	@$(BIN)/python -m tests.interop.install_ros2
