@@ -283,3 +283,32 @@ def test_button_sets_a_topic_that_is_only_subscribed_by_the_type_of_its_subscrib
     )
     page.click("button.push-button:not([disabled])", "Turn")
     assert served.run(heard.next(PATIENCE)).angular.z == 2.0
+
+
+@needs_chromium
+def test_switch_that_is_pressed_twice_does_not_show_what_comes_back_of_the_first(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    lamp = listen(served, "/lamp", Bool)
+    served.run(publisher(served, "/lamp", Bool, latch=True).publish(True))
+    switch = {"kind": "switch", "path": "/lamp/data", "type": "std_msgs/Bool"}
+    page = browse(address(served, panels(switch, {"kind": "lamp", "path": "/lamp/data"})))
+    page.wait_text("#state", "connected")
+    page.wait(
+        "return document.querySelector('.bulb.lit') && document.querySelector('.toggle[aria-checked=true]')"
+    )
+    page.evaluate(
+        """(() => {
+            const toggle = document.querySelector("button.toggle"), bulb = document.querySelector(".bulb");
+            const note = () => window.shown.push(toggle.getAttribute("aria-checked"));
+            window.shown = [];
+            new MutationObserver(note).observe(toggle, { attributes: true });
+            for (let count = 0; count < 3; count++) { toggle.click(); note(); }
+            const look = () => { window.isBack = !bulb.classList.contains("lit"); };
+            new MutationObserver(look).observe(bulb, { attributes: true });
+        })()"""
+    )
+    lamp(lambda message: not message.data)
+    page.wait("return window.isBack")
+    assert "true" not in page.evaluate("window.shown.slice(3).join()")

@@ -302,9 +302,21 @@ class Panel {
       const button = h("button", { type: "button", class: "toggle", role: "switch", "aria-checked": "false", "aria-label": this.title,
         onclick: () => {
           const isOn = button.getAttribute("aria-checked") !== "true";
-          if (this.send(isOn ? spec.on : spec.off)) button.setAttribute("aria-checked", String(isOn));
+          if (!this.send(isOn ? spec.on : spec.off)) return;
+          button.setAttribute("aria-checked", String(isOn));
+          // Its own earlier values are still to come back: what comes last within this time is shown then.
+          last = isOn;
+          clearTimeout(this.timer);
+          this.timer = setTimeout(() => {
+            this.timer = null;
+            button.setAttribute("aria-checked", String(last));
+          }, 1000);
         } });
-      this.show = (value) => button.setAttribute("aria-checked", String(!isSame(value, spec.off)));
+      let last = false;
+      this.show = (value) => {
+        last = !isSame(value, spec.off);
+        if (!this.timer) button.setAttribute("aria-checked", String(last));
+      };
       return button;
     }
     if (spec.kind === "slider") return this.slider();
