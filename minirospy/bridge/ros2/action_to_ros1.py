@@ -135,7 +135,7 @@ class GoalsToRos1:
         self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
     ) -> None:
         if self._is_closed:
-            accepted.set_exception(BridgeError("it is no longer bridged"))
+            accepted.set_exception(BridgeError("it is not bridged any more"))
             return
         # Those that are being accepted, and those that run.
         if len(self._tasks) + len(self._goals) >= MOST_GOALS:
