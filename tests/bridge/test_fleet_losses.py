@@ -178,6 +178,25 @@ async def _answers(importer: Importer) -> bool:
     return set(await importer._answering()) >= importer.contents.gateways
 
 
+def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
+    """Serve /slow (std_srvs/Trigger) on a robot without a response; return the event of its first call."""
+    from std_srvs.srv import Trigger
+
+    called = asyncio.Event()
+
+    async def never(_: object) -> None:
+        called.set()
+        await asyncio.Event().wait()
+
+    node = robot.node("slow")
+
+    async def serving() -> None:
+        await node.serve("/slow", Trigger, never)
+
+    fleet.run(serving())
+    return called
+
+
 def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     fleet: Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,18 +208,7 @@ def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     slow = tmp_path / "slow.json5"
     slow.write_text("{ transport: { link: { tx: { lease: 600000 } } } }")
     robot, control = fleet.place(), fleet.place()
-    called = asyncio.Event()
-
-    async def never(_: object) -> None:
-        called.set()
-        await asyncio.sleep(3600)
-
-    node = robot.node("slow")
-
-    async def serving() -> None:
-        await node.serve("/slow", Trigger, never)
-
-    fleet.run(serving())
+    called = serve_never(fleet, robot)
     network = NetworkOptions(listen=(fleet.endpoint,), config=str(slow))
     importer = gateway_of(control, "", network).importer
     assert importer is not None
@@ -237,18 +245,7 @@ def test_a_call_ends_when_the_robot_is_lost(fleet: Fleet, quick: str) -> None:
     from std_srvs.srv import Trigger
 
     robot, control = fleet.place(), fleet.place()
-    called = asyncio.Event()
-
-    async def never(_: object) -> None:
-        called.set()
-        await asyncio.sleep(3600)
-
-    node = robot.node("slow")
-
-    async def serving() -> None:
-        await node.serve("/slow", Trigger, never)
-
-    fleet.run(serving())
+    called = serve_never(fleet, robot)
     gateway_of(control, "", NetworkOptions(listen=(fleet.endpoint,), config=quick))
     gateway = gateway_of(robot, "robot1", NetworkOptions(connect=(fleet.endpoint,), config=quick))
     client = control.node("client")
