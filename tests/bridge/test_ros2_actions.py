@@ -323,7 +323,7 @@ def test_the_loop_goes_on_while_an_action_leaves_ros2() -> None:
         there.may_close.clear()
         looking = asyncio.ensure_future(bridge.look())
         await until(lambda: there.closing)
-        with pytest.raises(BridgeError, match="no longer bridged"):
+        with pytest.raises(BridgeError, match="not bridged any more"):
             await asyncio.wrap_future(there.accept(cdr()[:4] + bytes(4), lambda _: None))
         there.may_close.set()
         assert await looking
