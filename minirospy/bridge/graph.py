@@ -16,8 +16,9 @@ from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
+from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.bridge.types import ServiceTypes, TypeTexts
+from minirospy.bridge.types import ServiceInfo, TypeTexts, described
 from minirospy.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch
@@ -33,8 +34,7 @@ FASTEST_LOOK = 0.25
 """Seconds from one look at the graph to the next while it changes."""
 
 _QUEUE = 100
-_PROBES = 8
-_PROBE_SECONDS = 2.0
+_QUERY_SECONDS = 2.0
 """After this the graph is reported without the types of services that are still looked up."""
 
 
@@ -196,7 +196,6 @@ class SharedGraph:
         self.snapshot = Snapshot()
         self.topics: dict[str, SharedTopic] = {}
         self.texts = TypeTexts(node)
-        self.service_types = ServiceTypes()
         self._is_first_look = True
         self._slowest_look = max(slowest_look, FASTEST_LOOK)
         self._listeners: list[GraphListener] = []
@@ -205,7 +204,10 @@ class SharedGraph:
         self._faults = Faults(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
-        self._probing = asyncio.Semaphore(_PROBES)
+        self._has_new_types = False
+        self._service_types = NodeQueries(
+            self._service_type, Faults(_log, "the query for a service's type"), arrived_late=self.look_soon
+        )
 
     def now(self) -> int:
         """Return the time of messages in nanoseconds: the node's, unless ``clock`` gives another."""
@@ -221,6 +223,7 @@ class SharedGraph:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        await self._service_types.close()
         await self.texts.close()
 
     # --- the graph
@@ -254,7 +257,7 @@ class SharedGraph:
         before, self.snapshot = self.snapshot, after
         changes = compare(before, after)
         is_first, self._is_first_look = self._is_first_look, False
-        has_types, self.service_types.has_news = self.service_types.has_news, False
+        has_types, self._has_new_types = self._has_new_types, False
         if changes or is_first or has_types or before.types != after.types:
             for listener in tuple(self._listeners):
                 try:
@@ -286,37 +289,19 @@ class SharedGraph:
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._look_soon.wait(), pause)
 
+    def service_info(self, service: str) -> ServiceInfo | None:
+        """Return a service's type; None where it is not known, or not installed here."""
+        return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
+
     async def _look_up_services(self, found: Snapshot) -> None:
         """Find the types of new services, which the master does not know: their nodes do."""
-        is_late = False
+        wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
+        await self._service_types.look(wanted, _QUERY_SECONDS)
 
-        async def probe(name: str, nodes: tuple[str, ...]) -> None:
-            async with self._probing:
-                try:
-                    header = await service_header(self.node, name)
-                except ServiceException as error:
-                    _log.debug("service %s: %s", name, error)
-                    self.service_types.failed(name, nodes)
-                except Exception as error:  # noqa: BLE001 - of one service: the others are looked up
-                    self._faults.report(error)
-                    self.service_types.failed(name, nodes)
-                else:
-                    self.service_types.found(name, nodes, header)
-                    if is_late:
-                        self.look_soon()
-
-        new = [
-            (name, nodes)
-            for name, nodes in found.services.items()
-            if self.filters.services(name) and self.service_types.needs_look(name, nodes)
-        ]
-        self.service_types.keep(found.services)
-        if new:
-            for name, nodes in new:
-                self.service_types.started(name, nodes)
-            # Nodes that do not answer keep nobody from what else has changed.
-            await asyncio.wait([self.spawn(probe(*each)) for each in new], timeout=_PROBE_SECONDS)
-            is_late = True
+    async def _service_type(self, key: tuple[str, tuple[str, ...]]) -> ServiceInfo:
+        found = described(key[0], await service_header(self.node, key[0]))
+        self._has_new_types = True
+        return found
 
     # --- topics
 

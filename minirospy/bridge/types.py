@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from minirospy.errors import MinirospyError, RpcError, WireError
+from minirospy.errors import MinirospyError, NotFoundError, RpcError, WireError
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.wire.header import Header
@@ -19,14 +17,12 @@ from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscribe
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
 
-__all__ = ["ServiceInfo", "ServiceTypes", "TypeTexts", "installed_type", "type_of_text"]
+__all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 _MOST_NAMES = 2_000
 """Types that are remembered, also those that are not installed: a peer may name any number."""
 _AT_ONCE = 32
 """Publishers that are queried at a time."""
-_AGAIN_SECONDS = 10.0
-"""After this a service that did not answer is tried again."""
 
 
 def installed_type(name: str) -> InterfaceType | None:
@@ -136,53 +132,17 @@ class ServiceInfo:
     response: InterfaceType
 
 
-class ServiceTypes:
-    """The types of services, found once for each service and its providers."""
-
-    def __init__(self) -> None:
-        self.has_news = False
-        """Whether types were found since this was set to False."""
-        self._known: dict[str, tuple[tuple[str, ...], ServiceInfo | None, float]] = {}
-
-    def __getitem__(self, name: str) -> ServiceInfo | None:
-        """Return a service's type; None where it is not known, or not installed here."""
-        known = self._known.get(name)
-        return known[1] if known else None
-
-    def needs_look(self, name: str, nodes: tuple[str, ...]) -> bool:
-        """Return whether a service is new, has moved to another node, or did not answer a while ago."""
-        known = self._known.get(name)
-        return known is None or known[0] != nodes or (known[1] is None and time.monotonic() >= known[2])
-
-    def started(self, name: str, nodes: tuple[str, ...]) -> None:
-        """Record that a service's node is being queried: until it has answered, or failed to, it is not queried again."""
-        self._known[name] = (nodes, None, math.inf)
-
-    def found(self, name: str, nodes: tuple[str, ...], header: Mapping[str, str]) -> None:
-        """Record the type that a service's node has named."""
-        self.has_news = True
-        self._known[name] = (nodes, _described(name, header), time.monotonic() + _AGAIN_SECONDS)
-
-    def failed(self, name: str, nodes: tuple[str, ...]) -> None:
-        """Record that a service did not answer."""
-        self._known[name] = (nodes, None, time.monotonic() + _AGAIN_SECONDS)
-
-    def keep(self, names: Mapping[str, object]) -> None:
-        """Forget the services that are no more."""
-        for name in [name for name in self._known if name not in names]:
-            del self._known[name]
-
-
-def _described(name: str, header: Mapping[str, str]) -> ServiceInfo | None:
+def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
+    """Return the type that a service's connection header names. Raise NotFoundError where it is not installed here."""
     from minirospy.idl.load import get_service_class
 
     type_ = header.get("type", "")
     try:
         found = get_service_class(type_)
-    except (MinirospyError, ImportError, SyntaxError):
-        return None
+    except (ImportError, SyntaxError) as error:
+        raise NotFoundError("service type", type_) from error
     if found is None or header.get("md5sum") not in (ANY, found._md5sum):
-        return None
+        raise NotFoundError("service type", type_)
     return ServiceInfo(
         name,
         type_,

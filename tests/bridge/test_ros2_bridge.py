@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 import sys
 import threading
@@ -549,6 +550,23 @@ def test_what_came_from_ros2_is_not_sent_back() -> None:
             there = side.publishers["/t"]
             await there.arrived.wait()
             assert [each[4:] for each in there.sent] == [b"\2"]
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
+def test_publishers_that_do_not_answer_keep_no_topic_waiting() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        topics = [f"/dead{number}" for number in range(40)]
+        with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
+            uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+            async with Node("dead", rosout=False) as dead:
+                for topic in topics:
+                    await dead._node.master("registerPublisher", topic, "std_msgs/String", uri)
+            await node.advertise("/live", raw("std_msgs/String"))
+            side.graph = {topic: Ros2Topic(subscribers=(STRING,)) for topic in [*topics, "/live"]}
+            await asyncio.wait_for(bridge.look(), 30.0)
+            assert side.publishers.keys() == {*topics, "/live"}
 
     bridged(scene)
 

@@ -13,10 +13,7 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 
-from minirospy.bridge import graph as bridge_graph
-from minirospy.bridge import types as bridge_types
 from minirospy.bridge.graph import SharedGraph
-from minirospy.introspect.snapshot import Snapshot
 from minirospy.wire.header import serialize_header
 from minirospy.wire.tcpros import InterfaceType
 
@@ -92,34 +89,6 @@ def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
         assert "/late" not in client.services
         may_answer.set()
         assert client.service("/late")
-
-
-def test_service_is_looked_up_once_at_a_time(bridge: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bridge_graph, "_PROBE_SECONDS", 0.0)
-    monkeypatch.setattr(bridge_types, "_AGAIN_SECONDS", 0.0)
-    probed: list[str] = []
-    may_answer = asyncio.Event()
-
-    async def header_of(_: object, name: str) -> dict[str, str]:
-        probed.append(name)
-        await may_answer.wait()
-        return {}
-
-    async def look_up() -> None:
-        graph = SharedGraph(bridge.bridge.node)
-        for _ in range(5):
-            await graph._look_up_services(Snapshot(services={"/silent": ("/node",)}))
-            await asyncio.sleep(0)
-        assert probed == ["/silent"]
-        may_answer.set()
-        await asyncio.gather(*graph._tasks)
-        await graph._look_up_services(Snapshot(services={"/silent": ("/node",)}))
-        await asyncio.gather(*graph._tasks)
-        assert probed == ["/silent", "/silent"]
-        await graph.close()
-
-    monkeypatch.setattr(bridge_graph, "service_header", header_of)
-    bridge.run(look_up())
 
 
 @pytest.mark.parametrize("turns", range(6))

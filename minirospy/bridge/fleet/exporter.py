@@ -100,6 +100,7 @@ class Exporter:
         if watching:
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
+        await self.graph.close()
         for declared in [*self._declared, *self._tokens.values()]:
             declared.undeclare()
         self._declared, self._tokens = [], {}

@@ -6,13 +6,15 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Collection
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import service_header
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken, TopicToken, is_md5
 from minirospy.bridge.fleet.rules import Export, GatewayRules, exported_services, exported_topics
-from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ServiceException
+from minirospy.bridge.node_queries import NodeQueries
+from minirospy.bridge.tasks import Faults
+from minirospy.errors import MasterUnreachableError, RpcError, WireError
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.header import Header
 
@@ -23,10 +25,8 @@ __all__ = ["RobotGraph"]
 
 _log = logging.getLogger(__name__)
 _FASTEST_LOOK, _SLOWEST_LOOK = 0.25, 2.0
-_PROBE_SECONDS, _AGAIN_SECONDS = 3.0, 10.0
-_PROBES = 8
-
-_Key = TypeVar("_Key", bound=tuple[str, object])
+_QUERY_SECONDS = 3.0
+"""After this the graph is announced without what is still queried for."""
 
 
 class RobotGraph:
@@ -53,10 +53,14 @@ class RobotGraph:
         self._rules = rules
         self._hidden = hidden
         self._gateways = gateways
-        self._headers: dict[tuple[str, str], Header] = {}
-        self._service_types: dict[tuple[str, tuple[str, ...]], tuple[str, str]] = {}
-        self._not_before: dict[tuple[str, object], float] = {}
-        self._probing = asyncio.Semaphore(_PROBES)
+        faults = Faults(_log, "a query for a type")
+        self._publishers = NodeQueries(self._publisher, faults)
+        self._services = NodeQueries(self._service, faults)
+
+    async def close(self) -> None:
+        """End the queries. Idempotent."""
+        await self._publishers.close()
+        await self._services.close()
 
     async def look(self) -> bool:
         """Read the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
@@ -67,8 +71,11 @@ class RobotGraph:
         self.service_names = {name for name, nodes in snapshot.services.items() if set(nodes) - own}
         exports = exported_topics(snapshot, own, self._rules.topics, hidden)
         services = exported_services(snapshot, own, self._rules.services, hidden)
-        await self._look_at_publishers(exports)
-        await self._look_at_services(services)
+        present = {(each.topic, node): None for each in exports.values() for node in each.publishers}
+        await asyncio.gather(
+            self._publishers.look(present, _QUERY_SECONDS),
+            self._services.look(services.items(), _QUERY_SECONDS),
+        )
 
         topics = {}
         for export in exports.values():
@@ -76,9 +83,8 @@ class RobotGraph:
             if token:
                 topics[export.topic] = token
         found = {
-            name: ServiceToken(self._claim.name, self._claim.gateway, name, *self._service_types[name, nodes])
-            for name, nodes in services.items()
-            if (name, nodes) in self._service_types
+            name: ServiceToken(self._claim.name, self._claim.gateway, name, *type_)
+            for (name, _), type_ in self._services.found.items()
         }
         changed = topics != self.topics or found != self.services
         self.topics, self.services = topics, found
@@ -107,7 +113,7 @@ class RobotGraph:
         headers = [
             header
             for publisher in export.publishers
-            if (header := self._headers.get((export.topic, publisher))) is not None
+            if (header := self._publishers.found.get((export.topic, publisher))) is not None
         ]
         type_, md5sum = export.type, UNKNOWN_MD5
         if headers:
@@ -132,45 +138,18 @@ class RobotGraph:
             rewriter is not None,
         )
 
-    async def _look_at_publishers(self, exports: dict[str, Export]) -> None:
-        """Learn from each new publisher its type, and whether it latches: the master knows neither."""
-        present = {(each.topic, node) for each in exports.values() for node in each.publishers}
-        self._headers = {key: header for key, header in self._headers.items() if key in present}
+    async def _publisher(self, key: tuple[str, str]) -> Header:
+        """Learn from a publisher its type, and whether it latches."""
+        header = await self._definitions.texts._header_of(*key)
+        self._definitions.learn(
+            header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")
+        )
+        return header
 
-        async def probe(topic: str, node: str) -> None:
-            async with self._probing:
-                try:
-                    header = await asyncio.wait_for(
-                        self._definitions.texts._header_of(topic, node), _PROBE_SECONDS
-                    )
-                except (MinirospyError, OSError, asyncio.TimeoutError, ValueError):
-                    self._not_before[topic, node] = time.monotonic() + _AGAIN_SECONDS
-                else:
-                    self._headers[topic, node] = header
-                    self._definitions.learn(
-                        header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")
-                    )
-
-        await asyncio.gather(*(probe(*key) for key in self._due(present - self._headers.keys())))
-
-    async def _look_at_services(self, services: dict[str, tuple[str, ...]]) -> None:
-        """Learn the types of new services: their nodes alone know them."""
-        present = set(services.items())
-        self._service_types = {key: found for key, found in self._service_types.items() if key in present}
-
-        async def probe(name: str, nodes: tuple[str, ...]) -> None:
-            async with self._probing:
-                try:
-                    header = await asyncio.wait_for(service_header(self._node, name), _PROBE_SECONDS)
-                except (ServiceException, asyncio.TimeoutError):
-                    self._not_before[name, nodes] = time.monotonic() + _AGAIN_SECONDS
-                    return
-            if is_md5(header.get("md5sum", "")) and "/" in header.get("type", ""):
-                self._service_types[name, nodes] = header["type"], header["md5sum"]
-
-        await asyncio.gather(*(probe(*key) for key in self._due(present - self._service_types.keys())))
-
-    def _due(self, keys: set[_Key]) -> list[_Key]:
-        now = time.monotonic()
-        self._not_before = {key: until for key, until in self._not_before.items() if until > now}
-        return [key for key in keys if key not in self._not_before]
+    async def _service(self, key: tuple[str, tuple[str, ...]]) -> tuple[str, str]:
+        """Return a service's type and md5sum."""
+        header = await service_header(self._node, key[0])
+        type_, md5sum = header.get("type", ""), header.get("md5sum", "")
+        if not is_md5(md5sum) or "/" not in type_:
+            raise WireError(f"service [{key[0]}] names no type")
+        return type_, md5sum

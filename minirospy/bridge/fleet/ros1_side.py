@@ -132,6 +132,7 @@ class Ros1Side:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        await self.graph.close()
         for declared in (self._beacons_received, *self._outlets.values(), *self._answered.values()):
             if declared:
                 declared.undeclare()

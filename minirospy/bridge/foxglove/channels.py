@@ -118,7 +118,7 @@ class Services:
 
     def update(self, graph: SharedGraph) -> tuple[list[ServiceOffer], list[int]]:
         """Return the services that are new and the ids of those that are no more, after a look at the graph."""
-        infos = (graph.service_types[name] for name in graph.snapshot.services)
+        infos = (graph.service_info(name) for name in graph.snapshot.services)
         wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
         removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]
         for id_ in removed:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
+from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.ros2.actions import ActionBridge
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
@@ -26,7 +26,6 @@ from minirospy.errors import (
     DefinitionError,
     DeserializationError,
     MasterUnreachableError,
-    MinirospyError,
     NotFoundError,
     ROSException,
     RpcError,
@@ -52,6 +51,8 @@ __all__ = ["Ros2Bridge", "Ros2Options"]
 _ORIGIN = "ros2_domain"
 """Field of the connection header of what comes from ROS 2, so that no bridge to the same domain sends it back."""
 _FASTEST_LOOK = 0.25
+_QUERY_SECONDS = 3.0
+"""After this topics are bridged without what is still queried of their publishers."""
 _JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
@@ -141,7 +142,8 @@ class Ros2Bridge:
         self._parameters = ParameterBridge(node, side, catalogue)
         self._types = _Types(side, options.rules, catalogue)
         self._texts = TypeTexts(node)
-        self._headers: dict[tuple[str, str], Header] = {}
+        faults = Faults(node.log, "the query of a publisher")
+        self._headers = NodeQueries(self._header, faults)
         self._watching: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         self._is_closed = False
@@ -164,6 +166,7 @@ class Ros2Bridge:
         await self.actions.close()
         await self.services.close()
         await self._parameters.close()
+        await self._headers.close()
         await self._texts.close()
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
@@ -225,26 +228,26 @@ class Ros2Bridge:
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
         """Learn from each new publisher of ROS 1, of a topic with subscribers in ROS 2, its definition and if it latches."""
-        present = {
+        present = [
             (topic, node)
             for topic, ends in ros2.items()
             if ends.subscribers
             for node in snapshot.publishers.get(topic, ())
             if not is_bridge(node)
-        }
-        self._headers = {key: header for key, header in self._headers.items() if key in present}
-        for topic, node in sorted(present - self._headers.keys()):
-            with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
-                self._headers[topic, node] = await self._texts._header_of(topic, node)
+        ]
+        await self._headers.look(present, _QUERY_SECONDS)
+
+    async def _header(self, key: tuple[str, str]) -> Header:
+        return await self._texts._header_of(*key)
 
     def _is_latched(self, topic: str, node: str) -> bool:
-        return self._headers.get((topic, node), {}).get("latching") == "1"
+        return self._headers.found.get((topic, node), {}).get("latching") == "1"
 
     def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
         """Return the functions of a link's types. Raise TypesDiffer."""
         texts = [
             header.get("message_definition", "")
-            for (topic, _), header in self._headers.items()
+            for (topic, _), header in self._headers.found.items()
             if topic == link.topic and header.get("type") == link.ros1_type
         ]
         text = next(filter(None, texts), "") if link.direction is Direction.TO_ROS2 else ""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, call_raw, service_header
+from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction, is_bridge
@@ -25,6 +26,7 @@ from minirospy.errors import (
     NotFoundError,
     ROSException,
     ServiceException,
+    WireError,
 )
 from minirospy.idl.cdr import CDR_HEADER, Transcoder
 from minirospy.idl.digest import service_md5
@@ -40,8 +42,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
-_PROBE_SECONDS = 1.0
-_PROBE_AGAIN_SECONDS = 10.0
+_QUERY_SECONDS = 1.0
+"""After this the services are bridged whose types are known."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MOST_CALLS = 1_000
@@ -138,13 +140,13 @@ class ServiceBridge:
         self._services = services
         self._types = _Types(side, rules, catalogue)
         self._call_seconds = call_seconds
-        self._probes = _Probes(node)
+        self._headers = NodeQueries(self._header, Faults(node.log, "the query for a service's type"))
         self._table: LinkTable[ServiceLink, _InRos1 | _InRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:
         """Close all. Idempotent."""
         await self._table.close()
-        await self._probes.close()
+        await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
         """Return what would be bridged of these services of ROS 1 and those of ROS 2, and why something is not."""
@@ -158,13 +160,24 @@ class ServiceBridge:
         ros1 = {name: nodes for name, nodes in ros1.items() if self._services(name)}
         foreign = {name: [node for node in nodes if not is_bridge(node)] for name, nodes in ros1.items()}
         ros2 = {name: type_ for name, type_ in self._side.services().items() if self._services(name)}
-        types = await self._probes.types({name: nodes[0] for name, nodes in foreign.items() if nodes})
+        await self._headers.look(
+            [(name, nodes[0]) for name, nodes in foreign.items() if nodes], _QUERY_SECONDS
+        )
+        types = {service: header["type"] for (service, _), header in self._headers.found.items()}
         return service_links(ros1, types, ros2, self._types.partner)
+
+    async def _header(self, key: tuple[str, str]) -> Header:
+        """Return a server's connection header: of services in ROS 1 the master does not know the types."""
+        header = await service_header(self._node, key[0])
+        if "type" not in header:
+            raise WireError(f"service [{key[0]}] names no type")
+        return header
 
     def _codec(self, link: ServiceLink) -> ServiceCodec:
         codec = self._types.codec(link.ros1_type, link.ros2_type)
         if link.direction is Direction.TO_ROS1:
-            md5sum = self._probes.md5sum(link.service)
+            headers = self._headers.found.items()
+            md5sum = next((each.get("md5sum", "") for (name, _), each in headers if name == link.service), "")
             if md5sum != codec.type.md5sum:
                 raise TypesDiffer(
                     f"its md5sum in ROS 1 is [{md5sum}], that of [{link.ros1_type}] here [{codec.type.md5sum}]: "
@@ -323,54 +336,3 @@ async def _pass_on(work: Awaitable[bytes], answered: Future[bytes]) -> None:
         answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
     else:
         answered.set_result(result)
-
-
-class _Probes:
-    """The types of services in ROS 1, which the master does not know: each server is queried once."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._headers: dict[tuple[str, str], Header] = {}
-        self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
-        self._again: dict[tuple[str, str], float] = {}
-        self._faults = Faults(node.log, "the query for a service's type")
-
-    async def types(self, services: Mapping[str, str]) -> dict[str, str]:
-        """Return the types of services, which are given with their nodes; those that do not answer are left out."""
-        present = set(services.items())
-        now = asyncio.get_running_loop().time()
-        self._headers = {key: header for key, header in self._headers.items() if key in present}
-        self._again = {key: time for key, time in self._again.items() if key in present}
-        for key in present - self._headers.keys() - self._tasks.keys():
-            if now >= self._again.get(key, 0.0):
-                self._tasks[key] = asyncio.ensure_future(self._probe(key))
-        if self._tasks:
-            # One that hangs keeps the others waiting this long, and no longer.
-            await asyncio.wait(self._tasks.values(), timeout=_PROBE_SECONDS)
-        return {service: header["type"] for (service, _), header in self._headers.items()}
-
-    def md5sum(self, service: str) -> str:
-        """Return the md5sum that a server has named."""
-        return next(
-            (header.get("md5sum", "") for (name, _), header in self._headers.items() if name == service), ""
-        )
-
-    async def close(self) -> None:
-        """End the queries. Idempotent."""
-        for task in self._tasks.values():
-            task.cancel()
-        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
-
-    async def _probe(self, key: tuple[str, str]) -> None:
-        try:
-            header = await service_header(self._node, key[0])
-            if "type" in header:
-                self._headers[key] = header
-                return
-        except ServiceException:
-            pass
-        except Exception as error:  # noqa: BLE001 - of one server: it is tried again, as those that do not answer
-            self._faults.report(error)
-        finally:
-            del self._tasks[key]
-        self._again[key] = asyncio.get_running_loop().time() + _PROBE_AGAIN_SECONDS

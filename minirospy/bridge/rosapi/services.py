@@ -43,6 +43,7 @@ from minirospy.aio.raw import service_header
 from minirospy.aio.services import Service, ServiceClass
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.json_text import load_json
+from minirospy.bridge.node_queries import AT_ONCE
 from minirospy.bridge.rosapi.typedefs import TypeDefinition, describe
 from minirospy.bridge.rosbridge.types import message_class, service_class
 from minirospy.errors import BridgeError, RpcRefused, ServiceException
@@ -76,7 +77,6 @@ __all__ = ["Rosapi"]
 
 _Handler = Callable[[Any], Awaitable[object]]
 
-_PROBES = 8
 _ACTION_TOPICS = ("cancel", "feedback", "goal", "result", "status")
 
 
@@ -86,7 +86,7 @@ class Rosapi:
     def __init__(self, node: Node, filters: Filters | None = None) -> None:
         self.node = node
         self._filters = filters or Filters()
-        self._probing = asyncio.Semaphore(_PROBES)
+        self._probing = asyncio.Semaphore(AT_ONCE)
         self._served: list[Service] = []
         self._offers: dict[str, tuple[ServiceClass[Message, Message], _Handler]] = {
             "topics": (Topics, self._topics),

@@ -24,7 +24,7 @@ __all__ = ["ClientService", "call"]
 async def call(graph: SharedGraph, name: str, arguments: object) -> Message:
     """Return a service's response. Raises BridgeError, ServiceException, ROSSerializationException."""
     service = graph.node.resolve(name)
-    info = graph.service_types[service]
+    info = graph.service_info(service)
     if info:
         type_ = info.type
     else:

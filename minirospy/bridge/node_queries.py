@@ -1,0 +1,102 @@
+"""What nodes alone know, such as the types of their services: the master does not, so each node is queried."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Collection
+from functools import partial
+from typing import Generic, TypeVar
+
+from minirospy.bridge.tasks import Faults
+from minirospy.errors import MinirospyError, ROSException
+
+__all__ = ["AT_ONCE", "NodeQueries"]
+
+AT_ONCE = 64
+"""Queries that run at a time: a node that hangs costs nothing but a connection."""
+
+_AGAIN_AT_ONCE = 32
+"""Of these, to what did not answer before: they have places of their own, so that nothing new waits for them."""
+_QUERY_SECONDS = 5.0
+_AGAIN_SECONDS = 10.0
+"""After this what did not answer is queried again."""
+
+_Key = TypeVar("_Key")
+_Found = TypeVar("_Found")
+
+
+class NodeQueries(Generic[_Key, _Found]):
+    """Queries nodes once for each key, such as the name of a service with its nodes. On the loop.
+
+    What does not answer is queried again later, and keeps nothing else waiting.
+    """
+
+    def __init__(
+        self,
+        query: Callable[[_Key], Awaitable[_Found]],
+        faults: Faults,
+        *,
+        arrived_late: Callable[[], object] = lambda: None,
+    ) -> None:
+        """``arrived_late`` is called when an answer has come that :meth:`look` did not wait for."""
+        self.found: dict[_Key, _Found] = {}
+        self._query = query
+        self._faults = faults
+        self._arrived_late = arrived_late
+        self._tasks: dict[_Key, asyncio.Task[None]] = {}
+        self._not_before: dict[_Key, float] = {}
+        self._first = asyncio.Semaphore(AT_ONCE)
+        self._again = asyncio.Semaphore(_AGAIN_AT_ONCE)
+
+    async def look(self, present: Collection[_Key], seconds: float) -> None:
+        """Query for what is new and forget what is absent; return when the new is found, or after ``seconds``."""
+        kept = set(present)
+        self.found = {key: found for key, found in self.found.items() if key in kept}
+        self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
+        is_late = False
+
+        async def ask(key: _Key, turns: asyncio.Semaphore) -> None:
+            async with turns:
+                if await self._ask(key) and is_late:
+                    self._arrived_late()
+
+        new = []
+        now = asyncio.get_running_loop().time()
+        for key in present:
+            if key in self.found or key in self._tasks or now < self._not_before.get(key, 0.0):
+                continue
+            has_failed = key in self._not_before
+            task = asyncio.ensure_future(ask(key, self._again if has_failed else self._first))
+            self._tasks[key] = task
+            task.add_done_callback(partial(self._ended, key))
+            if not has_failed:
+                new.append(task)
+        if new:
+            await asyncio.wait(new, timeout=seconds)
+        is_late = True
+
+    async def close(self) -> None:
+        """End the queries. Idempotent."""
+        tasks = list(self._tasks.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _ask(self, key: _Key) -> bool:
+        """Query once; return whether there was an answer."""
+        try:
+            self.found[key] = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
+        except (MinirospyError, ROSException, OSError, asyncio.TimeoutError, ValueError):
+            self._failed(key)
+        except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
+            self._faults.report(error)
+            self._failed(key)
+        else:
+            return True
+        return False
+
+    def _ended(self, key: _Key, _: object) -> None:
+        del self._tasks[key]
+
+    def _failed(self, key: _Key) -> None:
+        self._not_before[key] = asyncio.get_running_loop().time() + _AGAIN_SECONDS
