@@ -16,8 +16,8 @@ def main(words: list[str]) -> int:
         print("add_two_ints_client.py [x y]: two integers, or none for two at random")
         return 1
 
-    print(f"Requesting {x}+{y}")
     try:
+        print(f"Requesting {x}+{y}")
         rospy.wait_for_service("add_two_ints")
         print(f"{x} + {y} = {rospy.ServiceProxy('add_two_ints', AddTwoInts)(x, y).sum}")
     except KeyboardInterrupt:
