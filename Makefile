@@ -40,7 +40,7 @@ check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/interop --ignore=tests/windows
+	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
