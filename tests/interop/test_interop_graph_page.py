@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable
 from typing import Any
@@ -87,6 +88,69 @@ def test_groups_are_namespaces_of_several_elements() -> None:
     assert page_functions(("graph_elements", "groupsOf", [keys])) == [
         {"base": ["n/base/driver", "t/base/odom"]}
     ]
+
+
+@needs_node
+def test_connected_keys_are_those_of_links_in_a_row() -> None:
+    (found,) = page_functions(("graph_elements", "connectedOf", [list("abcdef"), ["ab", "dc", "bc", "ee"]]))
+    groups = {**{key: list("abcd") for key in "abcd"}, "e": ["e"], "f": ["f"]}
+    assert {key: sorted(part) for key, part in found.items()} == groups
+
+
+@needs_node
+def test_boxes_in_rows_fit_the_aspect_of_the_view_and_do_not_overlap() -> None:
+    boxes = [{"width": 100 + 10 * (each % 3), "height": 40 + 30 * (each % 4)} for each in range(12)]
+    views = (0.5, 1, 2.5)
+    for aspect, found in zip(
+        views,
+        page_functions(*(("graph_elements", "packed", [boxes, aspect]) for aspect in views)),
+        strict=True,
+    ):
+        assert aspect / 1.8 < found["width"] / found["height"] < aspect * 1.8
+        areas = [(each["x"], each["y"], box) for each, box in zip(found["places"], boxes, strict=True)]
+        assert max(x + box["width"] for x, _, box in areas) == found["width"]
+        assert max(y + box["height"] for _, y, box in areas) == found["height"]
+        for (x, y, box), (left, top, other) in itertools.combinations(areas, 2):
+            assert (
+                x + box["width"] < left
+                or left + other["width"] < x
+                or y + box["height"] < top
+                or top + other["height"] < y
+            )
+    assert page_functions(("graph_elements", "packed", [[], 1])) == [{"width": 0, "height": 0, "places": []}]
+
+
+@needs_chromium
+def test_parts_that_are_not_connected_fill_a_narrow_view_in_rows(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        for part in range(4):
+            for step in range(2):
+                topic = f"/part{part}/topic{step}"
+                for register, node in (("registerPublisher", step), ("registerSubscriber", step + 1)):
+                    name = f"/part{part}/node{node}"
+                    answer = getattr(master, register)(
+                        name, topic, "std_msgs/String", f"http://127.0.0.1:{1 + node}/"
+                    )
+                    assert answer[0] == 1, answer
+    page = browse(address(served, "graph"), width=390, height=844)
+    page.wait("return document.querySelectorAll('.graph .topic').length === 8")
+    places = page.evaluate(
+        "[0, 1, 2, 3].map(part => document.querySelector(`[data-key='n/part${part}/node0'] rect`).getBoundingClientRect())"
+        ".map(({x, y}) => [x, y])"
+    )
+    assert [len({each[axis] for each in places}) for axis in (0, 1)] == [2, 2]
+    # What is connected by its namespace alone is one part, too.
+    page.click("label", "namespaces")
+    page.wait("return document.querySelectorAll('.graph .namespace').length === 4")
+    for key in ("n/part3/node2", "t/part0/topic1"):
+        page.wait(
+            f"const box = document.querySelector(\"[data-key='{key}']\").getBoundingClientRect();"
+            "const view = document.querySelector('svg.graph').getBoundingClientRect();"
+            "return box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom"
+        )
 
 
 @needs_chromium

@@ -4,6 +4,7 @@ const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
 const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
 const TO_SERVER = ["goal", "cancel"];
 const FROM_SERVER = ["status", "feedback", "result"];
+const GAP = 12; // between boxes in rows
 
 /** Return the names of the actions among topics. */
 export function actionsIn(topics) {
@@ -90,6 +91,51 @@ export function groupsOf(keys) {
     found.set(parts[0], [...(found.get(parts[0]) ?? []), key]);
   }
   return new Map([...found].filter(([, members]) => members.length > 1));
+}
+
+/** Return Map of key -> the keys that it is connected with, one list for all of them; each of ``links`` is keys that belong together. */
+export function connectedOf(keys, links) {
+  const found = new Map(keys.map((key) => [key, [key]]));
+  for (const [first, ...others] of links) {
+    for (const other of others) {
+      const [less, more] = [found.get(first), found.get(other)].sort((one, two) => one.length - two.length);
+      if (less === more) continue;
+      for (const key of less) {
+        found.set(key, more);
+        more.push(key);
+      }
+    }
+  }
+  return found;
+}
+
+/** Put boxes in rows, the highest first, so that all are as large as they can be in a view of this aspect: {width, height, places: [{x, y}]}. */
+export function packed(boxes, aspect) {
+  const order = [...boxes.keys()].sort((one, other) => boxes[other].height - boxes[one].height);
+  const widest = Math.max(0, ...boxes.map(({ width }) => width));
+  let best = { width: 0, height: 0, places: [] };
+  let [most, least] = [0, Infinity];
+  for (const last of order) {
+    most += boxes[last].width + GAP;
+    const found = inRows(boxes, order, Math.max(most, widest));
+    const size = Math.max(found.width, found.height * aspect);
+    if (size < least) [best, least] = [found, size];
+  }
+  return best;
+}
+
+function inRows(boxes, order, most) {
+  const places = [];
+  let [x, y, next, width] = [0, 0, 0, 0];
+  for (const index of order) {
+    const box = boxes[index];
+    if (x && x + box.width > most) [x, y] = [0, next];
+    places[index] = { x, y };
+    width = Math.max(width, x + box.width);
+    x += box.width + GAP;
+    next = Math.max(next, y + box.height + GAP);
+  }
+  return { width, height: next - GAP, places };
 }
 
 /**

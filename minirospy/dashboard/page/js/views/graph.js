@@ -3,7 +3,7 @@
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
 import { brief, loopOf, pathOf } from "../drawing.js";
 import { bandwidth, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
-import { elementsOf, groupsOf, trafficOf } from "../graph_elements.js";
+import { connectedOf, elementsOf, groupsOf, packed, trafficOf } from "../graph_elements.js";
 import { PanZoom } from "../panzoom.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
@@ -105,46 +105,66 @@ export class Graph {
     const layouts = [this.lay(found, "LR")];
     // A chain of nodes is easier to read from top to bottom where the view is not as wide as it.
     if (found.nodes.size + found.topics.size < MOST_TRIED) layouts.push(this.lay(found, "TB"));
-    const [{ graph, groups }] = layouts.sort((one, other) => this.fitOf(other.graph) - this.fitOf(one.graph));
-    const boxes = [...groups.keys()].map((name) => this.makeGroup(name, graph.node(`g${name}`)));
+    const [{ width, height, boxes, edges }] = layouts.sort((one, other) => this.fitOf(other) - this.fitOf(one));
+    const groups = [...boxes].filter(([key]) => key[0] === "g").map(([key, box]) => this.makeGroup(key.slice(1), box));
     this.drawn = [];
-    const lines = graph.edges().map((id) => this.makeEdge(graph.edge(id), id, found.edges, graph.node(id.v)));
-    const parts = graph.nodes().filter((key) => SHAPES[key[0]]).map((key) => this.makePart(key, graph.node(key)));
-    this.drawing.replaceChildren(...boxes, ...lines, ...parts);
-    this.panzoom.resized(graph.graph().width, graph.graph().height);
+    const lines = edges.map(([id, edge]) => this.makeEdge(edge, id, found.edges, boxes.get(id.v)));
+    const parts = [...boxes].filter(([key]) => SHAPES[key[0]]).map(([key, box]) => this.makePart(key, box));
+    this.drawing.replaceChildren(...groups, ...lines, ...parts);
+    this.panzoom.resized(width, height);
     this.showReport();
     this.highlight();
   }
 
   /** Return by how much a drawing can be enlarged in the view. */
-  fitOf(graph) {
-    const { width, height } = graph.graph();
-    return Math.min(1, (this.picture.clientWidth || 1000) / width, (this.picture.clientHeight || 600) / height);
+  fitOf({ width, height }) {
+    const view = this.viewSize();
+    return Math.min(1, view.width / width, view.height / height);
   }
 
+  viewSize() {
+    return { width: this.picture.clientWidth || 1000, height: this.picture.clientHeight || 600 };
+  }
+
+  /** Lay out each connected part, and put them in rows. */
   lay({ nodes, topics, actions, edges }, rankdir) {
-    const graph = new Layered({ multigraph: true, compound: true });
-    graph.setGraph({ rankdir, nodesep: 22, ranksep: this.hasRates.checked ? 30 : 60, marginx: 12, marginy: this.hasGroups.checked ? 26 : 12 });
+    const keys = [["n", nodes], ["t", topics], ["a", actions]].flatMap(([kind, names]) => [...names].sort().map((name) => kind + name));
+    const groups = this.hasGroups.checked ? groupsOf(keys) : new Map();
+    const connected = connectedOf(keys, [...edges.map(({ from, to }) => [from, to]), ...groups.values()]);
+    const parts = new Map();
+    const partOf = (key) => parts.get(connected.get(key));
+    for (const part of connected.values()) {
+      if (parts.has(part)) continue;
+      parts.set(part, new Layered({ multigraph: true, compound: true }).setGraph({ rankdir, nodesep: 22, ranksep: this.hasRates.checked ? 30 : 60, marginx: 12, marginy: this.hasGroups.checked ? 26 : 12 }));
+    }
     const measure = h("canvas").getContext("2d");
     measure.font = "600 14px system-ui, sans-serif";
-    for (const [kind, names] of [["n", nodes], ["t", topics], ["a", actions]]) {
-      for (const name of [...names].sort()) {
-        graph.setNode(kind + name, { width: measure.measureText(brief(name)).width + (kind === "t" ? 26 : 44), height: HEIGHT });
-      }
-    }
-    const groups = this.hasGroups.checked ? groupsOf(graph.nodes()) : new Map();
-    for (const [name, keys] of groups) {
-      graph.setNode(`g${name}`, {});
-      for (const key of keys) graph.setParent(key, `g${name}`);
+    for (const key of keys) partOf(key).setNode(key, { width: measure.measureText(brief(key.slice(1))).width + (key[0] === "t" ? 26 : 44), height: HEIGHT });
+    for (const [name, members] of groups) {
+      partOf(members[0]).setNode(`g${name}`, {});
+      for (const key of members) partOf(key).setParent(key, `g${name}`);
     }
     measure.font = "12px system-ui, sans-serif";
     const room = this.hasRates.checked ? measure.measureText(RATE_TEXT).width : 0;
     edges.forEach(({ from, to, label }, index) => {
       const width = Math.max(label ? measure.measureText(brief(label)).width : 0, room);
-      graph.setEdge(from, to, width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index }, String(index));
+      partOf(from).setEdge(from, to, width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index }, String(index));
     });
-    layout(graph);
-    return { graph, groups };
+    const graphs = [...parts.values()];
+    for (const graph of graphs) layout(graph);
+    const view = this.viewSize();
+    const { places, ...size } = packed(graphs.map((graph) => graph.graph()), view.width / view.height);
+    const found = { ...size, boxes: new Map(), edges: [] };
+    graphs.forEach((graph, index) => {
+      const moved = (point) => Object.assign(point, { x: point.x + places[index].x, y: point.y + places[index].y });
+      for (const key of graph.nodes()) found.boxes.set(key, moved(graph.node(key)));
+      for (const id of graph.edges()) {
+        const edge = graph.edge(id);
+        edge.points.forEach(moved);
+        found.edges.push([id, edge.x === undefined ? edge : moved(edge)]);
+      }
+    });
+    return found;
   }
 
   makeGroup(name, { x, y, width, height }) {
