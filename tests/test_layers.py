@@ -49,6 +49,7 @@ LAYERS = [
         "tree_svg",
     },
     {"errors", "escape"},
+    {"suggestions"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = {"runtime", "wire"}

@@ -33,9 +33,9 @@ from minirospy.errors import (
     ROSException,
     ServiceException,
     UsageError,
-    did_you_mean,
 )
 from minirospy.escape import SafeTerminal, escaped
+from minirospy.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from minirospy.introspect.graph import Graph

@@ -209,7 +209,7 @@ def _dashboard(
     arguments: Sequence[str] = (),
 ) -> int:
     from minirospy.dashboard.views import LAYOUTS, VIEWS
-    from minirospy.errors import did_you_mean
+    from minirospy.suggestions import did_you_mean
 
     if view and layout:
         raise Misuse(f"'{view}' and --layout {layout} are two views: give one")

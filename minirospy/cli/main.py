@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import minirospy
 from minirospy.cli.command import run
 from minirospy.cli.registry import COMMANDS, find_verb
-from minirospy.errors import UsageError, did_you_mean
+from minirospy.errors import UsageError
+from minirospy.suggestions import did_you_mean
 
 __all__ = ["main"]
 

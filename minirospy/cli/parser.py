@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy import names
-from minirospy.errors import UsageError, did_you_mean
+from minirospy.errors import UsageError
+from minirospy.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from re import Pattern

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 from minirospy.cli.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
 from minirospy.cli.parser import CommandLineError, Misuse, Parser
-from minirospy.errors import MinirospyError, UsageError, did_you_mean
+from minirospy.errors import MinirospyError, UsageError
 from minirospy.names import parse_arguments
+from minirospy.suggestions import did_you_mean
 
 __all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
 

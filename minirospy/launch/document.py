@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 from xml.parsers import expat
 
-from minirospy.errors import LaunchError, NotFoundError, nearest
+from minirospy.errors import LaunchError, NotFoundError
 from minirospy.launch.substitution import Substitution, SubstitutionError
+from minirospy.suggestions import nearest
 
 __all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
 

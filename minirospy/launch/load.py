@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy import names
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError, nearest
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.document import Tag, parse_document
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
 from minirospy.launch.substitution import Substitution
+from minirospy.suggestions import nearest
 from minirospy.workspace.packages import Packages, package_name
 
 __all__ = [

@@ -19,7 +19,8 @@ from minirospy.cli.ros import (
     rosbag_rewrite,
 )
 from minirospy.cli.verbs import Family, HelpStatus
-from minirospy.errors import UsageError, did_you_mean
+from minirospy.errors import UsageError
+from minirospy.suggestions import did_you_mean
 
 __all__ = ["FAMILY", "main"]
 

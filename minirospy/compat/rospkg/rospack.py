@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy.compat.rospkg.environment import get_ros_paths
-from minirospy.errors import ManifestError, nearest
+from minirospy.errors import ManifestError
+from minirospy.suggestions import nearest
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, package_name
 
