@@ -10,7 +10,8 @@ import pytest
 
 from minirospy.cli.catkin.make import catkin_make
 from minirospy.errors import MinirospyError
-from minirospy.launch.load import find_files, load_files
+from minirospy.launch.files import find_files
+from minirospy.launch.load import load_files
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import read_plan
 

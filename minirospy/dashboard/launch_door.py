@@ -20,7 +20,7 @@ from minirospy.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.dashboard.launch_run import LaunchRun
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, UsageError
-from minirospy.launch.load import resolved_arg_docs
+from minirospy.launch.arg_docs import resolved_arg_docs
 from minirospy.workspace.packages import Packages
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.errors import LaunchError
-from minirospy.launch.load import LaunchSource, Problems, describe_args, load_sources
+from minirospy.launch.arg_docs import describe_args
+from minirospy.launch.load import LaunchSource, Problems, load_sources
 from minirospy.workspace.manifest import Kind, read_manifest
 from minirospy.workspace.packages import Packages, package_name
 

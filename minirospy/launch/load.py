@@ -7,49 +7,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from minirospy import names
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.errors import LaunchError
 from minirospy.launch.document import Tag, parse_document
+from minirospy.launch.files import hidden_hint, near_files, read_launch_file
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
 from minirospy.launch.substitution import Substitution
 from minirospy.suggestions import nearest
-from minirospy.workspace.packages import Packages, package_name
+from minirospy.workspace.packages import Packages
 
 __all__ = [
     "STDIN",
-    "LaunchFileNotFoundError",
     "LaunchSource",
     "Problems",
-    "describe_args",
-    "find_files",
     "load_files",
     "load_sources",
     "load_text",
-    "resolved_arg_docs",
 ]
 
 STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
 
 Problems = list[LaunchError]
-
-
-class LaunchFileNotFoundError(MinirospyError):
-    """A command line names no launch file; ``ros_text`` is what ROS prints about it, ``hint`` what to do."""
-
-    def __init__(self, ros_text: str, hint: str) -> None:
-        super().__init__(ros_text, hint)
-        self.ros_text = ros_text
-        self.hint = hint
-
-    def __str__(self) -> str:
-        return f"{self.ros_text}: {self.hint}"
 
 
 class LaunchSource(NamedTuple):
@@ -114,7 +98,7 @@ def load_sources(
         substitution = Substitution(packages, environ, file, dict(args), anonymous, used)
         reader = _File(spec, substitution, _Args(dict(args)), 0, problems)
         try:
-            reader.read(_read(file) if text is None else text, _Scope())
+            reader.read(read_launch_file(file) if text is None else text, _Scope())
         except LaunchError as error:
             reader.report(error)
 
@@ -124,68 +108,6 @@ def load_sources(
 
     _check_names(spec, problems)
     return spec
-
-
-def find_files(what: list[str], packages: Packages) -> list[str]:
-    """Return the launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
-    for word in what:
-        name, equals, value = word.partition("=")
-        if equals and name.isidentifier() and not Path(word).exists():
-            raise MinirospyError(f"[{word}] is not a launch file: an argument is written {name}:={value}")
-
-    if len(what) == 2 and not Path(what[0]).is_file():
-        package, file = what
-        try:
-            return [str(packages.find_resource(package, file))]
-        except NotFoundError as error:
-            raise LaunchFileNotFoundError(
-                f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch file name",
-                f"{error}{_package_with(file, packages)}",
-            ) from error
-
-    for file in what:
-        if not Path(file).is_file():
-            hint = _near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages)
-            raise LaunchFileNotFoundError(
-                f"[{file}] is not a launch file name", f"type roslaunch PACKAGE FILE, or a path{hint}"
-            )
-    return what
-
-
-def describe_args(file: str) -> list[ArgDoc]:
-    """Return the arguments that a file declares, without loading what it includes. Raises LaunchError."""
-    root = parse_document(_read(file), file)
-    return [
-        ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
-        for attributes in (element.attributes for element in root.children if element.tag == "arg")
-        if "name" in attributes and "value" not in attributes
-    ]
-
-
-def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
-    """Return the same as describe_args(), with the defaults' values where ``args`` are given, and without what does not apply.
-
-    What cannot be resolved stays as it is written. Raises LaunchError.
-    """
-    substitution = Substitution(packages, os.environ, file, dict(args))
-    found: dict[str, ArgDoc] = {}
-    for tag in Tag(parse_document(_read(file), file), file, substitution).children():
-        attributes = tag.element.attributes
-        name, default = attributes.get("name"), attributes.get("default")
-        if tag.name != "arg" or name is None:
-            continue
-        try:
-            if not tag.applies():
-                continue
-            value, default = tag.optional("value"), tag.optional("default")
-        except LaunchError:
-            value = attributes.get("value")
-        if value is None:
-            found.setdefault(name, ArgDoc(name, default, attributes.get("doc")))
-            value = default
-        if value is not None:
-            substitution.args.setdefault(name, value)
-    return list(found.values())
 
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
@@ -203,64 +125,6 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
             if problems is None:
                 raise error
             problems.append(error)
-
-
-def _near_files(file: str) -> str:
-    """Return the hint for a missing launch file: those of a similar name in its folder, else in its package."""
-    wanted = Path(file)
-    with suppress(OSError, ValueError):
-        if wanted.exists():
-            return ""
-        folder, package = wanted.parent, _package_of(wanted)
-        for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Without their endings, in which all are alike.
-            known: dict[str, Path] = {}
-            for path in files:
-                if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
-                    known.setdefault(path.name.partition(".")[0], path)
-            near = [known[name] for name in nearest(wanted.name.partition(".")[0], known)]
-            if near:
-                shown = (path.name if path.parent == folder else str(path) for path in near)
-                return f"; did you mean {' or '.join(shown)}?"
-    return ""
-
-
-def _hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing in a package, where another one of its name has it."""
-    with suppress(OSError, ValueError):
-        folder = _package_of(Path(file))
-        if folder:
-            return packages.hidden_hint(package_name(folder) or folder.name, Path(file).name, folder)
-    return ""
-
-
-def _package_of(file: Path) -> Path | None:
-    return next((each for each in file.parents if (each / "package.xml").is_file()), None)
-
-
-def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a package without a file: the launch files that it has."""
-    try:
-        files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
-    except NotFoundError:
-        return ""
-    return f"; package [{package}] has {', '.join(files) or 'no launch files'}"
-
-
-def _package_with(file: str, packages: Packages) -> str:
-    """Return the hint for a launch file whose package was not named, or is another one."""
-    for package, folder in sorted(packages.folders().items()):
-        if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
-            return f"; did you mean `roslaunch {package} {file}`?"
-    return ""
-
-
-def _read(file: str) -> bytes:
-    try:
-        return Path(file).read_bytes()
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise LaunchError(file, 0, f"cannot be read: {why}") from error
 
 
 class _File:
@@ -399,7 +263,7 @@ class _File:
             text = Path(file).read_bytes()
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            hint = _near_files(file) + _hidden_hint(file, self._substitution.packages)
+            hint = near_files(file) + hidden_hint(file, self._substitution.packages)
             raise tag.error(f"cannot include [{file}]: {why}{hint}") from None
 
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})

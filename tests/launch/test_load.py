@@ -9,7 +9,8 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError
-from minirospy.launch.load import describe_args, load_files, load_text
+from minirospy.launch.arg_docs import describe_args
+from minirospy.launch.load import load_files, load_text
 from minirospy.launch.spec import LaunchSpec, ParameterCommand
 from minirospy.workspace.packages import Packages
 

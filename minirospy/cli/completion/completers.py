@@ -250,7 +250,7 @@ def _launch_file(cursor: Cursor) -> str:
 
 
 def _launch_args(cursor: Cursor) -> Iterator[str]:
-    from minirospy.launch.load import describe_args
+    from minirospy.launch.arg_docs import describe_args
 
     name, assigned, _ = cursor.word.partition(":=")
     for arg in describe_args(_launch_file(cursor)):
@@ -263,7 +263,8 @@ def _launch_args(cursor: Cursor) -> Iterator[str]:
 
 def launch_nodes(cursor: Cursor) -> Iterable[str]:
     """Return the nodes of the launch file, for `roslaunch PACKAGE FILE --args NODE`."""
-    from minirospy.launch.load import LaunchSource, describe_args, load_sources
+    from minirospy.launch.arg_docs import describe_args
+    from minirospy.launch.load import LaunchSource, load_sources
 
     if not cursor.given:
         return []

@@ -15,15 +15,10 @@ from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
+from minirospy.launch.arg_docs import resolved_arg_docs
 from minirospy.launch.command import shell_line
-from minirospy.launch.load import (
-    STDIN,
-    LaunchFileNotFoundError,
-    LaunchSource,
-    find_files,
-    load_sources,
-    resolved_arg_docs,
-)
+from minirospy.launch.files import LaunchFileNotFoundError, find_files
+from minirospy.launch.load import STDIN, LaunchSource, load_sources
 from minirospy.launch.spec import ArgDoc, LaunchSpec, NodeSpec
 from minirospy.workspace.packages import Packages
 

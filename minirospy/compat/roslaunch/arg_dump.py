@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from minirospy import names
 from minirospy.compat.roslaunch.config import LaunchFile
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.launch.load import resolved_arg_docs
+from minirospy.launch.arg_docs import resolved_arg_docs
 
 __all__ = ["get_args"]
 

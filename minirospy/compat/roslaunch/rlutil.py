@@ -12,7 +12,7 @@ from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
-from minirospy.launch.load import find_files
+from minirospy.launch.files import find_files
 from minirospy.launch.master import LaunchMaster
 from minirospy.launch.output import Output, warn_of_large_logs
 from minirospy.runtime.rpc.master_proxy import MasterProxy

@@ -1,0 +1,109 @@
+"""Launch files that a command line or an include names: where they are, and what is meant by one that is not there."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.suggestions import nearest
+from minirospy.workspace.packages import Packages, package_name
+
+__all__ = ["LaunchFileNotFoundError", "find_files", "hidden_hint", "near_files", "read_launch_file"]
+
+
+class LaunchFileNotFoundError(MinirospyError):
+    """A command line names no launch file; ``ros_text`` is what ROS prints about it, ``hint`` what to do."""
+
+    def __init__(self, ros_text: str, hint: str) -> None:
+        super().__init__(ros_text, hint)
+        self.ros_text = ros_text
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.ros_text}: {self.hint}"
+
+
+def find_files(what: list[str], packages: Packages) -> list[str]:
+    """Return the launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
+    for word in what:
+        name, equals, value = word.partition("=")
+        if equals and name.isidentifier() and not Path(word).exists():
+            raise MinirospyError(f"[{word}] is not a launch file: an argument is written {name}:={value}")
+
+    if len(what) == 2 and not Path(what[0]).is_file():
+        package, file = what
+        try:
+            return [str(packages.find_resource(package, file))]
+        except NotFoundError as error:
+            raise LaunchFileNotFoundError(
+                f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch file name",
+                f"{error}{_package_with(file, packages)}",
+            ) from error
+
+    for file in what:
+        if not Path(file).is_file():
+            hint = near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages)
+            raise LaunchFileNotFoundError(
+                f"[{file}] is not a launch file name", f"type roslaunch PACKAGE FILE, or a path{hint}"
+            )
+    return what
+
+
+def read_launch_file(file: str) -> bytes:
+    """Return a file's bytes. Raise LaunchError."""
+    try:
+        return Path(file).read_bytes()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise LaunchError(file, 0, f"cannot be read: {why}") from error
+
+
+def near_files(file: str) -> str:
+    """Return the hint for a missing launch file: those of a similar name in its folder, else in its package."""
+    wanted = Path(file)
+    with suppress(OSError, ValueError):
+        if wanted.exists():
+            return ""
+        folder, package = wanted.parent, _package_of(wanted)
+        for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
+            # Without their endings, in which all are alike.
+            known: dict[str, Path] = {}
+            for path in files:
+                if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
+                    known.setdefault(path.name.partition(".")[0], path)
+            near = [known[name] for name in nearest(wanted.name.partition(".")[0], known)]
+            if near:
+                shown = (path.name if path.parent == folder else str(path) for path in near)
+                return f"; did you mean {' or '.join(shown)}?"
+    return ""
+
+
+def hidden_hint(file: str, packages: Packages) -> str:
+    """Return the hint for a file that is missing in a package, where another one of its name has it."""
+    with suppress(OSError, ValueError):
+        folder = _package_of(Path(file))
+        if folder:
+            return packages.hidden_hint(package_name(folder) or folder.name, Path(file).name, folder)
+    return ""
+
+
+def _package_of(file: Path) -> Path | None:
+    return next((each for each in file.parents if (each / "package.xml").is_file()), None)
+
+
+def _launch_files_of(package: str, packages: Packages) -> str:
+    """Return the hint for a package without a file: the launch files that it has."""
+    try:
+        files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
+    except NotFoundError:
+        return ""
+    return f"; package [{package}] has {', '.join(files) or 'no launch files'}"
+
+
+def _package_with(file: str, packages: Packages) -> str:
+    """Return the hint for a launch file whose package was not named, or is another one."""
+    for package, folder in sorted(packages.folders().items()):
+        if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
+            return f"; did you mean `roslaunch {package} {file}`?"
+    return ""
