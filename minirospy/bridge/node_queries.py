@@ -16,7 +16,7 @@ AT_ONCE = 64
 """Queries that run at a time: a node that hangs costs nothing but a connection."""
 
 _AGAIN_AT_ONCE = 32
-"""Of these, to what did not answer before: they have places of their own, so that nothing new waits for them."""
+"""Queries to what did not answer before that run at a time: next to the others, so that nothing new waits for them."""
 _QUERY_SECONDS = 5.0
 _AGAIN_SECONDS = 10.0
 """After this what did not answer is queried again."""
@@ -43,6 +43,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self._query = query
         self._faults = faults
         self._arrived_late = arrived_late
+        self._present: set[_Key] = set()
         self._tasks: dict[_Key, asyncio.Task[None]] = {}
         self._not_before: dict[_Key, float] = {}
         self._first = asyncio.Semaphore(AT_ONCE)
@@ -50,14 +51,14 @@ class NodeQueries(Generic[_Key, _Found]):
 
     async def look(self, present: Collection[_Key], seconds: float) -> None:
         """Query for what is new and forget what is absent; return when the new is found, or after ``seconds``."""
-        kept = set(present)
+        kept = self._present = set(present)
         self.found = {key: found for key, found in self.found.items() if key in kept}
         self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
         is_late = False
 
         async def ask(key: _Key, turns: asyncio.Semaphore) -> None:
             async with turns:
-                if await self._ask(key) and is_late:
+                if key in self._present and await self._ask(key) and is_late:
                     self._arrived_late()
 
         new = []
@@ -71,9 +72,11 @@ class NodeQueries(Generic[_Key, _Found]):
             task.add_done_callback(partial(self._ended, key))
             if not has_failed:
                 new.append(task)
-        if new:
-            await asyncio.wait(new, timeout=seconds)
-        is_late = True
+        try:
+            if new:
+                await asyncio.wait(new, timeout=seconds)
+        finally:
+            is_late = True
 
     async def close(self) -> None:
         """End the queries. Idempotent."""
@@ -85,18 +88,22 @@ class NodeQueries(Generic[_Key, _Found]):
     async def _ask(self, key: _Key) -> bool:
         """Query once; return whether there was an answer."""
         try:
-            self.found[key] = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
+            found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
         except (MinirospyError, ROSException, OSError, asyncio.TimeoutError, ValueError):
             self._failed(key)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
             self._faults.report(error)
             self._failed(key)
         else:
-            return True
+            # What is absent by now is new when it is back.
+            if key in self._present:
+                self.found[key] = found
+                return True
         return False
 
     def _ended(self, key: _Key, _: object) -> None:
         del self._tasks[key]
 
     def _failed(self, key: _Key) -> None:
-        self._not_before[key] = asyncio.get_running_loop().time() + _AGAIN_SECONDS
+        if key in self._present:
+            self._not_before[key] = asyncio.get_running_loop().time() + _AGAIN_SECONDS

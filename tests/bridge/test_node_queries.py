@@ -100,6 +100,42 @@ def test_an_answer_that_nobody_waited_for_is_reported() -> None:
     asyncio.run(asyncio.wait_for(run(), LIMIT))
 
 
+def test_an_answer_for_what_has_gone_meanwhile_is_forgotten() -> None:
+    async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
+        nodes.silent.add("moved")
+        await queries.look(["moved"], 0.0)
+        await until(lambda: nodes.queried)
+        await queries.look([], 0.0)
+        nodes.may_answer.set()
+        await until(lambda: not queries._tasks)
+        assert not queries.found
+
+        nodes.dead.add("moved")
+        await queries.look(["moved"], LIMIT)
+        assert nodes.queried == ["moved", "moved"], "it is as new as at first"
+
+    queried(scene)
+
+
+def test_an_answer_after_a_look_that_was_cancelled_is_reported() -> None:
+    async def run() -> None:
+        nodes = Nodes()
+        nodes.silent.add("late")
+        came = asyncio.Event()
+        queries = NodeQueries(
+            nodes.answer, Faults(logging.getLogger("test"), "the query"), arrived_late=came.set
+        )
+        looking = asyncio.ensure_future(queries.look(["late"], LIMIT))
+        await until(lambda: nodes.queried)
+        looking.cancel()
+        await asyncio.gather(looking, return_exceptions=True)
+        nodes.may_answer.set()
+        await came.wait()
+        await queries.close()
+
+    asyncio.run(asyncio.wait_for(run(), 10.0))
+
+
 def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.dead.add("a")
