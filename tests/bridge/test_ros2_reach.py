@@ -67,6 +67,42 @@ def test_requests_wait_ten_seconds_at_most_in_all() -> None:
     of(scene, prober=FakeProbe(answers=False))
 
 
+def test_a_later_server_that_does_not_answer_delays_requests_by_ten_seconds_at_most() -> None:
+    async def scene(loop: ManualLoop, client: FakeReachable, reach: Reach) -> None:
+        assert client.prober
+        await reach.wait(60)
+        client.servers = frozenset({b"2"})
+        client.prober.answers = False
+        waiting = asyncio.ensure_future(reach.wait(60))
+        await loop.advance(9.9)
+        assert not waiting.done()
+        await loop.advance(0.1)
+        assert waiting.done()
+
+    of(scene)
+
+
+def test_a_server_is_reached_where_one_that_did_not_answer_has_left() -> None:
+    async def scene(loop: ManualLoop, client: FakeReachable, reach: Reach) -> None:
+        crashed = client.prober
+        assert crashed
+        reach.start()
+        await loop.advance(10)
+        # The parameter services of a node that has left are never connected.
+        other = client.prober = FakeProbe(answers=False)
+        client.servers = frozenset({b"2"})
+        waiting = asyncio.ensure_future(reach.wait())
+        await loop.advance(0)
+        await loop.advance(0.02)
+        assert crashed.closed == 1
+        assert other.reaching
+        assert not waiting.done()
+        other.reaching[-1].set_result(None)
+        await waiting
+
+    of(scene, prober=FakeProbe(is_ready=False))
+
+
 def test_a_server_that_comes_later_is_reached_too() -> None:
     async def scene(_: ManualLoop, client: FakeReachable, reach: Reach) -> None:
         assert client.prober

@@ -9,6 +9,7 @@ client that was made later shows that those before were found, too.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from minirospy.errors import BridgeError
@@ -47,6 +48,7 @@ class Reach:
     def __init__(self, client: Reachable) -> None:
         self._client = client
         self._reached: frozenset[bytes] | None = None
+        self._wanted: frozenset[bytes] = frozenset()
         self._reaching: asyncio.Task[None] | None = None
         self._ready_at: float | None = None
 
@@ -66,7 +68,8 @@ class Reach:
             return
         self.start()
         assert self._reaching
-        if self._ready_at is not None:
+        seconds = min(seconds, _MOST_SECONDS)
+        if self._ready_at is not None and self._wanted <= servers:
             spent = asyncio.get_running_loop().time() - self._ready_at
             seconds = min(seconds, _MOST_SECONDS - spent)
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
@@ -78,17 +81,24 @@ class Reach:
             await asyncio.gather(self._reaching, return_exceptions=True)
 
     async def _reach(self) -> None:
-        while not self._client.is_ready:
-            await asyncio.sleep(_LOOK_SECONDS)
-        servers = self._client.servers
-        if servers is not None:
-            probe = await self._probe()
-            if probe:
-                try:
-                    await _answered(probe)
-                finally:
-                    probe.close()
-        self._reached = servers
+        while True:
+            while not self._client.is_ready:
+                await asyncio.sleep(_LOOK_SECONDS)
+            servers = self._client.servers
+            if servers is None or await self._has_reached(servers):
+                self._reached = servers
+                return
+
+    async def _has_reached(self, servers: frozenset[bytes]) -> bool:
+        """Wait until servers are reached, as far as they can be; return False where one has left before."""
+        self._wanted = servers
+        probe = await self._probe()
+        if probe is None:
+            return True
+        try:
+            return await _answered(probe, lambda: servers <= (self._client.servers or frozenset()))
+        finally:
+            probe.close()
 
     async def _probe(self) -> Ros2Probe | None:
         loop = asyncio.get_running_loop()
@@ -102,9 +112,10 @@ class Reach:
         return None
 
 
-async def _answered(probe: Ros2Probe) -> None:
+async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = _AGAIN_SECONDS
-    while True:
+    # The services of a node that has left are never connected again: without this it would be waited for without an end.
+    while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
             continue
@@ -116,5 +127,6 @@ async def _answered(probe: Ros2Probe) -> None:
             # The requests that follow will have the same reason.
             await asyncio.sleep(pause)
         else:
-            return
+            return True
         pause = min(2 * pause, _SLOWEST_SECONDS)
+    return False
