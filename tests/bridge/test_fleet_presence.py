@@ -15,14 +15,14 @@ class Fleet:
 
     def __init__(self) -> None:
         self.tokens: set[str] = {"a", "b"}
-        self.answering: set[str] = {"a", "b"}
+        self.answering: set[str] | None = {"a", "b"}
         self.queries = 0
         self.changes = 0
         self.presence = Presence(self._query, lambda: self.tokens, self._changed)
 
-    async def _query(self) -> set[str]:
+    async def _query(self) -> set[str] | None:
         self.queries += 1
-        return set(self.answering)
+        return self.answering
 
     def _changed(self) -> None:
         self.changes += 1
@@ -100,5 +100,28 @@ def test_nothing_is_sent_without_robots() -> None:
         fleet.tokens = set()
         await loop.advance(60)
         assert not fleet.queries
+
+    of(scene)
+
+
+def test_a_query_that_cannot_be_sent_says_nothing_of_any_robot() -> None:
+    async def scene(loop: ManualLoop, fleet: Fleet) -> None:
+        fleet.answering = {"a"}
+        await loop.advance(60)
+        fleet.answering = None
+        await loop.advance(60)
+        fleet.answering = {"a"}
+        for seconds in (60, 5):
+            await loop.advance(seconds)
+        assert not fleet.presence.lost, "b has never answered"
+
+        # One that is lost stays so.
+        fleet.answering = set()
+        for seconds in (60, 5):
+            await loop.advance(seconds)
+        assert fleet.presence.lost == {"a"}
+        fleet.answering = None
+        await loop.advance(10)
+        assert fleet.presence.lost == {"a"}
 
     of(scene)

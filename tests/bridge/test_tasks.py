@@ -17,6 +17,7 @@ from minirospy.bridge.fleet.exporter import Exporter
 from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
 from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.keys import Claim
+from minirospy.bridge.fleet.network import QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.graph import SharedGraph
 from minirospy.bridge.ros2.bridge import Ros2Bridge
@@ -152,6 +153,18 @@ def test_watch_of_the_fleets_robots_goes_on(
     monkeypatch.setattr("minirospy.bridge.fleet.importer._LOOK_SECONDS", 0.01)
     asyncio.run(run())
     assert len(reported(caplog)) == 1
+
+
+def test_query_of_the_fleet_that_fails_is_no_answer_of_any_robot() -> None:
+    async def fail(*_: object, **__: object) -> None:
+        raise QueryFailed("the session has ended")
+
+    async def run() -> None:
+        made = importer()
+        made._network.queries = fail  # type: ignore[assignment]
+        assert await made._answering() is None
+
+    asyncio.run(run())
 
 
 def test_robot_that_cannot_be_shown_keeps_no_other_away(

@@ -283,14 +283,14 @@ class Importer:
             for topic in list(shown.topics.values()):
                 topic.look(snapshot)
 
-    async def _answering(self) -> list[str]:
-        """Query all gateways of the fleet; return those that answer."""
+    async def _answering(self) -> list[str] | None:
+        """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
-            return list(self.contents.gateways)
+            return None
         return [key.removeprefix(start) for key in answers]
 
     async def _measure(self, shown: ImportedRobot) -> None:

@@ -24,12 +24,13 @@ class Presence:
 
     def __init__(
         self,
-        query: Callable[[], Awaitable[Collection[str]]],
+        query: Callable[[], Awaitable[Collection[str] | None]],
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query`` all; it returns those that answered in time. ``gateways``: those that have tokens.
+        """``query`` all; it returns those that answered in time, None where none could be queried.
 
+        ``gateways``: those that have tokens.
         ``changed`` is called when one is lost, or there again.
         """
         self.lost: frozenset[str] = frozenset()
@@ -68,9 +69,11 @@ class Presence:
         for number in range(_ROUNDS if present else 0):
             if number:
                 await asyncio.sleep(_ROUND_SECONDS)
-            answers = set(await self._query())
-            self._answered |= answers & present
-            missing -= answers
+            answers = await self._query()
+            if answers is None:
+                return
+            self._answered |= present.intersection(answers)
+            missing.difference_update(answers)
             if missing <= self.lost:
                 break
         lost = frozenset(missing)
