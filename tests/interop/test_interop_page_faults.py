@@ -8,6 +8,7 @@ from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+from tests.interop.test_interop_reconfigure_page import page_functions
 
 __all__ = ["browse", "serve"]
 
@@ -89,6 +90,39 @@ def test_values_that_a_type_does_not_hold_are_refused_with_their_fields() -> Non
         "on: neither true nor false", "name: not a text", "stamp: -2 does not fit into uint32",
         "points[1].y: there is no such field; there is x", "points[0]: not an object",
     ]  # fmt: skip
+
+
+@needs_node
+def test_message_with_a_field_called_length_is_encoded() -> None:
+    found = run_script(
+        "encode, decode, parseDefinition",
+        "js/ros1.js",
+        """const text = "float64 length\\nP[] parts\\n" + "=".repeat(80) + "\\nMSG: p/P\\nint32 length\\n";
+        const definition = parseDefinition("p/T", text);
+        return decode(definition, encode(definition, { length: 1.5, parts: [{ length: 2 }] }));""",
+    )
+    assert found == {"length": 1.5, "parts": [{"length": 2}]}
+
+
+@needs_node
+def test_message_with_a_field_called_length_is_not_shown_as_an_array() -> None:
+    rod = {"length": 4_000_000_000, "name": "a"}
+    found = page_functions(
+        ("dom", "shown", [rod]),
+        ("views/services", "yaml", [{"rod": rod}]),
+        ("widgets", "valueAt", [{"rod": {"length": 3}}, ["rod"]]),
+        ("widgets", "valueAt", [{"rod": rod}, ["rod", {"from": 0, "to": 2}]]),
+    )
+    assert found == ["{length: 4000000000, name: a}", 'rod:\n  length: 4000000000\n  name: "a"', 3, None]
+    points = run_script(
+        "select, parseSteps",
+        "js/paths.js",
+        f"""const points = [];
+        const found = (label, number) => points.push([label, number]);
+        for (const path of ["", "/length", "[0]"]) select({rod}, parseSteps(path), found);
+        return points;""",
+    )
+    assert points == [["/length", 4_000_000_000], ["/length", 4_000_000_000]]
 
 
 DOCK = """(async () => {

@@ -1,6 +1,7 @@
 // Elements. Text of topics, nodes and log lines always goes in by textContent: it never becomes HTML.
 // What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of setText, by t().
 
+import { isList } from "./ros1.js";
 import { t } from "./texts.js";
 
 const SPOKEN = new Set(["title", "aria-label", "placeholder", "label"]);
@@ -131,7 +132,7 @@ export function shown(value, most = 120) {
   let text;
   if (typeof value === "string") text = value;
   else if (typeof value === "number") text = number(value);
-  else if (value !== null && typeof value === "object" && value.length !== undefined) {
+  else if (isList(value)) {
     const some = Array.from({ length: Math.min(value.length, 12) }, (_, index) => shown(value[index], 20));
     text = `[${some.join(", ")}${value.length > some.length ? ", …" : ""}] (${value.length})`;
   } else if (value !== null && typeof value === "object") {

@@ -1,7 +1,7 @@
 // Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the elements with
 // a value: "/markers/markers[:]{ns=='goal'}{id>=2}/pose/position/x". Pure.
 
-import { isNumeric } from "./ros1.js";
+import { isList, isNumeric } from "./ros1.js";
 
 const MOST_VALUES = 50; // of one path, as of a whole array
 const MOST_TESTED = 10_000; // elements
@@ -72,7 +72,7 @@ export function select(value, steps, found, label = "", depth = 0) {
     }
   } else if (step.test) {
     if (step.test(value)) select(value, steps, found, label + step.text, depth + 1);
-  } else if (value?.length === undefined || typeof value === "string") {
+  } else if (!isList(value)) {
     return;
   } else if (typeof step === "number") {
     const index = step < 0 ? value.length + step : step;
@@ -101,7 +101,7 @@ function leaves(value, found, label) {
   if (number !== null) {
     found(label, number);
   } else if (value !== null && typeof value === "object") {
-    if (value.length !== undefined) {
+    if (isList(value)) {
       for (let index = 0; index < Math.min(value.length, MOST_VALUES); index++) {
         const each = numberOf(value[index]);
         if (each !== null) found(`${label}[${index}]`, each);

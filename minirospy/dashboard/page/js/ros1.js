@@ -247,7 +247,7 @@ function whyNotTime(type, { secs, nsecs }) {
 }
 
 function writeMessage(writer, definition, value, path) {
-  if (typeof value !== "object" || value === null || typeof value.length === "number") throw new MessageError(`${path || definition.name}: not an object`);
+  if (typeof value !== "object" || value === null || isList(value)) throw new MessageError(`${path || definition.name}: not an object`);
   for (const name of Object.keys(value)) {
     if (!definition.fields.some((field) => field.name === name)) {
       throw new MessageError(`${path ? `${path}.` : ""}${name}: there is no such field; there is ${definition.fields.map((field) => field.name).join(", ") || "none"}`);
@@ -261,7 +261,7 @@ function writeMessage(writer, definition, value, path) {
       continue;
     }
     const items = given ?? new Array(field.length ?? 0).fill(undefined);
-    if (typeof items !== "object" || typeof items.length !== "number") throw new MessageError(`${where}: not an array`);
+    if (!isList(items)) throw new MessageError(`${where}: not an array`);
     if (field.length !== null && items.length !== field.length) {
       throw new MessageError(`${where}: ${items.length} values, where ${field.length} are wanted`);
     }
@@ -307,6 +307,11 @@ export function zeroOf(definition) {
     found[field.name] = field.isArray ? Array.from({ length: field.length ?? 0 }, one) : one();
   }
   return found;
+}
+
+/** Return whether a value of a message is an array: a message may have a field called "length", too. */
+export function isList(value) {
+  return Array.isArray(value) || ArrayBuffer.isView(value);
 }
 
 /** Return whether a field's type is a number, a bool or a time: what can be plotted. */

@@ -1,6 +1,7 @@
 // The small panels: their settings as text in links, the value of a field of any type, the message that sets one. Pure.
 
 import { numberOf, parseSteps } from "./paths.js";
+import { isList } from "./ros1.js";
 
 /** Kind -> what it does, and its settings with their usual values. */
 export const KINDS = {
@@ -43,10 +44,11 @@ export function valueAt(message, steps) {
   for (const step of steps) {
     if (value === null || typeof value !== "object") return undefined;
     if (typeof step === "string") value = Object.hasOwn(value, step) ? value[step] : undefined;
+    else if (!isList(value)) return undefined;
     else if (typeof step === "number") value = value[step < 0 ? value.length + step : step];
     else value = Array.from(value).slice(step.from, step.to);
   }
-  while (value !== null && typeof value === "object" && value.length === undefined && numberOf(value) === null) {
+  while (value !== null && typeof value === "object" && !isList(value) && numberOf(value) === null) {
     const inner = Object.values(value);
     if (inner.length !== 1) break;
     [value] = inner;

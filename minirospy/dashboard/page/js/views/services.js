@@ -2,6 +2,7 @@
 
 import { fill, h, quoted, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
+import { isList } from "../ros1.js";
 import { t } from "../texts.js";
 
 export class Services {
@@ -79,8 +80,8 @@ export class Services {
 
 /** Return a message as rosservice prints it. */
 export function yaml(value, indent = "") {
-  if (value !== null && typeof value === "object" && value.length === undefined) {
-    return Object.entries(value).map(([name, each]) => (each !== null && typeof each === "object" && each.length === undefined
+  if (value !== null && typeof value === "object" && !isList(value)) {
+    return Object.entries(value).map(([name, each]) => (each !== null && typeof each === "object" && !isList(each)
       ? `${indent}${name}:\n${yaml(each, `${indent}  `)}` : `${indent}${name}: ${plain(each)}`)).join("\n");
   }
   return `${indent}${plain(value)}`;

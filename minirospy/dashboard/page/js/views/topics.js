@@ -3,6 +3,7 @@
 import { bandwidth, fill, h, setText, shown } from "../dom.js";
 import { numberOf } from "../paths.js";
 import { Rate } from "../rates.js";
+import { isList } from "../ros1.js";
 import { t } from "../texts.js";
 
 // Measuring these costs the bandwidth of a camera: only when opened.
@@ -201,7 +202,7 @@ export class Tree {
   }
 
   show(message) {
-    const isArray = message.length !== undefined;
+    const isArray = isList(message);
     const names = isArray ? Array.from({ length: Math.min(message.length, MOST_ITEMS) }, (_, index) => index) : Object.keys(message);
     const wanted = new Set(names);
     for (const [name, item] of this.items) {
@@ -243,10 +244,10 @@ class Field {
       return;
     }
     // Messages start open, arrays closed.
-    this.isOpen ??= value.length === undefined;
+    this.isOpen ??= !isList(value);
     this.head.disabled = false;
     this.head.setAttribute("aria-expanded", String(this.isOpen));
-    setText(this.value, this.isOpen ? (value.length === undefined ? "" : t("{count} values", { count: value.length }) + (value.length > MOST_ITEMS ? t(", the first {count} are shown", { count: MOST_ITEMS }) : "")) : shown(value));
+    setText(this.value, this.isOpen ? (!isList(value) ? "" : t("{count} values", { count: value.length }) + (value.length > MOST_ITEMS ? t(", the first {count} are shown", { count: MOST_ITEMS }) : "")) : shown(value));
     if (this.isOpen) {
       if (!this.tree) {
         this.tree = new Tree(this.path);
