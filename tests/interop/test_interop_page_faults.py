@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from minirospy.introspect.values import parse_value
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
@@ -102,6 +103,16 @@ def test_message_with_a_field_called_length_is_encoded() -> None:
         return decode(definition, encode(definition, { length: 1.5, parts: [{ length: 2 }] }));""",
     )
     assert found == {"length": 1.5, "parts": [{"length": 2}]}
+
+
+@needs_node
+def test_parameter_is_shown_as_text_that_is_read_as_the_same_value() -> None:
+    values: list[object] = [
+        1e-7, [1e-7, -2.5e-9, 1e21, 3], {"gain": 1e-9, "1e5": "1e-7"}, "1e-7", 'a"1e5\\', "yes", True,
+        ["a\u2028b", "\x7f\x9f\u0085", "\ufeff"],
+    ]  # fmt: skip
+    texts = page_functions(*(("views/parameters", "textOf", [value]) for value in values))
+    assert [parse_value(text) for text in texts] == values
 
 
 @needs_node

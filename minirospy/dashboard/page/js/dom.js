@@ -122,9 +122,9 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Return a text in quotes, as JSON: no letter in it turns the direction of what is around it. */
-export function quoted(text) {
-  return JSON.stringify(text).replace(/[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g, (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`);
+/** Return a value as JSON that YAML reads, too; no letter of its texts turns the direction of what is around it. */
+export function quoted(value) {
+  return JSON.stringify(value).replace(/[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]/g, (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`);
 }
 
 /** Return a value as one line of text for people; long arrays are cut. */

@@ -43,7 +43,7 @@ export class Parameters {
         row = this.makeRow(name);
         this.rows.set(name, row);
       }
-      const text = quoted(this.link.parameters.get(name));
+      const text = textOf(this.link.parameters.get(name));
       // What a person is typing stays.
       if (row.text !== text && document.activeElement !== row.input) row.input.value = text;
       row.text = text;
@@ -126,6 +126,12 @@ export class Parameters {
     if (!await this.set(name.startsWith("/") ? name : `/${name}`, this.value.value, this.typed)) return;
     this.name.value = this.value.value = "";
   }
+}
+
+/** Return a value as text of which the server reads the same value. */
+export function textOf(value) {
+  // JSON, but for numbers such as 1e-7: to YAML 1.1 they are texts.
+  return quoted(value).replace(/"(?:[^"\\]|\\.)*"|(-?\d+)(\.\d+)?e/g, (all, digits, fraction) => (digits === undefined || fraction ? all : `${digits}.0e`));
 }
 
 function say(element, text, isWrong = false) {
