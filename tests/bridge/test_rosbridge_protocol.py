@@ -8,6 +8,7 @@ import json
 import math
 import re
 import struct
+import sys
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +24,7 @@ from std_srvs.srv import SetBool
 
 from minirospy.aio.handle import serialized
 from minirospy.bridge.rosbridge import conversion, png, protocol
+from minirospy.bridge.rosbridge.cbor import encode_cbor
 from minirospy.bridge.rosbridge.protocol import OperationError, StatusLevel, Subscribe
 from minirospy.bridge.rosbridge.subscription import Fragments, Merged, Pacer, Room, merge
 from minirospy.errors import BridgeProtocolError
@@ -353,6 +355,20 @@ def test_png_of_other_things_is_refused() -> None:
     for data in ("%%%", base64.b64encode(b"\x89PNG\r\n\x1a\nrest").decode(), png.encode("x")[:40]):
         with pytest.raises(BridgeProtocolError, match=r"not a PNG of text(?!.*0x)"):
             png.decode(data)
+
+
+@pytest.mark.parametrize(
+    ("module", "encode", "extra"), [("cbor2", encode_cbor, "web"), ("PIL", png.encode, "images")]
+)
+def test_missing_library_is_named_without_paths_of_the_server(
+    module: str, encode: Callable[[str], object], extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(sys, "executable", "/home/me/.venv/bin/python")
+    with pytest.raises(BridgeProtocolError) as error:
+        encode("x")
+    assert f"minirospy[{extra}]" in str(error.value)
+    assert "/home/me" not in str(error.value)
 
 
 # --- subscriptions

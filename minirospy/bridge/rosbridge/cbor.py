@@ -12,7 +12,6 @@ from io import BytesIO
 from typing import Any
 
 from minirospy.errors import BridgeProtocolError
-from minirospy.installation import install_command
 
 __all__ = ["TYPED_ARRAYS", "decode_cbor", "encode_cbor", "typed_array"]
 
@@ -107,7 +106,8 @@ def _library() -> Any:
     try:
         import cbor2
     except ImportError as error:
+        # No command: it names the server's interpreter, and this goes to clients.
         raise BridgeProtocolError(
-            f"compression cbor needs the library cbor2 on the server: {install_command('minirospy[web]')}"
+            "compression cbor needs the library cbor2: install minirospy[web] on the server"
         ) from error
     return cbor2

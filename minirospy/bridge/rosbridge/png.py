@@ -12,7 +12,6 @@ from io import BytesIO
 from typing import Any
 
 from minirospy.errors import BridgeProtocolError
-from minirospy.installation import install_command
 
 __all__ = ["decode", "encode"]
 
@@ -50,7 +49,8 @@ def _pillow() -> Any:
     try:
         from PIL import Image
     except ImportError as error:
+        # No command: it names the server's interpreter, and this goes to clients.
         raise BridgeProtocolError(
-            f"compression png needs Pillow on the server: {install_command('minirospy[images]')}"
+            "compression png needs Pillow: install minirospy[images] on the server"
         ) from error
     return Image
