@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 
 from minirospy.dashboard.files import FOLDER
+from minirospy.robots import joint_parameters
 
 JS = FOLDER / "js"
 STRING = r'"(?:[^"\\\n]|\\.)*"'
@@ -43,6 +45,7 @@ def test_every_text_is_in_the_table() -> None:
 
 def test_every_translation_is_used_and_has_the_same_values() -> None:
     known = set().union(*(literals(text) for text in SOURCES.values()))
+    known |= literals(inspect.getsource(joint_parameters))  # the view Joints shows why it has none
     for text, translation in german().items():
         assert text in known, text
         assert sorted(re.findall(r"\{\w+\}", text)) == sorted(re.findall(r"\{\w+\}", translation)), text
@@ -63,6 +66,18 @@ def test_no_view_sets_a_text_without_its_translation() -> None:
         if re.search(r"[A-Za-z]{2} ", found) and "$" not in found
     }
     assert bare == set()
+
+
+def test_every_error_of_the_codec_and_the_worker_is_in_the_table() -> None:
+    thrown = {
+        ast.literal_eval(each)
+        for name in ("ros1.js", "paths.js", "worker.js")
+        for call in re.findall(r"(?:Error|fail|reject)\((.*)", SOURCES[name])
+        for each in re.findall(STRING, call)
+        if re.search(r"[a-z]", each)
+    }
+    assert len(thrown) > 20
+    assert thrown - german().keys() == set()
 
 
 def test_no_display_of_the_scene_has_a_status_or_error_without_its_translation() -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
+from minirospy.dashboard.files import FOLDER
 from minirospy.introspect.values import parse_value
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import Page
@@ -134,6 +136,26 @@ def test_message_with_a_field_called_length_is_not_shown_as_an_array() -> None:
         return points;""",
     )
     assert points == [["/length", 4_000_000_000], ["/length", 4_000_000_000]]
+
+
+@needs_node
+def test_errors_of_the_codec_are_in_the_language_of_the_page() -> None:
+    found = run_script(
+        "chooseLanguage, errorText",
+        "js/texts.js",
+        rf"""const {{ encode, parseDefinition }} = await import({json.dumps((FOLDER / "js/ros1.js").as_uri())});
+        chooseLanguage("de");
+        const definition = parseDefinition("p/T", "uint8 small\nfloat64[2] pair\ntime stamp\nbool on\nstring name\n");
+        const attempt = (value) => {{ try {{ return encode(definition, value); }} catch (error) {{ return errorText(error); }} }};
+        return [...[{{ small: 300 }}, {{ small: 1.5 }}, {{ small: null }}, {{ small: "a" }}, {{ pair: [1] }}, {{ pair: 1 }},
+          {{ stamp: 5 }}, {{ on: "a" }}, {{ name: 3 }}, {{ other: 1 }}, [1]].map(attempt), errorText(new Error("{{name}}"))];""",
+    )
+    assert found == [
+        "small: 300 passt nicht in uint8", "small: 1.5 ist keine ganze Zahl", "small: null ist kein Wert", "small: keine Zahl",
+        "pair: 1 statt 2 Werte", "pair: keine Liste",
+        "stamp: nicht {secs, nsecs}", "on: weder true noch false", "name: kein Text",
+        "other: dieses Feld gibt es nicht; es gibt small, pair, stamp, on, name", "p/T: kein Objekt", "{name}",
+    ]  # fmt: skip
 
 
 DOCK = """(async () => {

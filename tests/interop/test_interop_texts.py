@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from geometry_msgs.msg import PoseWithCovariance
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool
 
@@ -115,6 +116,22 @@ def test_views_have_no_text_without_its_german_one(
     )
     left = [each for each in missing if each not in names and not any(word in each for word in data)]
     assert left == [], json.dumps(left)
+
+
+@needs_chromium
+def test_what_a_form_and_the_joints_refuse_is_said_in_german(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    publisher(served, "/where", PoseWithCovariance)
+    page = browse(address(served, "publish?topic=/where"))
+    page.wait_text("#state", "connected")
+    speak_german(page)
+    page.type("input[name=covariance]", "[1]")
+    page.click("button", "Einmal senden")
+    page.wait_text(".error", "covariance: 1 statt 36 Werte")
+    page.evaluate("location.hash = '#/joints'")
+    page.wait_text(".empty", "Der Parameter robot_description fehlt")
 
 
 @needs_chromium

@@ -1,6 +1,7 @@
 // The page's side of the worker: what the bridge offers, subscriptions, calls. Views get what they need from here.
 
 import { parseDefinition } from "./ros1.js";
+import { t, errorText } from "./texts.js";
 import { Tools } from "./tools.js";
 
 export class Link extends EventTarget {
@@ -85,16 +86,17 @@ export class Link extends EventTarget {
     },
     status: (status) => this.emit("notice", status),
     removeStatus: ({ ids }) => this.emit("withdrawn", ids),
-    answer: ({ id, response, error }) => {
+    answer: ({ id, response, error, errorValues }) => {
       const answer = this.answers.get(id);
       this.answers.delete(id);
-      if (error !== undefined) answer?.reject(new Error(error));
+      if (error !== undefined) answer?.reject(new Error(t(error, errorValues)));
       else answer?.resolve(response);
     },
     batch: ({ items }) => {
       // Handled before the next one is made, so a slow page makes batches larger, not more.
       try {
         for (const item of items) {
+          if (item.error !== undefined) item.error = t(item.error, item.errorValues);
           try {
             this.entries.get(item.key)?.(item);
           } catch (error) {
@@ -174,7 +176,7 @@ export class Link extends EventTarget {
       try {
         found = parseDefinition(type, text);
       } catch (error) {
-        this.emit("notice", { level: 1, message: `${type}: ${error.message}` });
+        this.emit("notice", { level: 1, message: `${type}: ${errorText(error)}` });
       }
       this.definitions.set(key, found);
     }

@@ -1,7 +1,7 @@
 // Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the elements with
 // a value: "/markers/markers[:]{ns=='goal'}{id>=2}/pose/position/x". Pure.
 
-import { isList, isNumeric } from "./ros1.js";
+import { TextError, isList, isNumeric } from "./ros1.js";
 
 const MOST_VALUES = 50; // of one path, as of a whole array
 const MOST_TESTED = 10_000; // elements
@@ -21,14 +21,8 @@ export function topicOf(path, topics) {
   return found;
 }
 
-/** A path that leads to no number; its text and the values in it can be translated. */
-export class PathError extends Error {
-  constructor(text, values) {
-    super(text.replace(/\{(\w+)\}/g, (all, name) => values[name] ?? all));
-    this.text = text;
-    this.values = values;
-  }
-}
+/** A path that leads to no number. */
+export class PathError extends TextError {}
 
 /** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws PathError. */
 export function parseSteps(text) {

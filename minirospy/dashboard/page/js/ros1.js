@@ -37,7 +37,16 @@ const MOST_EMPTY = 1_000_000; // elements without bytes, which no length of a me
 const TEXT = new TextDecoder();
 const BYTES = new TextEncoder();
 
-export class MessageError extends Error {}
+/** An error whose text, and the values in it, can be translated. */
+export class TextError extends Error {
+  constructor(text, values = {}) {
+    super(text.replace(/\{(\w+)\}/g, (all, name) => values[name] ?? all));
+    this.text = text;
+    this.values = values;
+  }
+}
+
+export class MessageError extends TextError {}
 
 function exact(value) {
   const number = Number(value);
@@ -69,9 +78,9 @@ export function parseDefinition(name, text) {
 
 function build(name, sections, done, open) {
   if (done.has(name)) return done.get(name);
-  if (open.has(name)) throw new MessageError(`the definition of ${name} contains itself`);
+  if (open.has(name)) throw new MessageError("the definition of {name} contains itself", { name });
   const section = sections.get(name);
-  if (!section) throw new MessageError(`the definition of ${name} is missing`);
+  if (!section) throw new MessageError("the definition of {name} is missing", { name });
   open.add(name);
   const found = { name, fields: [], constants: [] };
   for (const raw of section.lines) {
@@ -84,7 +93,7 @@ function build(name, sections, done, open) {
       continue;
     }
     const field = /^([A-Za-z][\w/]*)(\[(\d*)\])?\s+([A-Za-z]\w*)$/.exec(line);
-    if (!field) throw new MessageError(`${name}: "${line}" is not a field`);
+    if (!field) throw new MessageError("{name}: \"{line}\" is not a field", { name, line });
     const [, type, brackets, length, fieldName] = field;
     const isMessage = type !== "string" && !Object.hasOwn(PRIMITIVES, type);
     found.fields.push({
@@ -230,27 +239,27 @@ export function encode(definition, value) {
 
 const INTEGER = /^(u?)int(\d+)$/;
 
-/** Return why a number is not one of a type; empty where it is. What does not fit would become another number. */
-function whyNot(type, value) {
-  if (type === "float32") return Number.isFinite(value) && !Number.isFinite(Math.fround(value)) ? `${value} does not fit into ${type}` : "";
+/** Throw MessageError where a number is not one of a type: what does not fit would become another number. */
+function checkNumber(name, type, value) {
+  const text = String(value);
   const integer = INTEGER.exec({ byte: "int8", char: "uint8" }[type] ?? type);
-  if (!integer) return "";
-  if (typeof value === "number" && !Number.isInteger(value)) return `${value} is not a whole number`;
-  const bits = Number(integer[2]);
-  return BigInt(value) === (integer[1] ? BigInt.asUintN : BigInt.asIntN)(bits, BigInt(value)) ? "" : `${value} does not fit into ${type}`;
+  if (integer && typeof value === "number" && !Number.isInteger(value)) throw new MessageError("{name}: {text} is not a whole number", { name, text });
+  const fits = integer ? BigInt(value) === (integer[1] ? BigInt.asUintN : BigInt.asIntN)(Number(integer[2]), BigInt(value))
+    : type !== "float32" || !Number.isFinite(value) || Number.isFinite(Math.fround(value));
+  if (!fits) throw new MessageError("{name}: {text} does not fit into {type}", { name, text, type });
 }
 
-function whyNotTime(type, { secs, nsecs }) {
-  if (typeof secs !== "number" || typeof nsecs !== "number") return "not {secs, nsecs}";
-  const part = type === "time" ? "uint32" : "int32";
-  return whyNot(part, secs) || whyNot(part, nsecs);
+function checkTime(name, type, { secs, nsecs }) {
+  if (typeof secs !== "number" || typeof nsecs !== "number") throw new MessageError("{name}: not {secs, nsecs}", { name });
+  for (const each of [secs, nsecs]) checkNumber(name, type === "time" ? "uint32" : "int32", each);
 }
 
 function writeMessage(writer, definition, value, path) {
-  if (typeof value !== "object" || value === null || isList(value)) throw new MessageError(`${path || definition.name}: not an object`);
+  if (typeof value !== "object" || value === null || isList(value)) throw new MessageError("{name}: not an object", { name: path || definition.name });
   for (const name of Object.keys(value)) {
     if (!definition.fields.some((field) => field.name === name)) {
-      throw new MessageError(`${path ? `${path}.` : ""}${name}: there is no such field; there is ${definition.fields.map((field) => field.name).join(", ") || "none"}`);
+      const fields = definition.fields.map((field) => field.name).join(", ");
+      throw new MessageError(fields ? "{name}: there is no such field; there is {fields}" : "{name}: there is no such field; there is none", { name: path ? `${path}.${name}` : name, fields });
     }
   }
   for (const field of definition.fields) {
@@ -261,21 +270,21 @@ function writeMessage(writer, definition, value, path) {
       continue;
     }
     const items = given ?? new Array(field.length ?? 0).fill(undefined);
-    if (!isList(items)) throw new MessageError(`${where}: not an array`);
+    if (!isList(items)) throw new MessageError("{name}: not an array", { name: where });
     if (field.length !== null && items.length !== field.length) {
-      throw new MessageError(`${where}: ${items.length} values, where ${field.length} are wanted`);
+      throw new MessageError("{name}: {count} values, where {wanted} are wanted", { name: where, count: items.length, wanted: field.length });
     }
     if (field.length === null) writer.length(items.length);
     for (let index = 0; index < items.length; index++) writeOne(writer, field, items[index], `${where}[${index}]`);
   }
 }
 
-function writeOne(writer, field, value, where) {
-  if (value === null) throw new MessageError(`${where}: null is not a value`);
+function writeOne(writer, field, value, name) {
+  if (value === null) throw new MessageError("{name}: null is not a value", { name });
   if (field.message) {
-    writeMessage(writer, field.message, value ?? {}, where);
+    writeMessage(writer, field.message, value ?? {}, name);
   } else if (field.type === "string") {
-    if (value !== undefined && typeof value !== "string") throw new MessageError(`${where}: not a text`);
+    if (value !== undefined && typeof value !== "string") throw new MessageError("{name}: not a text", { name });
     const bytes = BYTES.encode(value ?? "");
     writer.length(bytes.length);
     const start = writer.room(bytes.length);
@@ -284,17 +293,16 @@ function writeOne(writer, field, value, where) {
     const { size, set, zero } = PRIMITIVES[field.type];
     const checked = value ?? zero;
     if (typeof zero === "number" && typeof checked !== "number" && typeof checked !== "bigint" && typeof checked !== "boolean") {
-      throw new MessageError(`${where}: not a number`);
+      throw new MessageError("{name}: not a number", { name });
     }
-    if (typeof zero === "boolean" && typeof checked !== "boolean" && checked !== 0 && checked !== 1) throw new MessageError(`${where}: neither true nor false`);
-    const why = typeof checked === "object" ? whyNotTime(field.type, checked) : whyNot(field.type, checked);
-    if (why) throw new MessageError(`${where}: ${why}`);
-    if (typeof zero === "object" && typeof checked !== "object") throw new MessageError(`${where}: not {secs, nsecs}`);
+    if (typeof zero === "boolean" && typeof checked !== "boolean" && checked !== 0 && checked !== 1) throw new MessageError("{name}: neither true nor false", { name });
+    if (typeof zero === "object") checkTime(name, field.type, checked);
+    else checkNumber(name, field.type, checked);
     const start = writer.room(size);
     try {
       set(writer.view, start, checked);
     } catch (error) {
-      throw new MessageError(`${where}: ${error.message}`);
+      throw new MessageError(`${name}: ${error.message}`);
     }
   }
 }

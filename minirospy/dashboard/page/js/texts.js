@@ -15,6 +15,9 @@ export function chooseLanguage(wanted, offered = []) {
   table = TABLES[language];
 }
 
+/** Return the text of an error; a TextError's is translated. */
+export const errorText = ({ message, text, values }) => (text === undefined ? message : t(text, values));
+
 const missing = new Set();
 const made = new Set();
 let isWatched = false;

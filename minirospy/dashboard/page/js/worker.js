@@ -2,7 +2,7 @@
 // Nothing waits here without a bound: where the page is slow, a topic's older messages give way to newer ones.
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
-import { decode, encode, parseDefinition } from "./ros1.js";
+import { TextError, decode, encode, parseDefinition } from "./ros1.js";
 import { PathError, numericPaths, parseSteps, select, topicOf } from "./paths.js";
 
 const FLUSH_MS = 33;
@@ -32,6 +32,9 @@ let isScheduled = false;
 let isAwaited = false; // a batch that the page has not handled yet
 
 const post = (message, transfer = []) => self.postMessage(message, transfer);
+/** Return the fields by which the page is notified of an error, in its language. */
+const faultOf = ({ message, text = message, values = null }) => ({ error: text, errorValues: values });
+const failing = (id) => (error) => post({ kind: "answer", id, ...faultOf(typeof error === "string" ? { message: error } : error) });
 const send = (fields) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(fields)); };
 
 // --- the connection
@@ -226,7 +229,7 @@ function subscribeTopic(topic) {
   try {
     topic.definition = definitionOf(channel.schemaName, channel.schema);
   } catch (error) {
-    topic.failure = error.message;
+    topic.failure = error;
   }
   bySubscription.set(topic.subscription, topic);
   send({ op: "subscribe", subscriptions: [{ id: topic.subscription, channelId: channel.id }] });
@@ -268,7 +271,7 @@ function give(topic, entry, seconds, bytes, decoded) {
   }
   let message = decoded;
   try {
-    if (!topic.definition) throw new Error(topic.failure);
+    if (!topic.definition) throw topic.failure;
     message ??= decode(topic.definition, bytes);
   } catch (error) {
     entry.error = error;
@@ -341,10 +344,10 @@ function itemOf(entry, transfer) {
     entry.count = entry.bytes = 0;
     if (!entry.isCounted) {
       try {
-        if (!topic.definition) throw new Error(topic.failure);
+        if (!topic.definition) throw topic.failure;
         item.message = decode(topic.definition, bytes);
       } catch (error) {
-        item.error = error.message;
+        Object.assign(item, faultOf(error));
       }
     }
     return item;
@@ -365,8 +368,7 @@ function itemOf(entry, transfer) {
     return item;
   }
   if (entry.error) {
-    const { message, text, values } = entry.error;
-    Object.assign(item, { error: message, errorText: text, errorValues: values });
+    Object.assign(item, faultOf(entry.error));
     entry.error = null;
     return item;
   }
@@ -376,14 +378,14 @@ function itemOf(entry, transfer) {
 // --- services, publishing, parameters
 
 function call({ id, service: name, request }) {
-  const fail = (error) => post({ kind: "answer", id, error });
+  const fail = failing(id);
   const service = services.get(name);
-  if (!service) return fail(`there is no service ${name}, or it may not be called`);
+  if (!service) return fail(new TextError("there is no service {name}, or it may not be called", { name }));
   let body;
   try {
     body = encode(definitionOf(`${service.type}Request`, service.request.schema), request);
   } catch (error) {
-    return fail(error.message);
+    return fail(error);
   }
   const callId = nextId++;
   calls.set(callId, {
@@ -392,7 +394,7 @@ function call({ id, service: name, request }) {
       try {
         post({ kind: "answer", id, response: decode(definitionOf(`${service.type}Response`, service.response.schema), bytes) });
       } catch (error) {
-        fail(error.message);
+        fail(error);
       }
     },
   });
@@ -409,7 +411,7 @@ function call({ id, service: name, request }) {
 
 /** Fetch a file of a package. */
 function asset({ id, uri }) {
-  const fail = (error) => post({ kind: "answer", id, error });
+  const fail = failing(id);
   if (socket?.readyState !== WebSocket.OPEN) return fail("the connection is lost");
   const requestId = nextId++;
   calls.set(requestId, { reject: fail, resolve: (bytes) => post({ kind: "answer", id, response: bytes }, [bytes.buffer]) });
@@ -432,14 +434,14 @@ function publication({ topic, type, schema }) {
 }
 
 function publish({ id, topic, type, schema, message }) {
-  const fail = (error) => post({ kind: "answer", id, error });
+  const fail = failing(id);
   if (socket?.readyState !== WebSocket.OPEN) return fail("the connection is lost");
   if (!capabilities.has("clientPublish")) return fail("publishing is not allowed: this token is read-only");
   let body;
   try {
     body = encode(definitionOf(type, schema), message);
   } catch (error) {
-    return fail(error.message);
+    return fail(error);
   }
   const channel = publication({ topic, type, schema });
   const frame = new Uint8Array(5 + body.length);

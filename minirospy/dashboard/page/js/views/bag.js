@@ -5,7 +5,7 @@ import { Door } from "../door.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { decode } from "../ros1.js";
-import { language, t } from "../texts.js";
+import { language, t, errorText } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
@@ -463,7 +463,7 @@ class Player {
         } else this.draw();
       }
     } catch (failure) {
-      error = failure.message;
+      error = errorText(failure);
     }
     if (isMoment && error) this.cards.get(row.name)?.fail(error);
   }

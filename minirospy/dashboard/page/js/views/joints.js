@@ -67,7 +67,7 @@ export class Joints {
       this.list.append(row.element);
     }
     this.list.hidden = !this.rows.size;
-    setText(this.empty, joints ? (this.rows.size ? "" : t("This robot has no joint that can be set.")) : why);
+    setText(this.empty, joints ? (this.rows.size ? "" : t("This robot has no joint that can be set.")) : t(why));
     setText(this.about, joints ? [joints.robot, t("{topic} at {rate} Hz while it is published", { topic: joints.topic, rate: joints.rate }), joints.sources.length ? t("follows {sources}", { sources: joints.sources.join(", ") }) : "", ...joints.warnings].filter(Boolean).join(" · ") : "");
     setText(this.publishText, joints ? t("Publish {topic}", { topic: joints.topic }) : t("Publish"));
     this.enable();

@@ -2,7 +2,7 @@
 
 import { fill, h, setText, shown, svg, uniqueId } from "../dom.js";
 import { numberOf, numericPaths } from "../paths.js";
-import { t } from "../texts.js";
+import { t, errorText } from "../texts.js";
 import { COLORS, KINDS, MOST_PANELS, TYPES, isSame, messageWith, panelText, parsePanel, splitPath, valueAt } from "../widgets.js";
 
 const SEND_MS = 50; // between two messages of a slider that is moved
@@ -206,7 +206,7 @@ class Panel {
       if (!found && !spec.isService && !spec.type && KINDS[spec.kind].isWriter) found = this.subscribed();
       if (!found && !spec.isService && spec.type) found = [spec.path.replace(/\/data$/, ""), spec.path.endsWith("/data") ? ["data"] : []];
     } catch (error) {
-      this.say(error.text ? t(error.text, error.values) : error.message, true);
+      this.say(errorText(error), true);
       return;
     }
     if (!found) {

@@ -192,7 +192,7 @@ export class Plot {
 
   received(path, item) {
     if (item.error) {
-      this.problems.set(path, item.errorText ? t(item.errorText, item.errorValues) : item.error);
+      this.problems.set(path, item.error);
       this.showProblems();
     }
     for (const { label, times, values } of item.series ?? []) {
