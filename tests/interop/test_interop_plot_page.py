@@ -121,6 +121,47 @@ def test_filters_of_a_path_choose_elements() -> None:
 
 
 @needs_node
+def test_path_is_compared_with_the_type_of_its_topic() -> None:
+    body = r"""
+      const { parseDefinition } = await import(%s);
+      const definition = parseDefinition("p/T", "time stamp\nstring name\nfloat64[] list\nP[] points\nE empty\nuint8[3] bytes\n"
+        + "=".repeat(80) + "\nMSG: p/P\nint32 x\n" + "=".repeat(80) + "\nMSG: p/E\n");
+      const good = ["", "/stamp", "/stamp/secs", "/list", "/list[0]", "/list[1:]", "/points[:]{x>1}/x",
+        "/points[0]", "/bytes[-1]"];
+      const bad = ["/other", "/name", "/stamp/other", "/stamp[0]", "/list/x", "/list[0][0]", "/points",
+        "/points/x", "/points[0]/y", "/empty"];
+      return [good, bad].map(paths => paths.map(path => canLead(definition, parseSteps(path))));"""
+    good, bad = run_script("canLead, parseSteps", "js/paths.js", body % json.dumps(f"{JS}/ros1.js"))
+    assert good == [True] * 9
+    assert bad == [False] * 10
+
+
+@needs_chromium
+def test_path_that_is_wrong_is_refused_before_a_message_comes(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    publisher(served, "/path", Vector3)
+    page = browse(address(served, "plot?path=/path/x"))
+    page.wait_text(".series-missing .muted", "waiting for /path/x")
+    syntax = '" is not a field, nor an index, nor a filter as {id==1}'
+    for path, why in {
+        "/topic/rubbish[": f'"[{syntax}',
+        "/path/x[0": f'"[0{syntax}',
+        "/late/": f'"/{syntax}',
+        "/path/rubbish": "no number there; there is /path/x, /path/y, /path/z",
+    }.items():
+        page.type("form input", path)
+        page.click("form button", "Plot")
+        page.wait_text(".series-missing .error", f"{path}: {why}")
+    # What is right and not there waits.
+    page.type("form input", "/late[0:5]{a==1}.b/c")
+    page.click("form button", "Plot")
+    page.wait_text(".series-missing .muted", "waiting for /late[0:5]{a==1}.b/c")
+    assert page.evaluate("document.querySelectorAll('.series-missing .error').length") == 4
+
+
+@needs_node
 def test_topic_of_a_filtered_path_is_found() -> None:
     body = "return [topicOf('/a{on==true}/x', ['/a', '/a/b']), topicOf('/a/b[:]{id==1}/x', ['/a', '/a/b'])];"
     assert run_script("topicOf", "js/paths.js", body) == ["/a", "/a/b"]

@@ -6,6 +6,8 @@ import { TextError, isList, isNumeric } from "./ros1.js";
 const MOST_VALUES = 50; // of one path, as of a whole array
 const MOST_TESTED = 10_000; // elements
 
+const TIME_PARTS = ["secs", "nsecs"].map((name) => ({ name, type: "int32", isArray: false }));
+
 const TESTS = {
   "==": (one, other) => one === other, "!=": (one, other) => one !== other, "<": (one, other) => one < other,
   "<=": (one, other) => one <= other, ">": (one, other) => one > other, ">=": (one, other) => one >= other };
@@ -88,6 +90,26 @@ export function numberOf(value) {
     return value.secs + value.nsecs * 1e-9;
   }
   return null;
+}
+
+/** Return whether the steps may lead to a number in a message of this type. */
+export function canLead(definition, steps) {
+  let at = { message: definition, type: "", isArray: false };
+  for (const step of steps) {
+    if (step.test) continue;
+    if (typeof step === "string") {
+      const parts = at.type === "time" || at.type === "duration" ? TIME_PARTS : at.message?.fields ?? [];
+      const field = at.isArray ? null : parts.find(({ name }) => name === step);
+      if (!field) return false;
+      at = field;
+    } else if (at.isArray) {
+      at = { ...at, isArray: false };
+    } else {
+      return false;
+    }
+  }
+  if (!at.message) return isNumeric(at.type);
+  return !at.isArray && at.message.fields.some(({ type, isArray }) => isNumeric(type) && !isArray);
 }
 
 function leaves(value, found, label) {

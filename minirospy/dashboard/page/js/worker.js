@@ -3,7 +3,7 @@
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
 import { TextError, decode, encode, parseDefinition } from "./ros1.js";
-import { PathError, numericPaths, parseSteps, select, topicOf } from "./paths.js";
+import { PathError, canLead, numericPaths, parseSteps, select, topicOf } from "./paths.js";
 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
@@ -192,16 +192,26 @@ function subscribe(entry) {
 
 function resolvePath(entry) {
   const topic = topicOf(entry.path, channels.keys());
-  if (topic === null) return;
-  entry.topic = topic;
   try {
-    entry.steps = parseSteps(entry.path.slice(topic.length));
+    // Wrong syntax is refused before its topic is there.
+    entry.steps = parseSteps(entry.path.slice((topic ?? /^(\/\w+)*/.exec(entry.path)[0]).length));
   } catch (error) {
     entry.error = error;
     schedule();
     return;
   }
+  if (topic === null) return;
+  entry.topic = topic;
   use(entry);
+  const { definition } = topics.get(entry.place);
+  if (!definition || canLead(definition, entry.steps)) return;
+  entry.error = noNumber(topic, definition);
+  schedule();
+}
+
+function noNumber(topic, definition) {
+  const paths = numericPaths(definition, 3).map((path) => topic + path).join(", ");
+  return new PathError(paths ? "no number there; there is {paths}" : "no number there; there is none in this topic", { paths });
 }
 
 function use(entry) {
@@ -288,10 +298,7 @@ function give(topic, entry, seconds, bytes, decoded) {
     addPoint(entry, label, seconds, number);
   });
   entry.isFound ||= isFound;
-  if (!entry.isFound) {
-    const known = numericPaths(topic.definition, 3).map((path) => topic.name + path);
-    entry.error = known.length ? new PathError("no number there; there is {paths}", { paths: known.join(", ") }) : new PathError("no number there; there is none in this topic", {});
-  }
+  if (!entry.isFound) entry.error = noNumber(topic.name, topic.definition);
   return message;
 }
 
