@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import http.client
+import sys
 from collections.abc import Callable
 from io import BytesIO
 from types import SimpleNamespace
@@ -135,6 +136,18 @@ def test_what_is_not_an_image_is_refused(message: Any, text: str) -> None:
     with pytest.raises(BridgeError) as error:
         encoded(message._type, serialized(message), Picture())
     assert text in str(error.value)
+
+
+@pytest.mark.parametrize("picture", [Picture("png"), Picture("jpeg", width=2)])
+def test_missing_library_is_named_without_paths_of_the_server(
+    picture: Picture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("cv2", "PIL", "simplejpeg"):
+        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(sys, "executable", "/home/me/.venv/bin/python")
+    with pytest.raises(BridgeError, match=r"minirospy\[images\]") as error:
+        encoded(RED._type, serialized(RED), picture)
+    assert "/home/me" not in str(error.value)
 
 
 # --- pages

@@ -47,7 +47,11 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
     except BridgeError:
         raise
     except Exception as error:  # the libraries for images raise errors of many kinds on bad data
-        raise BridgeError(f"the image cannot be shown: {error}") from error
+        why: object = error
+        if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
+            # Without the command that installs it, which names the server's interpreter: this goes to clients.
+            why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
+        raise BridgeError(f"the image cannot be shown: {why}") from error
 
 
 def _content_type(data: bytes) -> str:
