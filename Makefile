@@ -24,6 +24,7 @@ help:
 	@echo "make windows  test on Windows' CPython by Wine, which it installs (needs apt-get and root)"
 	@echo "make pythons  run the fast tests on every Python found, with -X dev"
 	@echo "make ros2     test the bridge to ROS 2 against real ROS 2, which it installs from PyPI"
+	@echo "make ros2-core  the same without the peers over Zenoh, whose installation takes minutes"
 	@echo "make lint     check style (ruff) and types (mypy)"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"

@@ -58,7 +58,7 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
         # The same name in another package or namespace may be meant, too.
         if ratios and (min(ratios) >= cutoff or (ratios[0] == 1 and cutoff < _SLIP)):
             found.append((-sum(ratios) / len(ratios), len(parts) != len(wanted), name))
-    # Next to the name itself, in other cases or without its end, the others are not what is meant.
+    # Next to the name itself, in other letter cases or without its end, the others are not what is meant.
     exact = [entry for entry in found if entry[0] == -1]
     return [name for *_, name in sorted(exact or found)]
 

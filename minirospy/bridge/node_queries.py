@@ -56,9 +56,9 @@ class NodeQueries(Generic[_Key, _Found]):
         self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
         is_late = False
 
-        async def ask(key: _Key, turns: asyncio.Semaphore) -> None:
+        async def query(key: _Key, turns: asyncio.Semaphore) -> None:
             async with turns:
-                if key in self._present and await self._ask(key) and is_late:
+                if key in self._present and await self._query_once(key) and is_late:
                     self._arrived_late()
 
         new = []
@@ -67,7 +67,7 @@ class NodeQueries(Generic[_Key, _Found]):
             if key in self.found or key in self._tasks or now < self._not_before.get(key, 0.0):
                 continue
             has_failed = key in self._not_before
-            task = asyncio.ensure_future(ask(key, self._again if has_failed else self._first))
+            task = asyncio.ensure_future(query(key, self._again if has_failed else self._first))
             self._tasks[key] = task
             task.add_done_callback(partial(self._ended, key))
             if not has_failed:
@@ -85,8 +85,8 @@ class NodeQueries(Generic[_Key, _Found]):
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _ask(self, key: _Key) -> bool:
-        """Query once; return whether there was an answer."""
+    async def _query_once(self, key: _Key) -> bool:
+        """Query once; return whether there is an answer to what is still present."""
         try:
             found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
         except (MinirospyError, ROSException, OSError, asyncio.TimeoutError, ValueError):

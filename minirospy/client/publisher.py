@@ -312,7 +312,7 @@ class PublishedTopic(SharedTopic):
         try:
             message.serialize(pieces)
         except SerializationOverflowError:
-            # Not one of rospy's, which lets struct's own through.
+            # rospy converts no OverflowError of struct's: programs catch it by this type.
             raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:

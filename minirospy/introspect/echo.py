@@ -48,7 +48,7 @@ class Echo:
     ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
     such fields are shown. ``width``: of numbers. ``offset``: times as differences from ``now()``, which is
     the time in nanoseconds. ``header_times``: a plot has the time in a message's header, if it has one, not of its reception.
-    ``is_type_known``: of a field that is not a message, too, which a topic's is and a bag's is not.
+    ``is_type_known``: whether ROS looks up the type of a field that is not a message, as it does for topics, not for bags.
     """
 
     def __init__(

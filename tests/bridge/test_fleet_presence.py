@@ -64,7 +64,7 @@ def test_a_robot_that_does_not_answer_twice_is_lost_until_it_does() -> None:
     of(scene)
 
 
-def test_one_answer_that_is_missing_is_no_loss() -> None:
+def test_one_missing_answer_is_not_a_loss() -> None:
     async def scene(loop: ManualLoop, fleet: Fleet) -> None:
         fleet.presence.answered("b")
         fleet.answering = {"a"}

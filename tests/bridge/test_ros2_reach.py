@@ -67,7 +67,7 @@ def test_requests_wait_ten_seconds_at_most_in_all() -> None:
     of(scene, prober=FakeProbe(answers=False))
 
 
-def test_a_later_server_that_does_not_answer_delays_requests_by_ten_seconds_at_most() -> None:
+def test_a_later_server_without_answers_delays_requests_by_ten_seconds() -> None:
     async def scene(loop: ManualLoop, client: FakeReachable, reach: Reach) -> None:
         assert client.prober
         await reach.wait(60)

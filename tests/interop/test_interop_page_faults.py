@@ -62,7 +62,7 @@ def test_request_that_is_too_long_for_the_server_is_answered() -> None:
 
 
 @needs_node
-def test_rate_of_one_latched_message_is_unknown_and_of_more_is_without_the_first() -> None:
+def test_rate_is_unknown_of_one_message_and_does_not_count_the_first() -> None:
     found = run_script(
         "Rate",
         "js/rates.js",
@@ -289,7 +289,7 @@ def test_form_offers_constants_and_takes_their_names(
 
 
 @needs_chromium
-def test_answer_of_a_service_is_not_shown_for_another_and_one_that_left_is_named(
+def test_answer_of_one_service_is_not_shown_for_another(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     page = browse(address(serve(), "topics"))

@@ -268,7 +268,7 @@ def test_reader_sets_nothing(serve: Callable[..., Served], browse: Callable[...,
 
 
 @needs_chromium
-def test_button_sets_a_topic_that_is_only_subscribed_by_the_type_of_its_subscribers(
+def test_button_sets_a_topic_that_is_only_subscribed(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()
@@ -286,7 +286,7 @@ def test_button_sets_a_topic_that_is_only_subscribed_by_the_type_of_its_subscrib
 
 
 @needs_chromium
-def test_switch_that_is_pressed_twice_does_not_show_what_comes_back_of_the_first(
+def test_switch_pressed_twice_does_not_show_its_earlier_value(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()

@@ -1,6 +1,6 @@
-"""Which gateways are there, whatever Zenoh's tokens say: tokens of robots that are lost together may stay for minutes.
+"""Which gateways answer, whatever Zenoh's tokens show: tokens of robots that are lost together may stay for minutes.
 
-All gateways are queried at once, regularly, and a moment after a robot has left. One that has answered before, and does not
+One query goes to all gateways, regularly, and a moment after a robot has left. One that has answered before, and does not
 twice, is lost until it answers again. One that has never answered, as where its access rights forbid it, is left alone.
 All on the node's loop.
 """
@@ -49,7 +49,7 @@ class Presence:
         self._soon.set()
 
     async def watch(self) -> None:
-        """Check again and again."""
+        """Check regularly, and soon after :meth:`check_soon`."""
         while True:
             pause = _LOST_SECONDS if self.lost else _REGULAR_SECONDS
             waiting = asyncio.ensure_future(self._soon.wait())

@@ -1,8 +1,8 @@
 """Wait until servers of ROS 2 have found the bridge's client: before, their responses may be lost. On the node's loop.
 
 A server finds the ends of a client later than the client finds the server. Until then rmw_fastrtps and rmw_cyclonedds keep a
-response for 100 ms, and drop it. Nothing tells a client what a server has found, but a response does: a request without
-effect is sent until it is answered. A process announces its ends in the order in which they were made, so the answer to a
+response for 100 ms, and drop it. A client is not notified of what a server has found, but a response shows it: a request
+without effect is sent until it is answered. A process announces its ends in the order in which they were made, so the answer to a
 client that was made later shows that those before were found, too.
 """
 

@@ -15,8 +15,8 @@ __all__ = ["VERB"]
 def _parser() -> Parser:
     parser = Parser(
         "rosbag convert",
-        "Write the messages of a bag into an MCAP file, or those of an MCAP file into a bag, without loss. Which of the two, "
-        f"the ends of the names say: .bag, .mcap. MCAP files need a library: {install_command('minirospy[mcap]')}",
+        "Write the messages of a bag into an MCAP file, or those of an MCAP file into a bag, without loss. The ends of "
+        f"the names specify which: .bag, .mcap. MCAP files need a library: {install_command('minirospy[mcap]')}",
     )
     parser.add_argument("source", metavar="FROM", help="a bag or an MCAP file", completer="bag_files")
     parser.add_argument("target", metavar="TO", help="the file that is written", completer="files")

@@ -37,12 +37,12 @@ export class Actions {
     this.noGoals = h("p", { class: "muted" });
     this.badge = h("span", { class: "badge" });
     this.title = h("h2", { class: "grow" });
-    this.said = h("p", { class: "note" }); // the status text of the server
+    this.statusText = h("p", { class: "note" }); // the status text of the server
     this.silent = h("p", { class: "error", role: "status" });
     this.bar = h("progress", { max: "1", hidden: true, "aria-label": "Progress" });
     this.feedback = h("pre", { class: "answer", "aria-label": "Feedback" });
     this.result = h("pre", { class: "answer", "aria-label": "Result", "aria-live": "polite" });
-    this.details = h("section", { class: "panel details", hidden: true, "aria-label": "Chosen goal" }, h("div", { class: "bar" }, this.title, this.badge), this.said, this.bar,
+    this.details = h("section", { class: "panel details", hidden: true, "aria-label": "Chosen goal" }, h("div", { class: "bar" }, this.title, this.badge), this.statusText, this.bar,
       h("div", { class: "halves" }, h("div", {}, h("h3", {}, "Feedback"), this.feedback), h("div", {}, h("h3", {}, "Result"), this.result)));
     main.append(h("div", { class: "bar" }, this.choice, this.about), this.problem, this.silent,
       h("div", { class: "halves actions" },
@@ -239,7 +239,7 @@ export class Actions {
     this.details.hidden = !goal;
     if (!goal) return;
     setText(this.title, goal.id);
-    setText(this.said, goal.text);
+    setText(this.statusText, goal.text);
     showBadge(this.badge, goal.finalStatus ?? goal.status);
     const progress = goal.finalStatus === 3 ? 1 : progressOf(goal.feedback);
     this.bar.hidden = progress === null;

@@ -93,7 +93,7 @@ export class Diagnostics {
     return now - status.at > STALE_SECONDS ? 3 : level;
   }
 
-  /** Note that the messages of a status have ended. */
+  /** Record that the messages of a status have ended. */
   silence(status) {
     status.isSilent = true;
     status.changes = [{ time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) }, ...status.changes].slice(0, MOST_CHANGES);

@@ -18,7 +18,7 @@ export class Topics {
     this.place = place;
     this.rows = new Map();
     this.opened = new Set(words.getAll("open"));
-    this.asked = words.get("open");
+    this.linked = words.get("open");
     this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
       this.showFiltered();
       this.remember();
@@ -60,14 +60,14 @@ export class Topics {
       before = row.element;
     }
     this.showFiltered();
-    this.showAsked();
+    this.showLinked();
   }
 
   /** Scroll to the topic of the link, once it is there. */
-  showAsked() {
-    const row = this.rows.get(this.asked);
+  showLinked() {
+    const row = this.rows.get(this.linked);
     if (!row) return;
-    this.asked = null;
+    this.linked = null;
     row.element.scrollIntoView({ block: "nearest" });
   }
 
