@@ -9,12 +9,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import PointStamped, Vector3
+from rospy import Time
 
 from minirospy.dashboard.files import FOLDER
 from tests.dashboard.conftest import Served
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import run_script
+from tests.interop.test_interop_aio import until
 from tests.interop.test_interop_dashboard import (
     address,
     browse,
@@ -56,6 +58,72 @@ def test_derivative_is_the_slope_from_point_to_point_in_any_parts() -> None:
         "(d => [...d.append([0, 1], [1, 3]), ...d.append([1.5], [2]), ...d.append([1.5, 3.5], [7, 6])])(derivedOf('derivative'))"
     )
     assert parts == whole
+
+
+@needs_node
+def test_derivative_is_by_the_stamps_of_headers_where_there_are_some() -> None:
+    assert evaluated(
+        "[...derivedOf('derivative').append([0, 5, 5, 5.1], [0, 1, 2, 4], [10, 10.5, 11, 12])]"
+    ) == [
+        None,
+        2,
+        2,
+        2,
+    ]
+    # A bag that is played again: its stamps go back.
+    assert evaluated("[...derivedOf('derivative').append([0, 1, 2, 3], [0, 1, 5, 7], [8, 9, 1, 2])]") == [
+        None,
+        1,
+        None,
+        2,
+    ]
+    # The first ones have none; they are kept with the points, also when the memory grows and the oldest are dropped.
+    points = evaluated(
+        "(made => { made.append([1, 2], [0, 0]); made.append(new Float64Array(2000).fill(3), new Float64Array(2000),"
+        " new Float64Array(2000).fill(7)); made.append([4], [0]); const all = [...made.stamps.subarray(0, made.count)];"
+        " made.drop(2001); return [all, [...made.stamps.subarray(0, made.count)]]; })(of([0], [0]))"
+    )
+    assert points == [[0, 1, 2, *[7] * 2000, 4], [7, 7, 4]]
+
+
+@needs_node
+def test_stamp_of_a_message_is_that_of_its_header() -> None:
+    body = """return [{ header: { stamp: { secs: 2, nsecs: 5e8 } } }, { header: { stamp: { secs: 0, nsecs: 0 } } }, {},
+      { header: "a" }, { header: { stamp: 4 } }].map(stampOf);"""
+    assert run_script("stampOf", "js/paths.js", body) == [2.5, 0, 0, 0, 0]
+
+
+@needs_chromium
+def test_derivative_of_messages_that_come_in_batches_has_no_spikes(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    talker = publisher(served, "/where", PointStamped, queue_size=None)
+    page = browse(address(served, "plot?path=/where/point/x&show=derivative%20/where/point/x"))
+
+    async def batch(first: int) -> None:
+        for number in range(first, first + 20):
+            message = PointStamped()
+            message.header.stamp = Time(100, number * 10_000_000)
+            message.point.x = 0.5 * number
+            await talker.publish(message)
+
+    served.run(until(lambda: talker.num_connections == 1))
+    for first in (0, 20):
+        served.run(batch(first))
+        page.wait_text(".series .count", str(first + 20))
+    page.wait_text(".series .num", "50")
+    # Another kind, and back: all points are computed again.
+    for kind in ("", "derivative"):
+        page.choose(".series select", kind)
+    page.wait_text(".series .num", "50")
+    texts = page.evaluate(
+        "new Promise(resolve => { URL.createObjectURL = blob => { blob.text().then(resolve); return ''; };"
+        "[...document.querySelectorAll('button')].find(e => e.textContent === 'CSV').click(); })"
+    )
+    slopes = [float(line.split(",")[1] or "nan") for line in texts.splitlines()[1:]]
+    assert len(slopes) > 2
+    assert slopes[1:] == pytest.approx([50] * (len(slopes) - 1)), texts
 
 
 @needs_node

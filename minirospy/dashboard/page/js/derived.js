@@ -2,7 +2,7 @@
 
 export const KINDS = [["", "as it is"], ["derivative", "derivative"], ["average1", "average of 1 s"], ["average10", "average of 10 s"]];
 
-/** Return what computes a kind of KINDS, {append(times, values)}: the values of new points, NaN where there is none yet; null for "". */
+/** Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is none yet; null for "". */
 export function derivedOf(kind) {
   if (kind === "derivative") return new Derivative();
   const seconds = Number(/^average(\d+)$/.exec(kind)?.[1] ?? 0);
@@ -15,13 +15,15 @@ class Derivative {
     this.value = NaN;
   }
 
-  append(times, values) {
-    const found = new Float64Array(times.length);
-    for (let index = 0; index < times.length; index++) {
-      const span = times[index] - this.time;
-      // Messages that come at the same time have no slope between them.
+  append(times, values, stamps) {
+    // Messages may come in batches: the times of their headers are closer to those of the values.
+    const moments = stamps ?? times;
+    const found = new Float64Array(moments.length);
+    for (let index = 0; index < moments.length; index++) {
+      const span = moments[index] - this.time;
+      // Messages of the same time have no slope between them. Stamps go back where a bag starts again.
       found[index] = span > 0 ? (values[index] - this.value) / span : NaN;
-      if (!(span <= 0)) [this.time, this.value] = [times[index], values[index]];
+      if (span !== 0) [this.time, this.value] = [moments[index], values[index]];
     }
     return found;
   }

@@ -112,6 +112,11 @@ export function canLead(definition, steps) {
   return !at.isArray && at.message.fields.some(({ type, isArray }) => isNumeric(type) && !isArray);
 }
 
+/** Return the time in the header of a message; 0 where there is none. */
+export function stampOf({ header }) {
+  return header?.stamp?.nsecs === undefined ? 0 : numberOf(header.stamp);
+}
+
 function leaves(value, found, label) {
   const number = numberOf(value);
   if (number !== null) {

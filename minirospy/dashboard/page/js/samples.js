@@ -8,16 +8,18 @@ export class Samples {
   constructor() {
     this.times = new Float64Array(FIRST);
     this.values = new Float64Array(FIRST);
+    this.stamps = null; // times of the headers, of messages that have them
     this.count = 0;
     this.total = 0; // that ever came
   }
 
-  append(times, values) {
+  append(times, values, stamps = null) {
     this.total += times.length;
     if (this.count + times.length > MOST_POINTS) this.drop(Math.max(MOST_POINTS / 4, this.count + times.length - MOST_POINTS));
+    if (stamps) this.stamps ??= this.times.slice();
     if (this.count + times.length > this.times.length) {
       const size = Math.max(this.times.length * 2, this.count + times.length);
-      for (const name of ["times", "values"]) {
+      for (const name of this.names) {
         const longer = new Float64Array(size);
         longer.set(this[name].subarray(0, this.count));
         this[name] = longer;
@@ -25,14 +27,18 @@ export class Samples {
     }
     this.times.set(times, this.count);
     this.values.set(values, this.count);
+    this.stamps?.set(stamps ?? times, this.count);
     this.count += times.length;
   }
 
   drop(count) {
     const gone = Math.min(count, this.count);
-    this.times.copyWithin(0, gone, this.count);
-    this.values.copyWithin(0, gone, this.count);
+    for (const name of this.names) this[name].copyWithin(0, gone, this.count);
     this.count -= gone;
+  }
+
+  get names() {
+    return this.stamps ? ["times", "values", "stamps"] : ["times", "values"];
   }
 
   get last() {

@@ -3,7 +3,7 @@
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
 import { TextError, decode, encode, parseDefinition } from "./ros1.js";
-import { PathError, canLead, numericPaths, parseSteps, select, topicOf } from "./paths.js";
+import { PathError, canLead, numericPaths, parseSteps, select, stampOf, topicOf } from "./paths.js";
 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
@@ -293,30 +293,33 @@ function give(topic, entry, seconds, bytes, decoded) {
     return message;
   }
   let isFound = false;
+  const stamp = stampOf(message);
   select(message, entry.steps, (label, number) => {
     isFound = true;
-    addPoint(entry, label, seconds, number);
+    addPoint(entry, label, seconds, stamp, number);
   });
   entry.isFound ||= isFound;
   if (!entry.isFound) entry.error = noNumber(topic.name, topic.definition);
   return message;
 }
 
-function addPoint(entry, label, seconds, number) {
+function addPoint(entry, label, seconds, stamp, number) {
   let series = entry.series.get(label);
   if (!series) {
-    series = { times: new Float64Array(256), values: new Float64Array(256), count: 0 };
+    series = { times: new Float64Array(256), stamps: new Float64Array(256), values: new Float64Array(256), count: 0, isStamped: false };
     entry.series.set(label, series);
   }
   if (series.count === series.times.length) {
     if (series.count >= MOST_POINTS) return;
-    for (const name of ["times", "values"]) {
+    for (const name of ["times", "stamps", "values"]) {
       const longer = new Float64Array(series.count * 2);
       longer.set(series[name]);
       series[name] = longer;
     }
   }
   series.times[series.count] = seconds;
+  series.stamps[series.count] = stamp || seconds;
+  series.isStamped ||= stamp !== 0;
   series.values[series.count++] = number;
 }
 
@@ -366,8 +369,8 @@ function itemOf(entry, transfer) {
   }
   if (entry.mode === "series" && entry.series.size) {
     item.series = [];
-    for (const [label, { times, values, count }] of entry.series) {
-      const part = { label: entry.topic + label, times: times.slice(0, count), values: values.slice(0, count) };
+    for (const [label, { times, stamps, values, count, isStamped }] of entry.series) {
+      const part = { label: entry.topic + label, times: times.slice(0, count), values: values.slice(0, count), stamps: isStamped ? stamps.slice(0, count) : null };
       transfer.push(part.times.buffer, part.values.buffer);
       item.series.push(part);
     }

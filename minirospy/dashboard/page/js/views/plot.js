@@ -170,9 +170,9 @@ export class Plot {
     series.derived = derivedOf(kind);
     series.samples = series.raw;
     if (series.derived) {
-      const { times, values, count, total } = series.raw;
+      const { times, values, stamps, count, total } = series.raw;
       series.samples = new Samples();
-      series.samples.append(times.subarray(0, count), series.derived.append(times.subarray(0, count), values.subarray(0, count)));
+      series.samples.append(times.subarray(0, count), series.derived.append(times.subarray(0, count), values.subarray(0, count), stamps?.subarray(0, count)));
       series.samples.total = total;
     }
     this.isDirty = true;
@@ -195,7 +195,7 @@ export class Plot {
       this.problems.set(path, item.error);
       this.showProblems();
     }
-    for (const { label, times, values } of item.series ?? []) {
+    for (const { label, times, values, stamps } of item.series ?? []) {
       if (this.removed?.has(label)) continue;
       let series = this.series.get(label);
       if (!series) {
@@ -209,8 +209,8 @@ export class Plot {
         series.raw.drop(Infinity);
         this.setKind(series, series.kind);
       }
-      series.raw.append(times, values);
-      if (series.derived) series.samples.append(times, series.derived.append(times, values));
+      series.raw.append(times, values, stamps);
+      if (series.derived) series.samples.append(times, series.derived.append(times, values, stamps));
       this.isDirty = true;
     }
   }
