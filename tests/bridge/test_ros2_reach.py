@@ -191,3 +191,15 @@ def test_what_waits_returns_at_the_end() -> None:
         assert client.prober.closed == 1
 
     of(scene, prober=FakeProbe(answers=False))
+
+
+def test_a_request_after_the_end_waits_for_nothing_and_starts_nothing() -> None:
+    async def scene(_: ManualLoop, client: FakeReachable, reach: Reach) -> None:
+        before = asyncio.all_tasks()
+        await reach.close()
+        await asyncio.wait_for(reach.wait(), 1)
+        assert asyncio.all_tasks() == before
+        assert client.prober
+        assert not client.prober.reaching
+
+    of(scene)

@@ -51,10 +51,11 @@ class Reach:
         self._wanted: frozenset[bytes] = frozenset()
         self._reaching: asyncio.Task[None] | None = None
         self._ready_at: float | None = None
+        self._is_closed = False
 
     def start(self) -> None:
         """Reach the servers that are there, so that later requests need not wait."""
-        if self._reaching is None or self._reaching.done():
+        if not self._is_closed and (self._reaching is None or self._reaching.done()):
             self._ready_at = None
             self._reaching = asyncio.ensure_future(self._reach())
 
@@ -67,7 +68,9 @@ class Reach:
         if servers is None or (self._reached is not None and servers <= self._reached):
             return
         self.start()
-        assert self._reaching
+        # Calls that were queued go on while what they belong to is being closed.
+        if self._is_closed or self._reaching is None:
+            return
         seconds = min(seconds, _MOST_SECONDS)
         if self._ready_at is not None and self._wanted <= servers:
             spent = asyncio.get_running_loop().time() - self._ready_at
@@ -76,6 +79,7 @@ class Reach:
 
     async def close(self) -> None:
         """End it; what waits returns. Idempotent."""
+        self._is_closed = True
         if self._reaching:
             self._reaching.cancel()
             await asyncio.gather(self._reaching, return_exceptions=True)
