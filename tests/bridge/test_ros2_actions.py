@@ -333,6 +333,22 @@ def test_the_loop_goes_on_while_an_action_leaves_ros2() -> None:
 
 
 @pytest.mark.usefixtures("master")
+def test_goal_that_comes_as_its_link_is_closed_is_answered() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        async def execute(_: Any) -> dict[str, list[int]]:
+            return {}
+
+        await ActionServer(node, "/fly", FibonacciAction, execute)
+        await bridge.look()
+        closing = asyncio.ensure_future(bridge.actions.close())
+        answered = side.action_servers["/fly"].accept(cdr()[:4] + bytes(4), lambda _: None)
+        await closing
+        assert answered.cancelled()
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
 def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = {**SEND_GOAL, "/odd/_action/send_goal": "odd_msgs/Odd_SendGoal"}

@@ -144,6 +144,8 @@ class GoalsToRos1:
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        # Of a task that is cancelled, also before its first step.
+        task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
         self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
@@ -154,9 +156,6 @@ class GoalsToRos1:
             accepted.set_exception(BridgeError(f"its server has not answered within {_SERVER_SECONDS:g} s"))
         except (DeserializationError, ROSException) as error:
             accepted.set_exception(BridgeError(str(error)))
-        except asyncio.CancelledError:
-            accepted.cancel()
-            raise
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
             self._faults.report(error)
             accepted.set_exception(BridgeError(f"the bridge failed: {type(error).__name__}"))
