@@ -208,6 +208,25 @@ def test_a_server_of_ros1_is_called_from_ros2_until_it_ends() -> None:
 
 
 @pytest.mark.usefixtures("master")
+def test_calls_that_come_as_their_link_is_closed_are_answered() -> None:
+    async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
+        async def never(_: bytes, __: Header) -> bytes:
+            await asyncio.Event().wait()
+            return b""
+
+        await RawService(node, "/set", interface(SET_BOOL), never)
+        await bridge.look()
+        there = side.servers["/set"]
+        before = there.answer(b"\0\1\0\0\1\0\0\0")
+        await asyncio.ensure_future(bridge.services.close())
+        assert before.cancelled()
+        with pytest.raises(BridgeError, match="not bridged any more"):
+            await asyncio.wait_for(asyncio.wrap_future(there.answer(b"\0\1\0\0\1\0\0\0")), 5.0)
+
+    bridged(scene)
+
+
+@pytest.mark.usefixtures("master")
 def test_a_server_of_ros1_that_hangs_is_given_up() -> None:
     async def hang(_: bytes, __: Header) -> bytes:
         await asyncio.sleep(LIMIT)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -286,11 +286,13 @@ class _InRos2:
         self._calls: set[asyncio.Task[None]] = set()
         self._side = side
         self._server: Ros2Handle | None = None
+        self._is_closed = False
 
     async def open(self) -> None:
         self._server = self._side.serve(self._link.service, self._link.ros2_type, self._arrived)
 
     async def close(self) -> None:
+        self._is_closed = True
         if self._server:
             self._server.close()
         for task in self._calls:
@@ -304,12 +306,28 @@ class _InRos2:
         return answered
 
     def _start(self, request: bytes, answered: Future[bytes]) -> None:
+        if self._is_closed:
+            answered.set_exception(BridgeError("it is not bridged any more"))
+            return
         if len(self._calls) >= _MOST_CALLS:
             answered.set_exception(BridgeError(f"the bridge passes on {_MOST_CALLS} calls already"))
             return
-        task = asyncio.ensure_future(_pass_on(self._answer(request), answered))
+        task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
+        # Of a task that is cancelled, also before its first step.
+        task.add_done_callback(lambda _: answered.cancel())
+
+    async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
+        """Give the answer, or why there is none, to a future of another thread."""
+        try:
+            result = await self._answer(request)
+        except (MinirospyError, ROSException, ServiceException) as error:
+            answered.set_exception(BridgeError(str(error)))
+        except Exception as error:  # noqa: BLE001 - the other side waits for the answer, whatever happened here
+            answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
+        else:
+            answered.set_result(result)
 
     async def _answer(self, request: bytes) -> bytes:
         codec = self._codec
@@ -321,18 +339,3 @@ class _InRos2:
             return codec.response.to_cdr(body, CDR_HEADER)
         except asyncio.TimeoutError:
             raise BridgeError(f"it has not answered within {self._call_seconds:g} s") from None
-
-
-async def _pass_on(work: Awaitable[bytes], answered: Future[bytes]) -> None:
-    """Give what ``work`` returns or raises to a future of another thread."""
-    try:
-        result = await work
-    except asyncio.CancelledError:
-        answered.cancel()
-        raise
-    except (MinirospyError, ROSException, ServiceException) as error:
-        answered.set_exception(BridgeError(str(error)))
-    except Exception as error:  # noqa: BLE001 - the other side waits for the answer, whatever happened here
-        answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
-    else:
-        answered.set_result(result)
