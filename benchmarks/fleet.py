@@ -1,11 +1,11 @@
 """`python benchmarks/fleet.py`: a simulated fleet of 10 to 1,000 robots, and one real control room.
 
 Robots are sessions of Zenoh that declare what a gateway declares, in a few processes; the control room is a real gateway with
-a real master. As root on Linux with `ip` and `tc`, robots are in a network namespace of their own, behind a link with delay
-and loss (where the kernel has netem), and their traffic is what this link counts; elsewhere all is on loopback, and traffic
-and cuts are left out. Printed for each number of robots: seconds until the control room's master has all names, bytes a second of
-each robot while nobody subscribes (both directions, with the headers of TCP, IP and Ethernet), seconds from a cut of the link
-until all are gone, and from its end until all are there again.
+a real master. As root on Linux with `ip`, robots are in a network namespace of their own, behind a link with delay and loss
+(slow_link.py), and their traffic is what this link counts; elsewhere all is on loopback, and traffic and cuts are left out.
+Printed for each number of robots: seconds until the control room's master has all names, bytes a second of each robot while
+nobody subscribes (both directions, with the headers of TCP, IP and Ethernet), seconds from a cut of the link until all are
+gone, and from its end until all are there again.
 """
 
 import argparse
@@ -19,12 +19,15 @@ import threading
 import time
 from pathlib import Path
 
+from slow_link import DEVICE
+
 SIZES = (10, 30, 100, 300, 1000)
 PROCESSES = 4
 TOPICS = 7
-SETTLE_SECONDS, QUIET_SECONDS = 8.0, 15.0
+SETTLE_SECONDS, QUIET_SECONDS = 8.0, 60.0
 CUT_SECONDS = 15.0
-LINK = "delay 20ms 5ms loss 1%"
+DELAY, JITTER, LOSS = 20, 5, 1
+"""Of the link, in each direction: milliseconds, and percent of the frames."""
 MOST_SECONDS = 300
 """How long a cut is waited for, and the recovery from it."""
 PORT = 27447
@@ -140,18 +143,18 @@ class Network:
     def __init__(self):
         self.is_isolated = sys.platform == "linux" and os.geteuid() == 0
         self.names = [f"fleet-{side}-{os.getpid()}" for side in ("room", "robots")]
+        self.link = None
 
     def __enter__(self):
         if self.is_isolated:
-            room, far = self.names
             try:
                 for name in self.names:
                     self._sh(f"ip netns add {name}")
-                self._sh(f"ip link add veth0 netns {room} type veth peer name veth0 netns {far}")
+                self._connect()
                 for number, name in enumerate(self.names, 1):
                     self._sh(f"ip -n {name} link set lo up")
-                    self._sh(f"ip -n {name} link set veth0 up")
-                    self._sh(f"ip -n {name} addr add 10.97.0.{number}/24 dev veth0")
+                    self._sh(f"ip -n {name} link set {DEVICE} up")
+                    self._sh(f"ip -n {name} addr add 10.97.0.{number}/24 dev {DEVICE}")
             except (OSError, subprocess.CalledProcessError):
                 self.__exit__()
                 self.is_isolated = False
@@ -159,26 +162,31 @@ class Network:
         return self
 
     def __exit__(self, *_):
+        if self.link:
+            self.link.stdin.close()
+            self.link.wait()
         for name in self.names:
             with contextlib.suppress(OSError):
                 subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True)
 
-    def impair(self):
-        """Set delay and loss of both directions; whether the kernel has netem."""
-        try:
-            for name in self.names:
-                self._sh(f"ip netns exec {name} tc qdisc replace dev veth0 root netem {LINK}")
-        except (OSError, subprocess.CalledProcessError):
-            return False
-        return True
+    def _connect(self):
+        words = ["--delay", DELAY, "--jitter", JITTER, "--loss", LOSS]
+        self.link = subprocess.Popen(
+            [sys.executable, Path(__file__).with_name("slow_link.py"), *self.names, *map(str, words)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        if self.link.stdout.readline() != "ready\n":
+            raise OSError("slow_link.py has not started")
 
     def switch(self, state):
         """Cut the link ("down"), and mend it ("up")."""
-        self._sh(f"ip -n {self.names[1]} link set veth0 {state}")
+        self._sh(f"ip -n {self.names[1]} link set {DEVICE} {state}")
 
     def count(self):
         """Return the bytes that have passed the link, both directions."""
-        text = subprocess.check_output(["ip", "-n", self.names[0], "-s", "-j", "link", "show", "veth0"])
+        text = subprocess.check_output(["ip", "-n", self.names[0], "-s", "-j", "link", "show", DEVICE])
         stats = json.loads(text)[0]["stats64"]
         return stats["rx"]["bytes"] + stats["tx"]["bytes"]
 
@@ -221,7 +229,7 @@ def measure(network, count, *, cuts):
     results = {"robots": count}
     try:
         if network.is_isolated:
-            results["link"] = LINK if network.impair() else "no netem in this kernel: neither delay nor loss"
+            results["link"] = f"{DELAY} ms, {JITTER} ms of jitter, {LOSS} % lost, each way"
         router = start(False, "-m", "minirospy", "fleet", "router", "--listen", network.endpoint)
         router.stdout.readline()
         each = -(-count // PROCESSES)
