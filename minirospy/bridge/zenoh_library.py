@@ -245,6 +245,8 @@ def configured(options: NetworkOptions) -> Config:
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
+        # Of a lease of 10 s: TCP repeats what a link loses, so that one fewer than Zenoh's default is enough.
+        ("transport/link/tx/keep_alive", 3),
         # What the kernel has taken waits before everything else: at 4 Mbit/s some 0.3 s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
         # It would pass large messages between gateways of one machine by files in /dev/shm, which containers make small.
