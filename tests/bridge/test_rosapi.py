@@ -67,6 +67,10 @@ def test_pair_is_sent_where_it_moved_enough() -> None:
 # --- calls
 
 
+class RefusedCall(Exception):
+    """A call that was answered with an error."""
+
+
 @pytest.fixture
 def api(run_bridge: Callable[..., Running]) -> Callable[..., Any]:
     """Return a function that calls a service of rosapi and returns its values; there are a talker and a server."""
@@ -88,7 +92,9 @@ def api(run_bridge: Callable[..., Running]) -> Callable[..., Any]:
 
     def call(service: str, /, **args: Any) -> Any:
         answer = client.call(f"/rosapi/{service}", args)
-        return answer["values"] if answer["result"] else str(answer["values"])
+        if not answer["result"]:
+            raise RefusedCall(answer["values"])
+        return answer["values"]
 
     return call
 
@@ -137,9 +143,8 @@ def test_types_are_described(api: Callable[..., Any]) -> None:
     assert api("service_request_details", type="std_srvs/SetBool")["typedefs"][0]["fieldtypes"] == ["bool"]
     response = api("service_response_details", type="std_srvs/SetBool")["typedefs"][0]
     assert response["fieldnames"] == ["success", "message"]
-    assert "Unable to load the manifest for package nowhere_msgs" in api(
-        "message_details", type="nowhere_msgs/Thing"
-    )
+    with pytest.raises(RefusedCall, match="Unable to load the manifest for package nowhere_msgs"):
+        api("message_details", type="nowhere_msgs/Thing")
 
 
 def test_parameters_are_json(api: Callable[..., Any]) -> None:
@@ -149,7 +154,8 @@ def test_parameters_are_json(api: Callable[..., Any]) -> None:
     assert api("get_param", name="/secret", default="2") == {"value": "null"}
     api("set_param", name="/speed/min", value="0.5")
     assert json.loads(api("get_param", name="/speed")["value"]) == {"max": 1.5, "min": 0.5}
-    assert "must be a JSON-formatted string" in api("set_param", name="/speed", value="{")
+    with pytest.raises(RefusedCall, match="must be a JSON-formatted string"):
+        api("set_param", name="/speed", value="{")
     assert api("has_param", name="/speed/min") == {"exists": True}
     assert api("search_param", name="speed") == {"global_name": "/speed"}
     api("delete_param", name="/speed/min")
