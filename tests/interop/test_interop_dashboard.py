@@ -585,6 +585,16 @@ def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Calla
         page.wait_text(".panel", "0.60 m ahead")
         board.move_person((0.3, 0.0))
         page.wait_text(".panel", "in the protective field")
+        # The names of the fields are readable before the person, who can be dragged by them.
+        for name in ("warning field", "protective field"):
+            label = f"[...document.querySelectorAll('.room text')].find(e => e.textContent === '{name}')"
+            assert page.evaluate(
+                f"[document.querySelector('.person').compareDocumentPosition({label}), getComputedStyle({label}).paintOrder]"
+            ) == [4, "stroke"]
+        assert page.evaluate(
+            f"(r => document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2))({label}.getBoundingClientRect())"
+            ".closest('.person') !== null"
+        )
 
 
 @needs_chromium

@@ -157,9 +157,10 @@ export class Board {
 
   drawRoom() {
     this.fields = svg("g", {});
+    this.labels = svg("g", {});
     this.person = svg("g", { class: "person", tabindex: 0, role: "img", "aria-label": "The person: drag, or the arrow keys" }, svg("circle", { r: REACH * METRES, class: "body" }), svg("circle", { r: 9, class: "face" }));
     this.room.append(svg("rect", { x: -130, y: -220, width: 260, height: 260, class: "floor" }), this.fields,
-      svg("rect", { x: -10, y: -8, width: 20, height: 16, rx: 4, class: "scanner" }), this.person);
+      svg("rect", { x: -10, y: -8, width: 20, height: 16, rx: 4, class: "scanner" }), this.person, this.labels);
     const move = (event) => {
       const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.room.getScreenCTM().inverse());
       const round = (value) => Math.round(value * 1000) / 1000;
@@ -188,9 +189,10 @@ export class Board {
     const distance = person ? Math.max(0, Math.hypot(...person) - REACH) : Infinity;
     if (!this.fields.children.length) {
       const names = [t("warning field"), t("protective field")];
-      fields.forEach((radius, index) => this.fields.append(svg("circle", { r: radius * METRES, class: `field f${index}` }), svg("text", { y: -radius * METRES - 5 }, names[index])));
+      this.fields.append(...fields.map((radius, index) => svg("circle", { r: radius * METRES, class: `field f${index}` })));
+      this.labels.append(...fields.map((radius, index) => svg("text", { y: -radius * METRES - 5 }, names[index])));
     }
-    fields.forEach((radius, index) => this.fields.children[index * 2].classList.toggle("hit", distance < radius));
+    fields.forEach((radius, index) => this.fields.children[index].classList.toggle("hit", distance < radius));
     this.person.classList.toggle("away", !person);
     if (person) this.person.setAttribute("transform", `translate(${-person[1] * METRES} ${-person[0] * METRES})`);
     setText(this.awayButton, person ? t("Send the person away") : t("Let a person come"));
