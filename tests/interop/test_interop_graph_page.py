@@ -112,10 +112,10 @@ def test_boxes_in_rows_fit_the_aspect_of_the_view_and_do_not_overlap() -> None:
         assert max(y + box["height"] for _, y, box in areas) == found["height"]
         for (x, y, box), (left, top, other) in itertools.combinations(areas, 2):
             assert (
-                x + box["width"] < left
-                or left + other["width"] < x
-                or y + box["height"] < top
-                or top + other["height"] < y
+                x + box["width"] <= left
+                or left + other["width"] <= x
+                or y + box["height"] <= top
+                or top + other["height"] <= y
             )
     assert page_functions(("graph_elements", "packed", [[], 1])) == [{"width": 0, "height": 0, "places": []}]
 

@@ -4,7 +4,6 @@ const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
 const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
 const TO_SERVER = ["goal", "cancel"];
 const FROM_SERVER = ["status", "feedback", "result"];
-const GAP = 12; // between boxes in rows
 
 /** Return the names of the actions among topics. */
 export function actionsIn(topics) {
@@ -115,12 +114,14 @@ export function packed(boxes, aspect) {
   const widest = Math.max(0, ...boxes.map(({ width }) => width));
   let best = { width: 0, height: 0, places: [] };
   let [most, least] = [0, Infinity];
-  for (const last of order) {
-    most += boxes[last].width + GAP;
-    const found = inRows(boxes, order, Math.max(most, widest));
-    const size = Math.max(found.width, found.height * aspect);
-    if (size < least) [best, least] = [found, size];
-  }
+  order.forEach((last, index) => {
+    most += boxes[last].width;
+    for (const limit of [Math.max(most, widest), (index + 1) * widest]) {
+      const found = inRows(boxes, order, limit);
+      const size = Math.max(found.width, found.height * aspect);
+      if (size < least) [best, least] = [found, size];
+    }
+  });
   return best;
 }
 
@@ -131,11 +132,11 @@ function inRows(boxes, order, most) {
     const box = boxes[index];
     if (x && x + box.width > most) [x, y] = [0, next];
     places[index] = { x, y };
-    width = Math.max(width, x + box.width);
-    x += box.width + GAP;
-    next = Math.max(next, y + box.height + GAP);
+    x += box.width;
+    width = Math.max(width, x);
+    next = Math.max(next, y + box.height);
   }
-  return { width, height: next - GAP, places };
+  return { width, height: next, places };
 }
 
 /**
