@@ -25,6 +25,7 @@ class Nodes:
         self.silent: set[str] = set()
         self.dead: set[str] = set()
         self.may_answer = asyncio.Event()
+        self.came_late = asyncio.Event()
 
     async def answer(self, name: str) -> str:
         self.queried.append(name)
@@ -40,7 +41,8 @@ def queried(scene: Callable[[Nodes, NodeQueries[str, str]], Awaitable[None]]) ->
 
     async def run() -> None:
         nodes = Nodes()
-        queries = NodeQueries(nodes.answer, Faults(logging.getLogger("test"), "the query"))
+        faults = Faults(logging.getLogger("test"), "the query")
+        queries = NodeQueries(nodes.answer, faults, arrived_late=nodes.came_late.set)
         try:
             await asyncio.wait_for(scene(nodes, queries), LIMIT)
         finally:
@@ -81,23 +83,17 @@ def test_a_node_that_hangs_is_queried_once_at_a_time(monkeypatch: pytest.MonkeyP
 
 
 def test_an_answer_that_nobody_waited_for_is_reported() -> None:
-    async def run() -> None:
-        nodes = Nodes()
+    async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("late")
-        came = asyncio.Event()
-        queries = NodeQueries(
-            nodes.answer, Faults(logging.getLogger("test"), "the query"), arrived_late=came.set
-        )
         await queries.look(["soon"], LIMIT)
         assert queries.found == {"soon": "SOON"}
         await queries.look(["late", "soon"], 0.0)
-        assert not came.is_set()
+        assert not nodes.came_late.is_set()
         nodes.may_answer.set()
-        await came.wait()
+        await nodes.came_late.wait()
         assert queries.found == {"late": "LATE", "soon": "SOON"}
-        await queries.close()
 
-    asyncio.run(asyncio.wait_for(run(), LIMIT))
+    queried(scene)
 
 
 def test_an_answer_for_what_has_gone_meanwhile_is_forgotten() -> None:
@@ -118,22 +114,16 @@ def test_an_answer_for_what_has_gone_meanwhile_is_forgotten() -> None:
 
 
 def test_an_answer_after_a_look_that_was_cancelled_is_reported() -> None:
-    async def run() -> None:
-        nodes = Nodes()
+    async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("late")
-        came = asyncio.Event()
-        queries = NodeQueries(
-            nodes.answer, Faults(logging.getLogger("test"), "the query"), arrived_late=came.set
-        )
         looking = asyncio.ensure_future(queries.look(["late"], LIMIT))
         await until(lambda: nodes.queried)
         looking.cancel()
         await asyncio.gather(looking, return_exceptions=True)
         nodes.may_answer.set()
-        await came.wait()
-        await queries.close()
+        await nodes.came_late.wait()
 
-    asyncio.run(asyncio.wait_for(run(), 10.0))
+    queried(scene)
 
 
 def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
