@@ -21,7 +21,7 @@ from minirospy.scanner import BEAMS
 from tests.waiting import until
 
 NODE = Path(__file__).parents[1] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
-SECONDS = 40.0
+SECONDS = 100.0
 FREE, WARNING, PROTECTIVE = [True, True], [True, False], [False, False]
 
 

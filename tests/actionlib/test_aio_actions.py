@@ -23,7 +23,7 @@ from tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("master")
 
-SECONDS = 40.0
+SECONDS = 100.0
 Client = ActionClient[msg.TestGoal, msg.TestResult, msg.TestFeedback]
 Server = ActionServer[msg.TestGoal, msg.TestResult, msg.TestFeedback]
 Goal = ServerGoal[msg.TestGoal, msg.TestFeedback]

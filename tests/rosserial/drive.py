@@ -24,7 +24,7 @@ from rosserial_msgs.srv import RequestParamRequest, RequestParamResponse
 from std_msgs.msg import Bool, String, Time
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
-SECONDS = 40
+SECONDS = 100
 CHATTER, LAMP, SERVER_OUT, SERVER_IN, CLIENT_OUT, CLIENT_IN = range(100, 106)
 
 

@@ -21,7 +21,7 @@ from cases import OPTIONS, STATES, STEPS, TELEOPS
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Joy
 
-SECONDS = 30
+SECONDS = 100
 
 
 def started(program: list[str], name: str, parameters: dict[str, object]) -> subprocess.Popen[bytes]:
