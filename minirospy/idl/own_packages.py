@@ -9,7 +9,6 @@ __all__ = ["COMPILED_AHEAD", "own_definitions"]
 COMPILED_AHEAD = frozenset(
     [
         "actionlib_msgs",
-        "bond",
         "dynamic_reconfigure",
         "geometry_msgs",
         "minirospy_msgs",
