@@ -135,8 +135,8 @@ class GraphStage:
         """See :meth:`Stage.waiting_bytes`: they are taken when the playing has ended, too."""
         return 0
 
-    def say(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Stage.say`: there is no terminal."""
+    def print(self, text: str, end: str = "\n") -> None:
+        """See :meth:`Stage.print`: there is no terminal."""
 
     def _send_clock(self, time: int) -> None:
         if self._clock:

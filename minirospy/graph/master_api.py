@@ -1,6 +1,6 @@
 """The Master API and the Parameter Server API: a table of methods, and the ``[status code, text, value]`` answers.
 
-Pure: what a call makes the master do goes through :meth:`MasterApi.act` and :attr:`MasterApi.note`. An answer that takes
+Pure: what a call makes the master do goes through :meth:`MasterApi.notify` and :attr:`MasterApi.record`. An answer that takes
 long comes in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; texts
 and corner cases are those of real rosmaster (tests/runtime/master/master_calls.py).
 """
@@ -48,7 +48,7 @@ _ROWS = 500
 """Of a table that are collected in one step."""
 
 PARAMETERS = ""
-"""For :meth:`MasterApi.hold`: no topic has this name."""
+"""For :meth:`MasterApi.defer`: no topic has this name."""
 
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 """What a change makes the master send to a node."""
@@ -60,9 +60,9 @@ class MasterApi(ABC):
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
-        self.say: Callable[[str], object] = nothing
+        self.log: Callable[[str], object] = nothing
         """Gets a line for each registration."""
-        self.note: Callable[..., object] = nothing
+        self.record: Callable[..., object] = nothing
         """Receives each change, as it is written to the journal."""
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal, and returns the number that a change refers to it by."""
@@ -116,18 +116,18 @@ class MasterApi(ABC):
         """Return the value for ROS_MASTER_URI."""
 
     @abstractmethod
-    def act(self, action: Notice) -> None:
+    def notify(self, action: Notice) -> None:
         """Do what a change of the tables requires."""
 
-    def act_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
+    def notify_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
         """Do what a change of the tables requires, which may be much."""
         for number, action in enumerate(actions):
-            self.act(action)
+            self.notify(action)
             if number % _FEW == _FEW - 1:
                 yield None
 
     @abstractmethod
-    def hold(self, uri: str, topic: str) -> None:
+    def defer(self, uri: str, topic: str) -> None:
         """Delay notices to a node about a topic or PARAMETERS, whose answer it is receiving now."""
 
     @abstractmethod
@@ -209,9 +209,9 @@ class MasterApi(ABC):
         def register() -> Steps[Answer]:
             peers, actions = self.registry.register_publisher(caller_id, topic, type_, uri)
             others = self._act_first(actions)
-            self.note("+pub", caller_id, topic, type_, uri)
-            self.say(f"+PUB [{topic}] {caller_id} {uri}")
-            yield from self.act_in_steps(others)
+            self.record("+pub", caller_id, topic, type_, uri)
+            self.log(f"+PUB [{topic}] {caller_id} {uri}")
+            yield from self.notify_in_steps(others)
             return [SUCCESS, f"Registered [{caller_id}] as publisher of [{topic}]", peers]
 
         return self._run(register(), self.registry.count_subscribers(topic))
@@ -222,9 +222,9 @@ class MasterApi(ABC):
         def unregister() -> Steps[Answer]:
             actions = self.registry.unregister_publisher(caller_id, topic, uri)
             if actions is not None:
-                self.note("-pub", caller_id, topic, uri)
-                self.say(f"-PUB [{topic}] {caller_id} {uri}")
-                yield from self.act_in_steps(actions)
+                self.record("-pub", caller_id, topic, uri)
+                self.log(f"-PUB [{topic}] {caller_id} {uri}")
+                yield from self.notify_in_steps(actions)
             return self._unregistered(caller_id, topic, actions is not None)
 
         return self._run(unregister(), self.registry.count_subscribers(topic))
@@ -233,32 +233,32 @@ class MasterApi(ABC):
         """Register a subscriber; return the URIs of the topic's publishers."""
         peers, actions = self.registry.register_subscriber(caller_id, topic, type_, uri)
         self._act(actions)
-        self.hold(uri, topic)
-        self.note("+sub", caller_id, topic, type_, uri)
-        self.say(f"+SUB [{topic}] {caller_id} {uri}")
+        self.defer(uri, topic)
+        self.record("+sub", caller_id, topic, type_, uri)
+        self.log(f"+SUB [{topic}] {caller_id} {uri}")
         return [SUCCESS, f"Subscribed to [{topic}]", peers]
 
     def unregister_subscriber(self, caller_id: str, topic: str, uri: str) -> Answer:
         """Unregister a subscriber."""
         gone = self.registry.unregister_subscriber(caller_id, topic, uri)
         if gone:
-            self.note("-sub", caller_id, topic, uri)
-            self.say(f"-SUB [{topic}] {caller_id} {uri}")
+            self.record("-sub", caller_id, topic, uri)
+            self.log(f"-SUB [{topic}] {caller_id} {uri}")
         return self._unregistered(caller_id, topic, gone)
 
     def register_service(self, caller_id: str, service: str, service_uri: str, uri: str) -> Answer:
         """Register a service."""
         actions = self.registry.register_service(caller_id, service, service_uri, uri)
         self._act(actions)
-        self.note("+srv", caller_id, service, service_uri, uri)
-        self.say(f"+SERVICE [{service}] {caller_id} {uri}")
+        self.record("+srv", caller_id, service, service_uri, uri)
+        self.log(f"+SERVICE [{service}] {caller_id} {uri}")
         return [SUCCESS, f"Registered [{caller_id}] as provider of [{service}]", 1]
 
     def unregister_service(self, caller_id: str, service: str, uri: str) -> Answer:
         """Unregister a service, which is called at ``uri``."""
         if self.registry.unregister_service(caller_id, service, uri):
-            self.note("-srv", caller_id, service, uri)
-            self.say(f"-SERVICE [{service}] {caller_id} {uri}")
+            self.record("-srv", caller_id, service, uri)
+            self.log(f"-SERVICE [{service}] {caller_id} {uri}")
             return [SUCCESS, f"Unregistered [{caller_id}] as provider of [{service}]", 1]
         if self.registry.node_uri(caller_id) is None:
             return [SUCCESS, f"[{caller_id}] is not a registered node", 0]
@@ -312,11 +312,11 @@ class MasterApi(ABC):
         except ValueError as error:
             raise CallRefused(f"Error: invalid arguments: {error}") from error
         if number is None:
-            self.note("set", name, value)
+            self.record("set", name, value)
         else:
-            self.note("put", name, number)
-        self.say(f"+PARAM [{name}] by {caller_id}")
-        yield from self.act_in_steps(updates)
+            self.record("put", name, number)
+        self.log(f"+PARAM [{name}] by {caller_id}")
+        yield from self.notify_in_steps(updates)
         return [SUCCESS, f"parameter {name} set", 0]
 
     def has_param(self, caller_id: str, name: str) -> Answer:
@@ -331,9 +331,9 @@ class MasterApi(ABC):
             return [ERROR, f"parameter [{name}] is not set", 0]
 
         def delete() -> Steps[Answer]:
-            self.note("del", name)
-            self.say(f"-PARAM [{name}] by {caller_id}")
-            yield from self.act_in_steps(updates)
+            self.record("del", name)
+            self.log(f"-PARAM [{name}] by {caller_id}")
+            yield from self.notify_in_steps(updates)
             return [SUCCESS, f"parameter {name} deleted", 0]
 
         return self._run(delete(), self.parameters.count_subscriptions())
@@ -369,17 +369,17 @@ class MasterApi(ABC):
             self.parameters.unsubscribe(name, caller_id, uri)
             raise
         self._act(actions)
-        self.hold(uri, PARAMETERS)
-        self.note("+par", caller_id, name, uri)
-        self.say(f"+CACHEDPARAM [{name}] by {caller_id}")
+        self.defer(uri, PARAMETERS)
+        self.record("+par", caller_id, name, uri)
+        self.log(f"+CACHEDPARAM [{name}] by {caller_id}")
         return [SUCCESS, f"Subscribed to parameter [{name}]", value]
 
     def unsubscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
         """Tell it no more."""
         if self.parameters.unsubscribe(name, caller_id, uri):
             self.registry.unregister_parameter(caller_id, key_of_node(name), uri)
-            self.note("-par", caller_id, name, uri)
-            self.say(f"-CACHEDPARAM [{name}] by {caller_id}")
+            self.record("-par", caller_id, name, uri)
+            self.log(f"-CACHEDPARAM [{name}] by {caller_id}")
         return [SUCCESS, f"Unsubscribe to parameter [{name}]", 1]
 
     # --- helpers
@@ -395,12 +395,12 @@ class MasterApi(ABC):
         """
         others = iter(actions)
         for action in islice(others, 1):
-            self.act(action)
+            self.notify(action)
         return others
 
     def _act(self, actions: Iterable[Notice]) -> None:
         for action in actions:
-            self.act(action)
+            self.notify(action)
 
     def _unregistered(self, caller_id: str, topic: str, gone: bool) -> Answer:
         if gone:

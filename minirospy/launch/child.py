@@ -89,12 +89,12 @@ class _Child(Launcher):
 
     def _launch(self, text: str) -> list[list[str]]:
         spec = load_text(text, {}, self._packages)
-        self._output.say("launching nodes...")
+        self._output.print("launching nodes...")
         names: list[list[str]] = [[], []]
         for node in spec.nodes:
             process = self.start_node(node)
             names[process is None].append(process.name if process else node.base_name)
-        self._output.say("... done launching nodes")
+        self._output.print("... done launching nodes")
         return names
 
     def _shutdown(self) -> int:

@@ -56,10 +56,10 @@ class LaunchMaster:
 
     def wait(self) -> None:
         """Wait until a master answers."""
-        self._output.say("roscore/master is not yet running, will wait for it to start")
+        self._output.print("roscore/master is not yet running, will wait for it to start")
         while not self.is_online():
             self._pause(0.1)
-        self._output.say("master has started, initiating launch")
+        self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
         """Start a master on this machine. Raises MasterUnreachableError where it belongs on another, MinirospyError."""
@@ -67,7 +67,7 @@ class LaunchMaster:
             # Its error names what is wrong: a name without an address, a master that is suspended.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
-        self._output.say("auto-starting new master")
+        self._output.print("auto-starting new master")
         port = str(self._environment.master_address[1])
         command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", port, *arguments]
         return start_process("master", command, environ=os.environ)
@@ -103,10 +103,10 @@ class LaunchMaster:
                 )
             self.run_id = self.run_id or str(uuid.uuid1())
             self._proxy.set_param("/run_id", self.run_id)
-            self._output.say(f"setting /run_id to {self.run_id}", bold=True)
+            self._output.print(f"setting /run_id to {self.run_id}", bold=True)
 
         try:
-            self._output.say(f"... logging to {self._output.log_to(self.log_folder)}")
+            self._output.print(f"... logging to {self._output.log_to(self.log_folder)}")
         except OSError as error:
             # A disk that is full or read-only must not stop the nodes.
             self.has_logs = False
@@ -122,13 +122,13 @@ class LaunchMaster:
 
         for command in spec.commands:
             if command.file is None:
-                self._output.say(f"running rosparam delete {command.name}")
+                self._output.print(f"running rosparam delete {command.name}")
                 try:
                     self._proxy.delete_param(command.name)
                 except RpcError:
                     self._output.warn(f"ERROR: parameter [{command.name}] is not set")
             else:
-                self._output.say(f"running rosparam dump {command.file} {command.name}")
+                self._output.print(f"running rosparam dump {command.file} {command.name}")
                 self._dump(command.name, command.file)
 
         for name, value in {**CORE_PARAMETERS, **spec.params}.items():

@@ -23,10 +23,10 @@ INFO, ERROR = 2, 8
 
 
 class Output:
-    """Says things on standard output and error; colours and titles where that is a terminal.
+    """Prints lines on standard output and error; colours and titles where that is a terminal.
 
     ``listener`` gets (level, text) of each line, too: a roslaunch on another machine passes them to the one that
-    started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when something is said.
+    started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when a line is printed.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
@@ -38,7 +38,7 @@ class Output:
         self._log: Path | None = None
         self._unlogged: list[str] = []
 
-    def say(self, text: str = "", *, bold: bool = False) -> None:
+    def print(self, text: str = "", *, bold: bool = False) -> None:
         """Print a line on standard output."""
         self._write(text, _BOLD if bold else "", INFO)
 
@@ -52,7 +52,7 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all that was and will be said into roslaunch-HOST-PID.log of ``folder``; its path. Raises OSError."""
+        """Write all lines, those before, too, into roslaunch-HOST-PID.log of ``folder``; its path. Raises OSError."""
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -143,7 +143,7 @@ class RemoteMachines:
             },
         )
         self._api = api
-        self._output.say(f"started roslaunch server {api.uri}", bold=True)
+        self._output.print(f"started roslaunch server {api.uri}", bold=True)
 
         by_machine: dict[tuple[str, str, int, str], list[tuple[NodeSpec, MachineSpec]]] = {}
         for node, machine in nodes:
@@ -152,7 +152,7 @@ class RemoteMachines:
         for number, group in enumerate(by_machine.values()):
             machine = group[0][1]
             name = f"{machine.address}-{number}"
-            self._output.say(f"remote[{name}] starting roslaunch")
+            self._output.print(f"remote[{name}] starting roslaunch")
             ssh = self._start_ssh(name, machine, api.uri)
             self._children[name] = _Child(name, machine, [node for node, _ in group], ssh)
         for child in self._children.values():
@@ -161,7 +161,7 @@ class RemoteMachines:
     def close(self) -> None:
         """End the nodes and the roslaunches of the other machines. Idempotent."""
         for child in self._children.values():
-            self._output.say(f"[{child.name}] killing on exit")
+            self._output.print(f"[{child.name}] killing on exit")
         threads = [
             threading.Thread(target=self._end, args=(child,), daemon=True)
             for child in self._children.values()
@@ -178,7 +178,7 @@ class RemoteMachines:
     def _start_ssh(self, name: str, machine: MachineSpec, uri: str) -> Process:
         where = f"{machine.user}@{machine.address}" if machine.user else machine.address
         user = f", user[{machine.user}]" if machine.user else ""
-        self._output.say(
+        self._output.print(
             f"remote[{name}]: creating ssh connection to {machine.address}:{machine.ssh_port}{user}"
         )
         if machine.password:
@@ -258,7 +258,7 @@ class RemoteMachines:
         return 1
 
     def _log(self, name: str, level: int, text: str) -> int:
-        write = self._output.warn if level >= 8 else self._output.say
+        write = self._output.warn if level >= 8 else self._output.print
         write(f"[{name}]: {text}")
         return 1
 

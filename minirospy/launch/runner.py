@@ -126,11 +126,11 @@ class Launcher:
 
         if not had_master:
             self._start_master()
-        self._output.say(f"ROS_MASTER_URI={self._environment.master_uri}", bold=True)
+        self._output.print(f"ROS_MASTER_URI={self._environment.master_uri}", bold=True)
         self._output.title(f"{self._options.name} {self._environment.master_uri}")
         if not had_master:
-            self._output.say(f"setting /run_id to {self.run_id}", bold=True)
-            self._output.say("started core service [/rosout]")
+            self._output.print(f"setting /run_id to {self.run_id}", bold=True)
+            self._output.print("started core service [/rosout]")
             # As in ROS, where /rosout is the first process of a master that roslaunch started.
             next(self._numbers)
 
@@ -194,10 +194,10 @@ class Launcher:
     def _show(self, here: list[NodeSpec], elsewhere: list[NodeSpec]) -> None:
         self._output.title(self._options.name)
         if self._options.local:
-            self._output.say("local only launch specified, will not launch remote nodes", bold=True)
+            self._output.print("local only launch specified, will not launch remote nodes", bold=True)
         if self._options.summary:
             params = {**self._spec.params, **CORE_PARAMETERS}
-            self._output.say(summary([*here, *elsewhere], params, self._spec.clear))
+            self._output.print(summary([*here, *elsewhere], params, self._spec.clear))
         for warning in self._spec.warnings:
             self._output.warn(f"WARNING: {warning}")
         for program in dict.fromkeys(self._programs(here)):
@@ -216,7 +216,7 @@ class Launcher:
         self._has_run = True
         self.guard(process)
         self.supervisor.add_master(process)
-        self._output.say(f"process[master]: started with pid [{process.pid}]", bold=True)
+        self._output.print(f"process[master]: started with pid [{process.pid}]", bold=True)
         self._master.wait_for_start(process)
 
     def _start_remote(self, nodes: list[NodeSpec]) -> None:
@@ -234,7 +234,7 @@ class Launcher:
             self._files.add(node)
         process = self._starter.start(node, name)
         self.guard(process)
-        self._output.say(f"process[{name}]: started with pid [{process.pid}]", bold=True)
+        self._output.print(f"process[{name}]: started with pid [{process.pid}]", bold=True)
         return process
 
     def guard(self, process: Process) -> None:
@@ -260,12 +260,12 @@ class Launcher:
         ``forever``: also where no node is left.
         """
         if not forever and not self.supervisor.is_anything_left:
-            self._output.say("No processes to monitor", bold=True)
+            self._output.print("No processes to monitor", bold=True)
         status = self.supervisor.watch(forever=forever)
         if status is not None:
             return status
         if self._has_run:
-            self._output.say("all processes on machine have died, roslaunch will exit")
+            self._output.print("all processes on machine have died, roslaunch will exit")
         return 0
 
     def stop(self, why: str) -> None:
@@ -314,18 +314,18 @@ class Launcher:
             ]
             self._output.warn("\n".join(["Shutdown errors:", *lines]))
         if self._has_begun:
-            self._output.say("shutting down processing monitor...")
-            self._output.say("... shutting down processing monitor complete")
+            self._output.print("shutting down processing monitor...")
+            self._output.print("... shutting down processing monitor complete")
             self._has_begun = False
         if self._has_run:
-            self._output.say("done", bold=True)
+            self._output.print("done", bold=True)
             self._has_run = False
         self._master.close()
 
     def _end(self, processes: list[Process]) -> list[Process]:
         """End processes; return those that needed SIGKILL."""
         for process in processes:
-            self._output.say(f"[{process.name}] killing on exit")
+            self._output.print(f"[{process.name}] killing on exit")
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:

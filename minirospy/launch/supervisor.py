@@ -227,7 +227,7 @@ class Supervisor:
             )
             return 0 if is_clean else 1
         if is_clean:
-            self._output.say(f"[{process.name}] {text}", bold=True)
+            self._output.print(f"[{process.name}] {text}", bold=True)
         else:
             self._output.warn(f"[{process.name}] {text}")
 
@@ -252,7 +252,7 @@ class Supervisor:
             self.processes.remove(process)
             return
         place = self.processes.index(process)
-        self._output.say(f"[{process.name}] restarting process")
+        self._output.print(f"[{process.name}] restarting process")
         try:
             again = self._start(node, process.name)
         except MinirospyError as error:
@@ -267,7 +267,7 @@ class Supervisor:
     def _restart_changed(self, files: FileWatch) -> None:
         for process in self.processes:
             if process.node and not process.is_restarting and (file := files.changed(process.node)):
-                self._output.say(f"[{process.name}] {file} has changed")
+                self._output.print(f"[{process.name}] {file} has changed")
                 process.is_restarting = True
                 if process.is_running:
                     threading.Thread(target=self.end_process, args=(process,), daemon=True).start()

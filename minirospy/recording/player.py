@@ -387,4 +387,4 @@ class Player:
             self._wait.until(min(end, now + _TICK))
 
     def _say(self, text: str, end: str = "\n") -> None:
-        self._stage.say(text, end)
+        self._stage.print(text, end)

@@ -74,7 +74,7 @@ class Stage(Protocol):
     def waiting_bytes(self) -> int:
         """Return how many bytes subscribers have not taken yet."""
 
-    def say(self, text: str, end: str = "\n") -> None:
+    def print(self, text: str, end: str = "\n") -> None:
         """Print a line for a person."""
 
 
@@ -144,11 +144,11 @@ class NodeStage:
 
         client.Service("~pause_playback", SetBool, pause)
         if self._options.rate_control_topic:
-            self.say("Creating rate control topic subscriber...", end="")
+            self.print("Creating rate control topic subscriber...", end="")
             client.Subscriber(
                 self._options.rate_control_topic, ReceivedFrame, self._on_rate_control, callback_args=player
             )
-            self.say(" done.")
+            self.print(" done.")
 
     def has_all_subscribers(self) -> bool:
         """See :meth:`Stage.has_all_subscribers`."""
@@ -185,8 +185,8 @@ class NodeStage:
         topics = [publisher.impl for publisher, _ in self._publishers.values()]
         return sum(link.waiting_bytes for topic in topics if topic for link in topic.publication.links)
 
-    def say(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Stage.say`."""
+    def print(self, text: str, end: str = "\n") -> None:
+        """See :meth:`Stage.print`."""
         with contextlib.suppress(OSError, ValueError):
             if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
                 # The status line, written again and again in its place.

@@ -29,8 +29,8 @@ class Recorded(MasterApi):
         self.done: list[Any] = []
         self.stored: list[object] = []
         self.lines: list[str] = []
-        self.note = lambda *record: self.done.append(list(record))
-        self.say = self.lines.append
+        self.record = lambda *record: self.done.append(list(record))
+        self.log = self.lines.append
         self.store = self._store
 
     def _store(self, value: object) -> Steps[int]:
@@ -42,10 +42,10 @@ class Recorded(MasterApi):
     def uri(self) -> str:
         return "http://master:1/"
 
-    def act(self, action: Notice) -> None:
+    def notify(self, action: Notice) -> None:
         self.done.append(action)
 
-    def hold(self, uri: str, topic: str) -> None:
+    def defer(self, uri: str, topic: str) -> None:
         self.done.append(("hold", uri, topic))
 
     def stop(self) -> None:

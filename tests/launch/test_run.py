@@ -143,7 +143,7 @@ def test_a_node_is_guarded_and_watched_before_it_is_announced(
     monkeypatch.setattr(Guardian, "add", lambda _, process: guarded.append(process.pid))
 
     class Hearing(Output):
-        def say(self, text: str = "", *, bold: bool = False) -> None:
+        def print(self, text: str = "", *, bold: bool = False) -> None:
             if text.startswith("process["):
                 found.append((bool(guarded), launcher._files.changed(node)))
 

@@ -178,7 +178,7 @@ def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
             # The answer falls anywhere between two ticks of the clock.
             await clock.advance(0.001 * fraction)
             registered = clock.time()
-            notifier.hold("http://n:1/", "/t")
+            notifier.defer("http://n:1/", "/t")
             await clock.advance(0.0195)
             notifier.send(PublisherUpdate("http://n:1/", "/t"))
             while not notified:
@@ -195,7 +195,7 @@ def test_update_after_the_pause_or_of_another_topic_is_sent_immediately() -> Non
         notified: list[str] = []
         notifier = Notifier(Graph(), Turns(), 5.0)
         notifier.here["http://n:1/"] = lambda topic, uris: notified.append(topic)
-        notifier.hold("http://n:1/", "/t")
+        notifier.defer("http://n:1/", "/t")
         notifier.send(PublisherUpdate("http://n:1/", "/other"))
         await clock.advance(0.0)
         assert notified == ["/other"]

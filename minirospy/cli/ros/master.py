@@ -253,7 +253,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
     try:
         _write_pid(pid_file)
         run_id = master.session or str(uuid.uuid1())
-        log_file, master.say = _log_to_file(
+        log_file, master.log = _log_to_file(
             environment.log_dir / run_id, verbose=options.verbose, level=options.master_logger_level
         )
         for key, value in (("/run_id", run_id), ("/rosdistro", DISTRO), ("/rosversion", ROS_VERSION)):
@@ -315,7 +315,7 @@ async def _run(
     try:
         if rosout:
             await rosout.start()
-            master.adopt(rosout.node)
+            master.attach(rosout.node)
         if not quiet:
             _show(f"setting /run_id to {run_id}")
             core = "started core service [/rosout]; " if rosout else ""

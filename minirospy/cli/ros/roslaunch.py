@@ -137,7 +137,7 @@ def _run(
     launcher = Launcher(spec, environment, packages, _run_options(options, name), output)
     if options.verbose:
         for file in spec.files:
-            output.say(f"... loading XML file [{file}]")
+            output.print(f"... loading XML file [{file}]")
     if not options.skip_log_check:
         from minirospy.launch.output import warn_of_large_logs
 

@@ -445,12 +445,12 @@ def setup_env(
 
 def printlog(msg: str) -> None:
     """Print a line to standard output."""
-    Output().say(msg)
+    Output().print(msg)
 
 
 def printlog_bold(msg: str) -> None:
     """Print a line to standard output, bold on a terminal."""
-    Output().say(msg, bold=True)
+    Output().print(msg, bold=True)
 
 
 def printerrlog(msg: str) -> None:

@@ -149,7 +149,7 @@ class ROSLaunchRunner:
             if self._launcher.supervisor.is_anything_left:
                 monitor.mainthread_spin()
             elif not monitor.done:
-                Output(title=False).say("No processes to monitor", bold=True)
+                Output(title=False).print("No processes to monitor", bold=True)
         except KeyboardInterrupt:
             # As in ROS, where it ends the nodes, and not the program.
             pass

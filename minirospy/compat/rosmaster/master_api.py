@@ -42,11 +42,11 @@ class _Api(MasterApi):
         """Return the address that :meth:`ROSMasterHandler._ready` was given."""
         return self.where
 
-    def act(self, action: Notice) -> None:
+    def notify(self, action: Notice) -> None:
         """Pass a notice on to the thread that sends it."""
         self.notices.put(action)
 
-    def hold(self, uri: str, topic: str) -> None:
+    def defer(self, uri: str, topic: str) -> None:
         """Hold nothing back: a notice carries the state of the moment in which it is sent."""
 
     def stop(self) -> None:

@@ -175,14 +175,14 @@ class Master(MasterApi):
         await self._server.close()
         await self._notifier.close()
         self._replaced.close()
-        self.note = nothing
+        self.record = nothing
         if self._journal:
             if keep_journal:
                 self._journal.close()
             else:
                 self._journal.remove()
 
-    def adopt(self, node: Node) -> None:
+    def attach(self, node: Node) -> None:
         """``node``, which has started, is on this loop: it is notified of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
@@ -212,7 +212,7 @@ class Master(MasterApi):
             self._state = (changes, state)
         return state
 
-    def act(self, action: Notice) -> None:
+    def notify(self, action: Notice) -> None:
         """Call the node that is to be notified."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
@@ -231,9 +231,9 @@ class Master(MasterApi):
         """Return the keys of parameters that the node at ``uri`` has subscribed to."""
         return self.parameters.subscribed_keys(uri)
 
-    def hold(self, uri: str, topic: str) -> None:
-        """See :meth:`Notifier.hold`."""
-        self._notifier.hold(uri, topic)
+    def defer(self, uri: str, topic: str) -> None:
+        """See :meth:`Notifier.defer`."""
+        self._notifier.defer(uri, topic)
 
     def stop(self) -> None:
         """Somebody asked the master to stop."""
@@ -314,7 +314,7 @@ class Master(MasterApi):
                 f"no journal, a crash of the master would lose the graph: {self._journal_path} cannot be written: "
                 f"{journal.trouble}; set ROS_HOME (it is tried again every {RETRY_SECONDS:.0f} s)"
             )
-        self.note, self.store = journal.append, journal.store
+        self.record, self.store = journal.append, journal.store
         self._touch()
         return self.registry.nodes()
 
@@ -389,7 +389,7 @@ class Master(MasterApi):
                 lives = await _lives(rpc, name, uri, _CHECK_SECONDS, _CHECK_TRIES)
             if not lives:
                 self._act(self._forget(name, uri))
-                self.note("gone", name, uri)
+                self.record("gone", name, uri)
                 return False
             if self.registry.node_uri(name) == uri:
                 self._act(PublisherUpdate(uri, topic) for topic in self.registry.subscriptions(name))
@@ -416,8 +416,8 @@ class Master(MasterApi):
                 async for name, uri in find_dead(rpc, self.registry.nodes()):
                     self.parameters.unsubscribe_node(name, uri)
                     actions = self.registry.forget(name, uri)
-                    self.note("gone", name, uri)
-                    self._server.turns.start(self.act_in_steps(actions))
+                    self.record("gone", name, uri)
+                    self._server.turns.start(self.notify_in_steps(actions))
                     count += 1
                     if count % _FORGOTTEN_AT_ONCE == 0:
                         await asyncio.sleep(0)

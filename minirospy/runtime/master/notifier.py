@@ -120,7 +120,7 @@ class Notifier:
         self._large_bytes = 0
         self._is_writing = False
 
-    def hold(self, uri: str, topic: str) -> None:
+    def defer(self, uri: str, topic: str) -> None:
         """Delay notices to a node whose answer reports a topic, or PARAMETERS, as it is now.
 
         A node of rospy that takes the update first and then the answer goes by the answer, the older of the two.

@@ -104,8 +104,8 @@ class ServiceClient:
         if not self._reader.rest:
             sockets.busy_poll(self._sock)
 
-        ok, length = parse_response_head(self._reader.take(RESPONSE_HEAD))
-        body = self._reader.take(length)
+        ok, length = parse_response_head(self._reader.read(RESPONSE_HEAD))
+        body = self._reader.read(length)
         if not ok:
             raise CallFailed(body)
         return body
@@ -130,10 +130,10 @@ class ServiceClient:
     def _receive_header(self) -> Header:
         sockets.busy_poll(self._sock)
         try:
-            length = parse_length(self._reader.take(LENGTH_BYTES))
+            length = parse_length(self._reader.read(LENGTH_BYTES))
             if length > MAX_HEADER:
                 raise WireError(f"{self.uri} does not speak TCPROS")
-            return parse_header(self._reader.take(length))
+            return parse_header(self._reader.read(length))
         except PeerEndedError as error:
             raise WireError(
                 "connection from sender terminated before handshake header received. "
@@ -173,7 +173,7 @@ class Reader:
         self.rest = b""
         """The bytes behind the last read."""
 
-    def take(self, count: int, *, at_end_ok: bool = False) -> bytes:
+    def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
         """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
         data = self.rest
         while len(data) < count:

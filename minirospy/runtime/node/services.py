@@ -134,12 +134,12 @@ class ServiceServer:
             sock.setblocking(True)
             reader = Reader(sock)
             while not self._closed:
-                head = reader.take(REQUEST_HEAD, at_end_ok=True)
+                head = reader.read(REQUEST_HEAD, at_end_ok=True)
                 if not head:
                     return
 
                 connection.busy = True
-                request = reader.take(parse_request_head(head))
+                request = reader.read(parse_request_head(head))
                 sock.sendall(self._respond(memoryview(request), fields))
                 connection.busy = False
                 if not persistent:

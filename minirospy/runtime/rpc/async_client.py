@@ -94,7 +94,7 @@ class AsyncRpcClient:
             call.fail(EOFError("the client was closed"))
         self.under_way.close()
 
-    def take(self, address: _Address) -> _Connection | None:
+    def acquire(self, address: _Address) -> _Connection | None:
         """Return a kept connection."""
         kept = self._idle.get(address)
         if not kept:
@@ -261,7 +261,7 @@ class Call:
 
         client = self._client
         client.under_way.set(self, self._timeout)
-        kept = client.take(self._address)
+        kept = client.acquire(self._address)
         if kept:
             self._is_kept = True
             self._use(kept)

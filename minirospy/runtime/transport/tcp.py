@@ -90,11 +90,11 @@ class HeaderMemory:
 
     def __init__(self, most: int = _MOST_LONG_HEADERS) -> None:
         self.held = 0
-        """Bytes that are taken."""
+        """Bytes that are reserved."""
         self._most = most
 
-    def take(self, count: int) -> None:
-        """Take memory, to be returned by :meth:`free`. Raises WireError where it is too much."""
+    def reserve(self, count: int) -> None:
+        """Reserve memory, to be returned by :meth:`free`. Raises WireError where it is too much."""
         if self.held + count > self._most:
             raise WireError("too many long connection headers are being received at the same time")
         self.held += count
@@ -318,7 +318,7 @@ async def _receive_exactly(
                 raise (WireError if data else nothing)("the peer closed the connection during the handshake")
             data += more
             if len(data) > _SHORT_HEADER:
-                memory.take(len(more))
+                memory.reserve(len(more))
                 taken += len(more)
         return bytes(data)
     finally:
