@@ -37,7 +37,7 @@ class Codes:
         self._waiting[code] = token, self._clock() + _SECONDS
         return code
 
-    def take(self, code: str) -> str:
+    def redeem(self, code: str) -> str:
         """Return the token of a code, which is used with that; "" where there is none."""
         token, end = self._waiting.pop(code, ("", 0.0))
         return token if self._clock() < end else ""
@@ -45,7 +45,7 @@ class Codes:
     def serve(self, exchange: Exchange) -> None:
         """Answer the page that sends a code as a bearer token."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
-        token = self.take(code)
+        token = self.redeem(code)
         if token and users_of(exchange.request.peer_port, exchange.request.port) <= {0, _user()}:
             exchange.respond(200, token.encode())
         else:

@@ -259,10 +259,10 @@ def test_a_flow_that_floods_loses_its_own_messages() -> None:
         queue.add(flood, number, 1)
     queue.add(quiet, -1, 1)
     assert flood.dropped == 990
-    taken = [queue.take() for _ in range(11)]
+    taken = [queue.pop() for _ in range(11)]
     assert [each[1] for each in taken if each][:2] == [990, -1]
     assert (flood.passed, quiet.passed, quiet.dropped) == (10, 1, 0)
-    assert queue.take() is None
+    assert queue.pop() is None
 
 
 def test_large_messages_are_limited_by_their_bytes() -> None:
@@ -271,11 +271,11 @@ def test_large_messages_are_limited_by_their_bytes() -> None:
     assert queue.add(flow, "huge", 5000) == 0
     assert queue.add(flow, "large", 900) == 1
     assert queue.add(flow, "small", 50) == 0
-    assert [queue.take(), queue.take()] == [(flow, "large"), (flow, "small")]
+    assert [queue.pop(), queue.pop()] == [(flow, "large"), (flow, "small")]
     assert flow.waiting_bytes == 0
     queue.add(flow, "left", 10)
     queue.forget(flow)
-    assert queue.take() is None
+    assert queue.pop() is None
     assert len(queue) == 0
 
 

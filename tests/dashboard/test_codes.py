@@ -23,9 +23,9 @@ def test_code_is_used_once_within_a_minute() -> None:
     kept = Codes(lambda: now)
     first, second = kept.new("token-1"), kept.new("token-2")
     assert first != second
-    assert (kept.take("x"), kept.take(first), kept.take(first)) == ("", "token-1", "")
+    assert (kept.redeem("x"), kept.redeem(first), kept.redeem(first)) == ("", "token-1", "")
     now = 61.0
-    assert kept.take(second) == ""
+    assert kept.redeem(second) == ""
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="by Linux's table of sockets")

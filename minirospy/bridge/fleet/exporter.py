@@ -240,7 +240,7 @@ class Exporter:
     async def _hold(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
         inbound = self._inbound_of(topic)
         if inbound:
-            inbound.hold(md5sum, writer, body)
+            inbound.keep(md5sum, writer, body)
 
     async def _call(self, key: str, request: bytes) -> bytes:
         parsed = parse_call(key)

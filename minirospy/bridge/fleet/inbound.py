@@ -108,7 +108,7 @@ class InboundTopic:
         self._put(publisher, body)
         return True
 
-    def hold(self, md5sum: str, writer: str, body: bytes) -> None:
+    def keep(self, md5sum: str, writer: str, body: bytes) -> None:
         """Keep a message that has come before the topic is ready. On the loop."""
         if self.publish(md5sum, body):
             return

@@ -51,7 +51,7 @@ class FlowQueue(Generic[_T]):
         self._ready.setdefault(flow, None)
         return dropped
 
-    def take(self) -> tuple[Flow[_T], _T] | None:
+    def pop(self) -> tuple[Flow[_T], _T] | None:
         """Return the next message, of the flow whose turn it is; None where none waits."""
         while self._ready:
             flow, _ = self._ready.popitem(last=False)

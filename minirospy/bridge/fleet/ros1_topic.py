@@ -170,7 +170,7 @@ class Ros1Topic:
 
     async def _hold(self, message: bytes) -> None:
         if not self._is_closed:
-            self._inbound().hold(self.token.md5sum, _WRITER, message)
+            self._inbound().keep(self.token.md5sum, _WRITER, message)
 
 
 def _is_marked(header: Header) -> bool:

@@ -124,7 +124,7 @@ class _LaneWorker(_Worker):
                 if self._is_closed:
                     return
                 ended, self._ended = self._ended, []
-                taken = self._queue.take()
+                taken = self._queue.pop()
                 outflow = self._owners.get(taken[0]) if taken else None
             try:
                 for each in ended:
@@ -236,7 +236,7 @@ class Intake(_Worker):
                     self._condition.wait()
                 if self._is_closed:
                     return
-                taken = self._queue.take()
+                taken = self._queue.pop()
             if taken:
                 deliver, message, attachment = taken[1]
                 try:
