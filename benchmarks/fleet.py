@@ -103,6 +103,7 @@ async def control(endpoint, expected):
     from minirospy import Node
     from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
     from minirospy.bridge.fleet.network import NetworkOptions
+    from minirospy.errors import MasterUnreachableError
     from minirospy.runtime.master.master import Master
 
     master = Master()
@@ -113,7 +114,12 @@ async def control(endpoint, expected):
     async def shown(count):
         """Return when the master has so many names of robots."""
         while True:
-            state = await node._node.master("getSystemState")
+            try:
+                state = await node._node.master("getSystemState")
+            except MasterUnreachableError:
+                # It shares the cores with a thousand robots that come back.
+                await asyncio.sleep(1.0)
+                continue
             every = {name for table in state for name, _ in table}
             found = sum(name.startswith("/robot") for name in every)
             if found == count:

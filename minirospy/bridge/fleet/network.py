@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from minirospy.bridge.fleet.rules import Lane
+from minirospy.bridge.linger import LingerRemover
+from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.zenoh_library import (
     DEFAULT_ENDPOINT,
     DEFAULT_PORT,
@@ -57,6 +59,7 @@ _T = TypeVar("_T")
 MOST_TEXT = 16 << 20
 """Bytes of a query or a reply that is read at most: a response of a service, a definition."""
 _RETRY_SECONDS = 1.0
+_LINGER_SECONDS = 2.0
 _QUERIES = 200
 """Calls of services and parameters that are answered at the same time; more are refused."""
 _CONTROL_QUERIES = 50
@@ -66,6 +69,14 @@ _CONTROL_QUERIES = 50
 # --- the network
 
 
+async def _remove_linger() -> None:
+    """Remove SO_LINGER from each link of Zenoh, long before its lease of 10 s ends."""
+    remover = LingerRemover()
+    while True:
+        remover.look()
+        await asyncio.sleep(_LINGER_SECONDS)
+
+
 class QueryFailed(MinirospyError):
     """A query got no answer, or one that says why it failed."""
 
@@ -73,7 +84,9 @@ class QueryFailed(MinirospyError):
 class FleetNetwork:
     """A session of Zenoh; made by :meth:`open`. Handlers are called on the loop that opened it."""
 
-    def __init__(self, session: Session, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, session: Session, loop: asyncio.AbstractEventLoop, *, has_many_links: bool = False
+    ) -> None:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
@@ -83,11 +96,16 @@ class FleetNetwork:
         self._calls = _Share(_QUERIES)
         self._control = _Share(_CONTROL_QUERIES)
         self._is_closed = False
+        faults = Faults(_log, "the search for links of Zenoh")
+        self._lingering = (
+            asyncio.ensure_future(keep_running(_remove_linger, faults)) if has_many_links else None
+        )
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
         """Open a session; ``waits``: until the other end is there. Raise BridgeError where the configuration is not right."""
-        require_zenoh(has_many_links=bool(options.listen or options.config))
+        has_many_links = bool(options.listen or options.config)
+        require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
         loop = asyncio.get_running_loop()
         config = configured(options)
@@ -96,7 +114,8 @@ class FleetNetwork:
 
         while True:
             try:
-                return cls(await loop.run_in_executor(None, functools.partial(zenoh.open, config)), loop)
+                session = await loop.run_in_executor(None, functools.partial(zenoh.open, config))
+                return cls(session, loop, has_many_links=has_many_links)
             except zenoh.ZError as error:
                 text = one_line(error)
                 if "Unable to connect" not in text:
@@ -122,9 +141,10 @@ class FleetNetwork:
         if self._is_closed:
             return
         self._is_closed = True
-        for task in list(self._answering):
+        tasks = [*self._answering, *([self._lingering] if self._lingering else [])]
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(*self._answering, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
         # Of a link that is cut: the other end notices by itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
