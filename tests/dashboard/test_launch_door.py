@@ -310,7 +310,7 @@ def test_nothing_is_started_once_the_dashboard_closes(
 def test_lines_since_a_number_are_neither_lost_nor_repeated() -> None:
     lines = _Lines(lambda: None)
     total, seen, count = 1500, list[str](), 0
-    writing = threading.Thread(target=lambda: [lines.say(str(number)) for number in range(total)])
+    writing = threading.Thread(target=lambda: [lines.print(str(number)) for number in range(total)])
     writing.start()
     while len(seen) < total and (writing.is_alive() or count < total):
         new, count = lines.since(count)
