@@ -8,7 +8,7 @@ from functools import partial
 from typing import Generic, TypeVar
 
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import MinirospyError, ROSException
+from minirospy.errors import MinirospyError, ServiceException
 
 __all__ = ["AT_ONCE", "NodeQueries"]
 
@@ -89,7 +89,7 @@ class NodeQueries(Generic[_Key, _Found]):
         """Query once; return whether there is an answer to what is still present."""
         try:
             found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
-        except (MinirospyError, ROSException, OSError, asyncio.TimeoutError, ValueError):
+        except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
             self._failed(key)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
             self._faults.report(error)

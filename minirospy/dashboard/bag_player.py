@@ -136,7 +136,7 @@ class GraphStage:
         return 0
 
     def print(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Stage.print`: there is no terminal."""
+        """See :meth:`Stage.print`: nothing is printed, the page shows the state."""
 
     def _send_clock(self, time: int) -> None:
         if self._clock:

@@ -11,7 +11,7 @@ import pytest
 from minirospy.bridge import node_queries
 from minirospy.bridge.node_queries import AT_ONCE, NodeQueries
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import BridgeError
+from minirospy.errors import BridgeError, ServiceException
 from tests.waiting import until
 
 LIMIT = 60.0
@@ -185,3 +185,17 @@ def test_what_nobody_foresaw_of_one_node_is_reported(caplog: pytest.LogCaptureFi
 
     asyncio.run(asyncio.wait_for(run(), LIMIT))
     assert "the query failed at" in caplog.text
+
+
+def test_a_service_that_cannot_be_reached_is_not_reported(caplog: pytest.LogCaptureFixture) -> None:
+    async def run() -> None:
+        async def answer(name: str) -> str:
+            raise ServiceException(f"service [{name}] cannot be reached")
+
+        queries = NodeQueries(answer, Faults(logging.getLogger("test"), "the query"))
+        await queries.look(["/dead"], LIMIT)
+        assert "/dead" in queries._not_before
+        await queries.close()
+
+    asyncio.run(asyncio.wait_for(run(), LIMIT))
+    assert not caplog.text
