@@ -99,6 +99,7 @@ def test_nodes_are_queried_and_their_traffic_is_counted(master: str) -> None:
             await nodes[-1].start()
         publisher = nodes[0].advertise("/words", String, queue_size=None)
         subscription = await nodes[1].subscribe("/words", String)
+        await publisher.wait_for_subscribers(timeout=60)
         kept.append(await nodes[2].subscribe("/words", Bool))
         return publisher, subscription
 
