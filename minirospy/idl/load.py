@@ -243,13 +243,20 @@ def _is_module(name: str) -> bool:
 
 
 def write_if_changed(path: Path, text: str) -> bool:
-    """Write a file unless it says that already; whether it was written."""
+    """Write a file unless it says that already; whether it was written.
+
+    Its time is a later second than before: by second and size Python decides whether a compiled module is of this source.
+    """
     data = text.encode()
+    earliest = 0
     with contextlib.suppress(OSError):
         if path.read_bytes() == data:
             return False
+        earliest = int(path.stat().st_mtime) + 1
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
+    if path.stat().st_mtime < earliest:
+        os.utime(path, (earliest, earliest))
     return True
 
 
