@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 from pathlib import Path
 
@@ -116,25 +117,24 @@ FILES = sorted(
 )
 
 
-def imports(path: Path, *, for_types: bool = True) -> set[str]:
+@functools.cache
+def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
     """Return every module that a file imports, wherever in the file; without ``for_types`` only what runs."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    unseen: set[ast.AST] = set()
-    if not for_types:
-        for block in ast.walk(tree):
-            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING":
-                unseen.update(child for statement in block.body for child in ast.walk(statement))
-
     found: set[str] = set()
-    for node in ast.walk(tree):
-        if node in unseen:
-            continue
+    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while blocks:
+        node = blocks.pop()
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
+        elif isinstance(node, ast.If) and not for_types and ast.unparse(node.test) == "TYPE_CHECKING":
+            blocks += node.orelse
+        elif not isinstance(node, ast.expr):
+            # Imports are statements, and no expression has one.
+            blocks += ast.iter_child_nodes(node)
+    return frozenset(found)
 
 
 def graph_of_imports(room: str) -> dict[str, set[str]]:
@@ -143,7 +143,9 @@ def graph_of_imports(room: str) -> dict[str, set[str]]:
     modules = {module_name(path): path for path in files}
     found = {module: imports(path, for_types=False) for module, path in modules.items()}
     # `from package.module import name` and `from package import module` look alike.
-    named = {module: names | {name.rpartition(".")[0] for name in names} for module, names in found.items()}
+    named = {
+        module: set(names) | {name.rpartition(".")[0] for name in names} for module, names in found.items()
+    }
     for module in modules:
         named[module] -= {name.rpartition(".")[0] for name in found[module] if name in modules}
     return {module: (names & modules.keys()) - {module} for module, names in named.items()}

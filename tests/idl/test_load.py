@@ -25,8 +25,9 @@ def test_module_that_is_written_again_is_compiled_again(
 
 
 def imported_x(path: Path) -> object:
-    spec = spec_from_loader("made", SourceFileLoader("made", str(path)))
-    assert spec and spec.loader
+    loader = SourceFileLoader("made", str(path))
+    spec = spec_from_loader("made", loader)
+    assert spec
     module = module_from_spec(spec)
-    spec.loader.exec_module(module)
+    loader.exec_module(module)
     return module.x
