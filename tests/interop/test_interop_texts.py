@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +13,7 @@ from geometry_msgs.msg import PoseWithCovariance
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool
 
+import minirospy.dashboard
 from minirospy.dashboard.views import VIEWS
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import Page
@@ -46,6 +49,8 @@ TRANSLATED = (
 )
 """The views whose texts have German ones; add yours."""
 
+PAGE = Path(minirospy.dashboard.__file__).parent / "page"
+
 SETTINGS = {
     "plot": "?path=/button_state/data",
     "layout": "?tree=row(topics,console)",
@@ -69,6 +74,17 @@ def test_language_is_the_chosen_one_else_the_first_of_the_browser_that_is_there(
     assert run_script("chooseLanguage, t", "js/texts.js", body) == [
         "Anhalten", "Pause", "Pause", "Anhalten", "Pause {none}", "1 von <b> Topics", "constructor",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("module", ["form.js", "paths.js", "reconfigure.js", "ros1.js", "widgets.js"])
+def test_every_error_of_a_person_has_a_german_text(module: str) -> None:
+    """What a person may type wrong; each is thrown as a TextError or through t()."""
+    text = (PAGE / "js" / module).read_text(encoding="utf-8")
+    german = (PAGE / "js" / "german.js").read_text(encoding="utf-8")
+    assert re.findall(r"new Error\((?!t\()", text) == []
+    thrown = re.findall(r'Error\((?:t\()?("(?:[^"\\]|\\.)*")', text)
+    assert thrown
+    assert [each for each in thrown if f"{each}: " not in german] == []
 
 
 def speak_german(page: Page) -> None:

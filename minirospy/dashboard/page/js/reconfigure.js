@@ -1,6 +1,8 @@
 // Configurations of dynamic_reconfigure: what a server describes, the values it has, requests that change them. Pure.
 // Source: http://wiki.ros.org/dynamic_reconfigure; encodings of enums as parameter_generator writes them.
 
+import { TextError } from "./ros1.js";
+
 const LISTS = { bool: "bools", int: "ints", str: "strs", double: "doubles" };
 const INT_LIMIT = 2 ** 31 - 1;
 const TRUE = ["true", "yes", "on", "1"];
@@ -13,7 +15,7 @@ export function parseLiteral(text) {
   const reader = { text, at: 0 };
   const value = literal(reader);
   blank(reader);
-  if (reader.at < text.length) throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected`);
+  if (reader.at < text.length) throw new TextError("\"{text}\" is not expected", { text: text.slice(reader.at, reader.at + 20) });
   return value;
 }
 
@@ -27,7 +29,7 @@ function literal(reader) {
   if (first === "{") {
     return Object.fromEntries(items(reader, "}", () => {
       const key = literal(reader);
-      if (blank(reader) !== ":") throw new Error("a colon is missing");
+      if (blank(reader) !== ":") throw new TextError("a colon is missing");
       reader.at += 1;
       return [key, literal(reader)];
     }));
@@ -39,7 +41,7 @@ function literal(reader) {
   const word = /^[-+\w.]+/.exec(reader.text.slice(reader.at))?.[0] ?? "";
   reader.at += word.length;
   if (Object.hasOwn(WORDS, word)) return WORDS[word];
-  if (!word || Number.isNaN(Number(word))) throw new Error(`"${word || first || ""}" is not a value`);
+  if (!word || Number.isNaN(Number(word))) throw new TextError("\"{text}\" is not a value", { text: word || first || "" });
   return Number(word);
 }
 
@@ -49,7 +51,7 @@ function items(reader, end, read) {
   while (blank(reader) !== end) {
     found.push(read());
     if (blank(reader) === ",") reader.at += 1;
-    else if (blank(reader) !== end) throw new Error("a comma is missing");
+    else if (blank(reader) !== end) throw new TextError("a comma is missing");
   }
   reader.at += 1;
   return found;
@@ -59,7 +61,7 @@ function string(reader, [start, quote]) {
   reader.at += start.length;
   let found = "";
   while (reader.text[reader.at] !== quote) {
-    if (reader.at >= reader.text.length) throw new Error("a quote is missing");
+    if (reader.at >= reader.text.length) throw new TextError("a quote is missing");
     let next = reader.text[reader.at++];
     if (next === "\\") {
       next = reader.text[reader.at++] ?? "";
@@ -139,12 +141,12 @@ export function converted({ name, type, constants }, given) {
   if (type === "bool") {
     if (TRUE.includes(text.toLowerCase())) return true;
     if (FALSE.includes(text.toLowerCase())) return false;
-    throw new Error(`${name}: "${text}" is not true or false`);
+    throw new TextError("{name}: \"{text}\" is not true or false", { name, text });
   }
   const number = { inf: Infinity, "+inf": Infinity, "-inf": -Infinity, nan: NaN }[text.toLowerCase()] ?? (text === "" ? NaN : Number(text));
-  if (Number.isNaN(number) && text.toLowerCase() !== "nan") throw new Error(`${name}: "${text}" is not a number`);
+  if (Number.isNaN(number) && text.toLowerCase() !== "nan") throw new TextError("{name}: \"{text}\" is not a number", { name, text });
   if (type === "double") return number;
-  if (!Number.isInteger(number) || number > INT_LIMIT || number < -INT_LIMIT - 1) throw new Error(`${name}: "${text}" is not a whole number of 32 bits`);
+  if (!Number.isInteger(number) || number > INT_LIMIT || number < -INT_LIMIT - 1) throw new TextError("{name}: \"{text}\" is not a whole number of 32 bits", { name, text });
   return number;
 }
 

@@ -1,7 +1,7 @@
 // The small panels: their settings as text in links, the value of a field of any type, the message that sets one. Pure.
 
 import { numberOf, parseSteps } from "./paths.js";
-import { isList } from "./ros1.js";
+import { TextError, isList } from "./ros1.js";
 
 /** Kind -> what it does, and its settings with their usual values. */
 export const KINDS = {
@@ -65,20 +65,20 @@ export function messageWith(definition, steps, text) {
   if (!definition.fields.length) return message;
   // Without a field it is the only one, as data of std_msgs.
   if (!rest.length) {
-    if (definition.fields.length !== 1) throw new Error(`name a field: ${definition.fields.map((field) => field.name).join(", ")}`);
+    if (definition.fields.length !== 1) throw new TextError("name a field: {fields}", { fields: namesOf(definition) });
     rest = [definition.fields[0].name];
   }
   while (rest.length) {
     const name = rest.shift();
     const field = inside.fields.find((each) => each.name === name);
-    if (!field) throw new Error(`there is no field "${name}": there is ${inside.fields.map((each) => each.name).join(", ")}`);
-    if (field.isArray) throw new Error(`"${name}" is an array: a panel sets one value`);
+    if (!field) throw new TextError("there is no field \"{name}\": there is {fields}", { name, fields: namesOf(inside) });
+    if (field.isArray) throw new TextError("\"{name}\" is an array: a panel sets one value", { name });
     if (!field.message) {
-      if (rest.length) throw new Error(`"${name}" has no fields`);
+      if (rest.length) throw new TextError("\"{name}\" has no fields", { name });
       at[name] = valueOf(field.type, text);
     } else {
       if (!rest.length) rest = field.message.fields.length === 1 ? [field.message.fields[0].name] : rest;
-      if (!rest.length) throw new Error(`name a field of "${name}": ${field.message.fields.map((each) => each.name).join(", ")}`);
+      if (!rest.length) throw new TextError("name a field of \"{name}\": {fields}", { name, fields: namesOf(field.message) });
       at[name] = {};
       at = at[name];
       inside = field.message;
@@ -86,6 +86,8 @@ export function messageWith(definition, steps, text) {
   }
   return message;
 }
+
+const namesOf = (definition) => definition.fields.map((field) => field.name).join(", ");
 
 /** Return whether a value is that of a text: as a number where it is one. */
 export function isSame(value, text) {
@@ -97,7 +99,7 @@ export function isSame(value, text) {
 function valueOf(type, text) {
   if (type === "string") return String(text);
   const number = { true: 1, false: 0 }[String(text).trim().toLowerCase()] ?? Number(text);
-  if (!Number.isFinite(number) || String(text).trim() === "") throw new Error(`"${text}" is not a number`);
+  if (!Number.isFinite(number) || String(text).trim() === "") throw new TextError("\"{text}\" is not a number", { text });
   if (type === "bool") return number !== 0;
   if (type === "time" || type === "duration") return { secs: Math.floor(number), nsecs: Math.round((number - Math.floor(number)) * 1e9) };
   if (type.endsWith("64") && type !== "float64") return BigInt(Math.round(number));

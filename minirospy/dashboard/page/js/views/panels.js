@@ -390,10 +390,10 @@ class Panel {
     if (!this.name) return this.fail(t("waiting for {path}", { path: this.spec.path }));
     try {
       const sending = this.spec.isService ? this.call(text) : this.publish(text);
-      sending.then((answer) => this.say(answer), (error) => this.fail(error.message));
+      sending.then((answer) => this.say(answer), (error) => this.fail(errorText(error)));
       return true;
     } catch (error) {
-      return this.fail(error.message);
+      return this.fail(errorText(error));
     }
   }
 

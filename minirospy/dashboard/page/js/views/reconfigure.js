@@ -2,7 +2,7 @@
 
 import { download, fill, h, setText } from "../dom.js";
 import { converted, describe, requestOf, shownNumber, sliderStep, statesOf, valuesOf, yamlOf } from "../reconfigure.js";
-import { t } from "../texts.js";
+import { t, errorText } from "../texts.js";
 
 const DESCRIPTIONS = "/parameter_descriptions";
 const UPDATES = "/parameter_updates";
@@ -289,7 +289,7 @@ class Panel {
         control.show(value, true);
         change(parameter.name, value);
       } catch (error) {
-        this.note(error.message, true);
+        this.note(errorText(error), true);
       }
     });
     this.controls.set(parameter.name, control);
@@ -371,7 +371,7 @@ class Panel {
       this.note(t("{count} values of {name}", { count: found.length, name: file.name }) + (others.length ? t("; not known here: {names}", { names: others.slice(0, 5).join(", ") }) : ""));
       await this.send();
     } catch (error) {
-      this.note(`${file.name}: ${error.message}`, true);
+      this.note(`${file.name}: ${errorText(error)}`, true);
     }
   }
 }
