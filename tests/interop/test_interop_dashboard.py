@@ -742,6 +742,12 @@ def test_parameters_are_shown_set_and_deleted(
     page.wait("return document.querySelector(\"[data-name='/robot/speed'] input\")?.value === '1.5'")
     served.run(node.set_param("/robot/speed", 2))
     page.wait("return document.querySelector(\"[data-name='/robot/speed'] input\")?.value === '2'")
+    served.run(node.set_param("/robot/gains", [2.0, 1.5]))
+    page.wait("return document.querySelector(\"[data-name='/robot/gains'] input\")?.value === '[2.0,1.5]'")
+    page.type("[data-name='/robot/gains'] input", "[2.0, 3.0]")
+    page.evaluate("document.querySelector(\"[data-name='/robot/gains']\").requestSubmit()")
+    page.wait("return document.querySelector(\"[data-name='/robot/gains'] input\")?.value === '[2.0,3.0]'")
+    assert repr(served.run(node.get_param("/robot/gains"))) == "[2.0, 3.0]"
     page.type("input[placeholder='/name']", "/robot/list")
     page.type("input[placeholder^=value]", "[1, 2.0")
     page.wait_text(".preview-type", "expected")

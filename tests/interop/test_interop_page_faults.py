@@ -116,6 +116,13 @@ def test_parameter_is_shown_as_text_that_is_read_as_the_same_value() -> None:
     texts = page_functions(*(("views/parameters", "textOf", [value]) for value in values))
     assert [parse_value(text) for text in texts] == values
 
+    doubles = [2.0, -3.0, 1e20, 1e21, 0.5, [1.0, 2.5, -1e-9]]
+    types = ["float64"] * 5 + ["float64_array"]
+    texts = page_functions(
+        *(("views/parameters", "textOf", [*each]) for each in zip(doubles, types, strict=True))
+    )
+    assert [repr(parse_value(text)) for text in texts] == [repr(each) for each in doubles]
+
 
 @needs_node
 def test_message_with_a_field_called_length_is_not_shown_as_an_array() -> None:

@@ -14,6 +14,7 @@ export class Link extends EventTarget {
     this.services = new Map(); // name -> {name, type, request}
     this.graph = { published: new Map(), subscribed: new Map(), services: new Map() };
     this.parameters = new Map();
+    this.parameterTypes = new Map(); // "float64" and "float64_array" where the numbers are doubles
     this.time = null; // seconds of /clock, where time is simulated
     this.token = token;
     this.entries = new Map();
@@ -71,7 +72,8 @@ export class Link extends EventTarget {
     },
     parameters: ({ parameters, isAll }) => {
       if (isAll) this.parameters = new Map();
-      for (const { name, value } of parameters) {
+      for (const { name, value, type } of parameters) {
+        this.parameterTypes.set(name, type);
         if (value === undefined) {
           for (const each of [...this.parameters.keys()]) {
             if (each === name || each.startsWith(`${name}/`)) this.parameters.delete(each);

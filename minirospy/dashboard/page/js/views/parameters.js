@@ -43,7 +43,7 @@ export class Parameters {
         row = this.makeRow(name);
         this.rows.set(name, row);
       }
-      const text = textOf(this.link.parameters.get(name));
+      const text = textOf(this.link.parameters.get(name), this.link.parameterTypes.get(name));
       // What a person is typing stays.
       if (row.text !== text && document.activeElement !== row.input) row.input.value = text;
       row.text = text;
@@ -60,7 +60,7 @@ export class Parameters {
     const row = { input, text: "" };
     const element = h("form", { class: "row parameter", onsubmit: (event) => {
       event.preventDefault();
-      // What was not changed stays as it is: a double without a fraction is shown as an int.
+      // What was not changed stays as it is: doubles in lists of other values look like ints.
       const text = input.value;
       input.blur();
       if (text !== row.text) this.set(name, text, typed);
@@ -128,8 +128,10 @@ export class Parameters {
   }
 }
 
-/** Return a value as text of which the server reads the same value. */
-export function textOf(value) {
+/** Return a value as text of which the server reads the same value; the type says where numbers are doubles. */
+export function textOf(value, type) {
+  if (type === "float64_array") return `[${value.map((each) => textOf(each, "float64")).join(",")}]`;
+  if (type === "float64" && Number.isInteger(value) && Math.abs(value) < 1e21) return `${value}.0`;
   // JSON, but for numbers such as 1e-7: to YAML 1.1 they are texts.
   return quoted(value).replace(/"(?:[^"\\]|\\.)*"|(-?\d+)(\.\d+)?e/g, (all, digits, fraction) => (digits === undefined || fraction ? all : `${digits}.0e`));
 }
