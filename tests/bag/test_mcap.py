@@ -207,7 +207,13 @@ def test_a_file_that_is_cut_off_is_repaired_up_to_its_last_whole_chunk(compressi
     expected = library_reads(whole)
     data = whole.getvalue()
     last = 0
-    for size in [*range(60, len(data) - 700, len(data) // 100), *range(len(data) - 700, len(data) + 1)]:
+    # What comes behind the chunks is compressed in no file.
+    step = 1 if compression == "none" else 7
+    for size in [
+        *range(60, len(data) - 700, len(data) // 100),
+        *range(len(data) - 700, len(data), step),
+        len(data),
+    ]:
         _, stream = repaired(data[:size])
         found = library_reads(stream)
         assert set(found) <= set(expected)
