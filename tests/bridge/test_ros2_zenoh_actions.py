@@ -104,7 +104,10 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 
 
 class Server:
-    """A server of /fly in ROS 2: refuses a negative order, aborts 13, and ends 7 when it is cancelled."""
+    """A server of /fly in ROS 2: refuses a negative order, aborts 13, ends 3 when told, and 7 when it is cancelled.
+
+    Feedback and result come by two ways: what must be seen of a goal is awaited before it ends.
+    """
 
     def __init__(self, node: RmwNode) -> None:
         self.node = node
@@ -134,7 +137,7 @@ class Server:
 
     def get_result(self, query: Any) -> None:
         id = query.payload.to_bytes()[4:]
-        if self.goals[id] == 7:
+        if self.goals[id] in (3, 7):
             self.waiting[id] = query
         else:
             self.end(query, ABORTED if self.goals[id] == 13 else SUCCEEDED, self.goals[id])
@@ -156,7 +159,12 @@ def test_goals_of_ros1_reach_a_server_over_zenoh(node: RmwNode, endpoint: str) -
         async with ActionClient(other, "/fly", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
-            assert [list(each.sequence) async for each in goal] == [[0], [0, 1], [0, 1, 2]]
+            feedback = aiter(goal)
+            for count in (1, 2, 3):
+                assert list((await anext(feedback)).sequence) == list(range(count))
+            await until(lambda: bool(server.waiting))
+            server.end(server.waiting.popitem()[1], SUCCEEDED, 3)
+            assert [each async for each in feedback] == []
             assert list((await goal).sequence) == [0, 1, 2]
             assert await end_of(client.send(FibonacciGoal(order=13))) == (
                 GoalState.ABORTED,
