@@ -224,37 +224,27 @@ def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
 def test_one_address_is_in_sdist_and_wheel(tmp_path: Path) -> None:
     """Given when the sdist is made: a wheel that others build of it has the same metadata."""
     address = "https://git.example.org/robots/ours"
-    sdist = _built(tmp_path / "sdist", "sdist", ROOT, address)
+    sdist = _build(tmp_path, "--sdist", ROOT, {ADDRESS_VARIABLE: address})
     with tarfile.open(sdist) as archive:
         archive.extractall(tmp_path)
     source = tmp_path / sdist.name.removesuffix(".tar.gz")
-    metadata = _built(tmp_path / "metadata", "metadata", source, "")
+    wheel = _build(tmp_path / "wheel", "--wheel", source, {ADDRESS_VARIABLE: ""})
 
-    text = (metadata / "METADATA").read_text(encoding="utf-8")
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode()
     assert text == (source / "PKG-INFO").read_text(encoding="utf-8")
     assert faults_of_metadata(text, project_urls(address)) == []
     assert f"[security]({address}/blob/HEAD/docs/security.md)" in text
 
 
-def _built(target: Path, what: str, source: Path, address: str) -> Path:
-    """Build an sdist, or the metadata of a wheel alone, into a new folder, as pip and build do; return its path."""
-    script = (
-        "import sys, pyproject_hooks\n"
-        "target, what, source = sys.argv[1:]\n"
-        "hooks = pyproject_hooks.BuildBackendHookCaller(source, 'hatchling.build')\n"
-        "build = hooks.build_sdist if what == 'sdist' else hooks.prepare_metadata_for_build_wheel\n"
-        "print(build(target))\n"
-    )
-    target.mkdir()
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(target), what, str(source)],
-        env={**os.environ, ADDRESS_VARIABLE: address},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def _build(target: Path, kind: str, source: Path, environ: dict[str, str]) -> Path:
+    """Build an sdist or a wheel into a new folder; return the file."""
+    command = [sys.executable, "-m", "build", kind, "--no-isolation", "--outdir", str(target), str(source)]
+    done = subprocess.run(command, env={**os.environ, **environ}, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    return target / done.stdout.splitlines()[-1]
+    (found,) = (path for path in target.iterdir() if path.is_file())
+    return found
 
 
 @pytest.mark.timeout(180)
