@@ -1,11 +1,13 @@
 """SimpleActionClient: its state and its callbacks, with a server by hand that publishes every status and result."""
 
+import weakref
+
 import actionlib
 import rospy
 from action_peer import RawServer, Story, name_of
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus
-from referee import show
+from referee import eventually, show
 
 rospy.init_node("case", argv=[], disable_rosout=True)
 story = Story()
@@ -140,7 +142,10 @@ show(story.wait_log("Invalid"))
 tell()
 
 show("== a new goal while one is tracked: the first is heard of no more")
+# It is heard of for as long as the thread that logged the last line has it.
+first = weakref.ref(client.gh.comm_state_machine)
 second = send(done_cb=done)
+show(eventually(lambda: first() is None))
 server.result(id, S.SUCCEEDED, "first")
 server.result(second, S.SUCCEEDED, "second")
 show(client.wait_for_result(), story.wait(1))
