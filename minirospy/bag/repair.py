@@ -20,6 +20,9 @@ from minirospy.errors import BagCompressionError, BagFormatError
 
 __all__ = ["Repair"]
 
+_Entry = tuple[int, int, int]
+"""A message in a chunk's index: time, connection, offset of its record."""
+
 
 class _Content(NamedTuple):
     """The contents of a chunk's data; ``end``: bytes of whole records."""
@@ -29,13 +32,13 @@ class _Content(NamedTuple):
     end: int
 
     @property
-    def times(self) -> list[int]:
-        """The times of the messages, sorted."""
-        return sorted(each[0] for each in self.messages)
+    def entries(self) -> list[_Entry]:
+        """The entries of the index, sorted."""
+        return sorted(each[:3] for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
         """Return the chunk's summary."""
-        times = self.times
+        times = _times(self.entries)
         return ChunkInfo(position, times[0], times[-1], dict(Counter(each[1] for each in self.messages)))
 
     @property
@@ -231,21 +234,23 @@ class Repair:
         self._add_connections(content)
         if not content.messages:
             return record.end
-        position, times = _read_index(self._stream, record.end, limit)
-        # Third-party writers may have more in their index records than is needed.
-        is_usual = position == record.end + len(content.index_records)
-        if times != content.times or not (is_usual or is_record(self._stream, position, limit)):
-            position = self._make_index(record, content, limit)
+        self.end = self._keep_index(record, content, limit)
         self.chunks.append(content.info(record.position))
-        self.end = position
-        return position
+        return self.end
 
-    def _make_index(self, record: Record, content: _Content, limit: int) -> int:
-        """Have a chunk's index records written again; return where the next record is."""
+    def _keep_index(self, record: Record, content: _Content, limit: int) -> int:
+        """Have a chunk's index records written again where they are damaged; return the position after them."""
+        end, entries = _read_index(self._stream, record.end, limit)
+        is_whole = entries == content.entries
+        if is_whole and is_record(self._stream, end, limit):
+            return end
+
         following = expected = record.end + len(content.index_records)
         if not is_record(self._stream, expected, limit):
             found = next_chunk(self._stream, record.end, limit)
             following = limit if found is None else found
+        if is_whole and following > end:
+            return end  # the damage is behind the index
         if following > expected:
             self.problems.append(
                 f"index of the chunk at byte {record.position}: {following - expected} bytes are left out"
@@ -282,8 +287,9 @@ class Repair:
             return False
 
         data_end = record.data_position + content.end
-        if end < limit and _read_index(self._stream, data_end, limit)[1] != content.times:
-            return False
+        _, entries = _read_index(self._stream, data_end, limit)
+        if end < limit and _times(entries) != _times(content.entries):
+            return False  # wrong offsets alone do no harm: the index is written again
         self._add_connections(content)
         self.chunks.append(content.info(position))
         self.end = end
@@ -311,20 +317,25 @@ class Repair:
 _BLOCK = 4 * 1024 * 1024
 
 
-def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[int]]:
-    """Read the index records at a position; return where they end, and the times that they have, sorted."""
-    found: list[int] = []
+def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[_Entry]]:
+    """Read the index records at a position; return where they end, and their entries, sorted."""
+    found: list[_Entry] = []
     try:
         while position < limit:
             stream.seek(position)
             record = records.read_record(stream, limit)
             if record.op != records.OP_INDEX_DATA:
                 break
-            found += read_entries(stream, record)[0]
+            number = record.uint32("conn")
+            found += [(time, number, at) for time, at in zip(*read_entries(stream, record), strict=True)]
             position = stream.tell()
     except BagFormatError:
-        pass  # the caller sees by the times whether some are missing
+        pass  # the caller sees by the entries whether some are missing
     return position, sorted(found)
+
+
+def _times(entries: list[_Entry]) -> list[int]:
+    return [time for time, _, _ in entries]
 
 
 def _whole_records(data: bytes) -> int:

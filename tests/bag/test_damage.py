@@ -241,6 +241,30 @@ def test_repair_goes_on_at_the_next_chunk(compression: str, kind: str, lost: int
     assert repaired(stream.getvalue()) == found
 
 
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("place", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", ["missing byte", "wrong byte"])
+def test_repair_writes_a_wrong_offset_of_the_index_again(compression: str, place: int, kind: str) -> None:
+    """The last four bytes of a chunk's index records are an offset: its times are right, and so is its length."""
+    bag = make_bag(GIVEN, compression=compression)
+    at = chunk_places(bag)[3][2] - place
+    damaged = bag[:at] + (bytes((bag[at] ^ 0xFF,)) if kind == "wrong byte" else b"") + bag[at + 1 :]
+
+    repair = Repair(stream := io.BytesIO(damaged))
+    list(repair.run())
+    assert repair.problems == []
+    repair.apply()
+    BagWriter(stream, continued=Continued(repair.connections.values(), repair.chunks, repair.end)).close()
+    assert stream.getvalue() == bag
+
+
+def test_chunk_with_a_wrong_length_and_a_wrong_offset_is_repaired() -> None:
+    bag = make_bag(GIVEN)
+    damaged = bytearray(spoilt(bag, "data length"))
+    damaged[chunk_places(bag)[3][2] - 4] ^= 0xFF
+    assert set(repaired(bytes(damaged))) == EVERY
+
+
 @given(st.data(), st.sampled_from(COMPRESSIONS[1:]))
 @settings(deadline=None, max_examples=60)
 def test_damage_costs_only_the_chunks_that_it_touches(data: st.DataObject, compression: str) -> None:
