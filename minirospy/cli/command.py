@@ -220,7 +220,8 @@ def warn(what: str, name: str = "") -> None:
 
     why = why_illegal(name) if name else ""
     sys.stdout.flush()
-    print(escaped(f"WARNING: {what}{why and f'; {why}'}", "\n"), file=sys.stderr)
+    # One write: a thread may warn while others print.
+    print(escaped(f"WARNING: {what}{why and f'; {why}'}\n", "\n"), end="", file=sys.stderr)
 
 
 def warn_unpublished(graph: Graph, topic: str) -> None:

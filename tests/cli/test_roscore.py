@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import re
 import signal
@@ -16,6 +17,7 @@ from typing import Any
 
 import pytest
 
+from minirospy.cli.command import warn
 from minirospy.cli.ros import master as commands
 from minirospy.cli.ros.master import main, roscore
 from minirospy.cli.ros.rostopic import main as rostopic
@@ -410,3 +412,28 @@ def test_roscore_next_to_a_suspended_master(options: tuple[str, ...], start: Sta
     )
     assert done.returncode == 1
     assert done.stderr.endswith(expected)
+
+
+@pytest.mark.parametrize(("stream", "call"), [("stderr", warn), ("stdout", commands._show)])
+def test_a_line_is_one_write(
+    stream: str, call: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a buffer (PYTHONUNBUFFERED) a thread's line comes between the text and the end of another one."""
+    raw = Writes()
+    monkeypatch.setattr(sys, stream, io.TextIOWrapper(raw, "utf-8", write_through=True))
+    call("text")
+    assert [data for data in raw.writes if data] == [b"WARNING: text\n" if call is warn else b"text\n"]
+
+
+class Writes(io.RawIOBase):
+    """A stream that keeps what each write gave it."""
+
+    def __init__(self) -> None:
+        self.writes: list[bytes] = []
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any, /) -> int:
+        self.writes.append(bytes(data))
+        return len(data)

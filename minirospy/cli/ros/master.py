@@ -482,7 +482,8 @@ class _Shown(logging.Handler):
 def _show(line: str) -> None:
     """Print a line; a reader that disconnected (`roscore -v | head`) must not stop the master."""
     with contextlib.suppress(OSError):
-        print(line, flush=True)
+        # One write: the warning about ROS_MASTER_URI comes from a thread.
+        print(f"{line}\n", end="", flush=True)
 
 
 def _log_to_file(
