@@ -65,8 +65,11 @@ class LaunchDoor(JsonDoor["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """End a launch, and start its file again with the same arguments. Raise UsageError."""
-        if run.id in self._restarting:
+        """End a launch, and start its file again with the same arguments. Raise UsageError.
+
+        One that another client restarts, or has restarted meanwhile, is not started twice.
+        """
+        if run.id in self._restarting or run.id not in self.runs:
             return
         self._restarting.add(run.id)
         try:

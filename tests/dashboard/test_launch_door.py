@@ -278,6 +278,23 @@ def test_restart_is_completed_where_its_page_closes(
     assert started == [("lamp", "lamp.launch")]
 
 
+def test_launch_that_has_been_restarted_is_not_started_twice() -> None:
+    """The request of a second client may begin as that of the first one ends."""
+    started: list[LaunchFile] = []
+
+    async def work() -> None:
+        door = LaunchDoor("http://127.0.0.1:1")
+        door.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
+        run = Run(77)
+        run.joined.set()
+        door.runs[77] = cast("LaunchRun", run)
+        for _ in range(2):
+            await door.restart(cast("LaunchRun", run))
+
+    asyncio.run(work())
+    assert started == [("lamp", "lamp.launch")]
+
+
 def test_nothing_is_started_once_the_dashboard_closes(
     client: Callable[..., Client], serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
