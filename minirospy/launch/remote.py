@@ -102,6 +102,8 @@ class _Child:
     uri: str = ""
     has_registered: threading.Event = field(default_factory=threading.Event)
     running: set[str] = field(default_factory=set)
+    ended: set[str] = field(default_factory=set)
+    """Processes that have ended: perhaps before it was known that they had started."""
 
 
 class RemoteMachines:
@@ -236,6 +238,7 @@ class RemoteMachines:
             raise LaunchError(machine.file, machine.line, text) from None
         # As "Process<name-1>" of a real roslaunch.
         child.running |= {name.removeprefix("Process<").removesuffix(">") for name in succeeded}
+        child.running -= child.ended
         for name in failed:
             self._output.warn(f"remote[{child.name}]: [{name}] cannot be launched")
 
@@ -263,9 +266,11 @@ class RemoteMachines:
         return 1
 
     def _process_died(self, name: str, code: int) -> int:
-        for child in self._children.values():
-            child.running.discard(name)
         node_name = "/" + name.rpartition("-")[0]
+        for child in self._children.values():
+            if any(node.name == node_name for node in child.nodes):
+                child.ended.add(name)
+            child.running.discard(name)
         nodes = [node for child in self._children.values() for node in child.nodes if node.name == node_name]
         self._monitor.remote_ended(nodes[0] if nodes else None, name, code)
         return 1
