@@ -6,6 +6,7 @@ Parameters: ~lazy (subscribe only while the output has subscribers); ~stealth wi
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 from minirospy import client as rospy
@@ -39,6 +40,8 @@ class Relay:
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
+        # A subscriber that comes as the input is given up opens it again.
+        self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)
         self._input.open()
@@ -66,12 +69,15 @@ class Relay:
         rospy.loginfo("advertised as %s\n", self._output.topic)
 
     def _subscribed(self) -> None:
-        if self._is_lazy and not self._is_stealthy:
-            self._input.open()
+        with self._lock:
+            if self._is_lazy and not self._is_stealthy:
+                self._input.open()
 
     def _received(self, message: AnyMsg) -> None:
         self._output.advertise(message)
-        if (self._is_lazy or self._is_stealthy) and not self._output.has_subscribers:
-            self._input.close()
-        else:
+        with self._lock:
+            is_wanted = self._output.has_subscribers or not (self._is_lazy or self._is_stealthy)
+            if not is_wanted:
+                self._input.close()
+        if is_wanted:
             self._output.publish(message)

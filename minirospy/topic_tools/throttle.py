@@ -6,6 +6,7 @@ node's), ~force_latch and ~force_latch_value (whether the output is latched, wha
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -157,6 +158,8 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
+        # A subscriber that comes as the input is given up opens it again.
+        self._lock = threading.Lock()
 
         self._output = Output(
             target,
@@ -171,12 +174,15 @@ class Filter:
         print(f"advertised as {self._output.topic}", flush=True)
 
     def _subscribed(self) -> None:
-        if self._is_lazy:
-            self._input.open()
+        with self._lock:
+            if self._is_lazy:
+                self._input.open()
 
     def _received(self, message: AnyMsg) -> None:
         self._output.advertise(message)
-        if self._is_lazy and not self._output.has_subscribers:
-            self._input.close()
-        elif self._passes(self._clock(), len(message._buff or b"")):
+        with self._lock:
+            is_wanted = self._output.has_subscribers or not self._is_lazy
+            if not is_wanted:
+                self._input.close()
+        if is_wanted and self._passes(self._clock(), len(message._buff or b"")):
             self._output.publish(message)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from minirospy.topic_tools import relay, throttle
 from minirospy.topic_tools.passing import base_name
 from minirospy.topic_tools.throttle import ByteLimit, MessageLimit, every
 
@@ -20,11 +23,57 @@ def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
         [sys.executable, str(HERE / "drive.py"), str(PROGRAMS), sys.executable],
         capture_output=True,
         text=True,
-        timeout=110,
+        timeout=220,
         check=False,
     )
     assert done.stdout == (HERE / "drive.txt").read_text(encoding="utf-8"), done.stderr
     assert done.returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["relay", "throttle"])
+def test_subscriber_that_comes_as_the_input_is_given_up_opens_it_again(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one thread looks for subscribers, the other notices the first of them."""
+    comes: list[threading.Thread] = []
+
+    class Input:
+        is_open = False
+
+        def __init__(self, *_: object) -> None:
+            pass
+
+        def open(self) -> None:
+            self.is_open = True
+
+        def close(self) -> None:
+            self.is_open = False
+
+    class Output:
+        def __init__(self, *_: object, on_subscriber: Any, **__: object) -> None:
+            self._on_subscriber = on_subscriber
+
+        def advertise(self, _: object) -> None:
+            pass
+
+        @property
+        def has_subscribers(self) -> bool:
+            comes.append(threading.Thread(target=self._on_subscriber))
+            comes[0].start()
+            comes[0].join(0.2)
+            return False
+
+    module: Any = relay if kind == "relay" else throttle
+    monkeypatch.setattr(module, "Input", Input)
+    monkeypatch.setattr(module, "Output", Output)
+    tool: Any = (
+        relay.Relay("a", "b", is_lazy=True)
+        if kind == "relay"
+        else throttle.Filter("a", "b", every(0, 1), lambda: 0.0, is_lazy=True)
+    )
+    tool._received(None)
+    comes[0].join()
+    assert tool._input.is_open
 
 
 @pytest.mark.parametrize(
