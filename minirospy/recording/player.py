@@ -62,7 +62,7 @@ class Player:
         self._on_ready = on_ready
         self._span = (0, 0)
         self._seek_to: int | None = None
-        self._starts_paused = False
+        self._starts_paused = options.paused
         self._is_started = False
         self._is_at_end = False
         self._is_fresh = True
@@ -95,7 +95,6 @@ class Player:
         if self._on_ready:
             # Its clock does not advance until the playing starts.
             self._schedule = Schedule(options._replace(paused=True), *self._span, time.perf_counter_ns())
-            self._starts_paused = options.paused
             self._on_ready(*self._span)
         # From here on the files are its thread's.
         messages = ReadAhead(self._bags.messages(selection))
@@ -110,7 +109,7 @@ class Player:
         with self._lock:
             schedule = self._schedule
             if schedule is None:
-                return PlayerState(self._span[0], self._options.rate, self._options.paused, False)
+                return PlayerState(self._span[0], self._options.rate, self._starts_paused, False)
             now = time.perf_counter_ns()
             is_paused = schedule.is_paused if self._is_started else self._starts_paused
             return PlayerState(schedule.status(now).time, schedule.rate, is_paused, self._is_at_end)
@@ -175,7 +174,11 @@ class Player:
     def set_paused(self, paused: bool) -> bool:
         """Pause, or go on; return whether that changed anything. From any thread."""
         with self._lock:
-            changed = bool(self._schedule and self._schedule.set_paused(paused, time.perf_counter_ns()))
+            if self._schedule and self._is_started:
+                changed = self._schedule.set_paused(paused, time.perf_counter_ns())
+            else:
+                changed = paused != self._starts_paused
+                self._starts_paused = paused
         self._wait.wake()
         return changed
 
@@ -218,7 +221,8 @@ class Player:
         now = time.perf_counter_ns()
         schedule, self._is_started = self._schedule, True
         if schedule is None:
-            self._schedule = Schedule(self._options, *span, now + _LEAD)
+            options = self._options._replace(paused=self._starts_paused)
+            self._schedule = Schedule(options, *span, now + _LEAD)
         elif not self._starts_paused:
             schedule.set_paused(False, now)
 
@@ -237,7 +241,6 @@ class Player:
                 for number, message in messages:
                     if not self._play(message):
                         break
-                    self._is_fresh = False
                     self._publish(number, message)
             if self._schedule and not self._ended and not self._options.quiet:
                 # All of it has been played, however long ago the last line was.
@@ -324,6 +327,9 @@ class Player:
                 if self._seek_to is not None:
                     return False
                 wait = schedule.poll(now)
+                if wait is None:
+                    # A client that sees the new time counts its steps from there.
+                    self._is_fresh = False
             if wait is None:
                 # At a step the clock shows the message's time first.
                 self._tick(schedule, now)

@@ -10,13 +10,16 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from unittest.mock import Mock
 
 import pytest
 
 from minirospy.bag.writer import BagWriter
 from minirospy.environment import Environment
 from minirospy.introspect.streams import ToolNode
+from minirospy.recording.player import Player
+from minirospy.recording.schedule import PlayOptions
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -220,6 +223,19 @@ def test_keys_pause_and_step(ear: Ear, start: Start, tmp_path: Path) -> None:
     process.communicate(timeout=GUARD)
 
     ear.expect("0", "1", "2", "3", "4")
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_pause_requested_while_it_waits_for_subscribers_counts(paused: bool) -> None:
+    """The service is offered before the clock runs."""
+    bags: Any = Mock()
+    player = Player(bags, PlayOptions(paused=paused), stage=Mock())
+    assert not player.set_paused(paused)
+    assert player.set_paused(not paused)
+    assert not player.set_paused(not paused)
+    assert player.state().is_paused is not paused
+    player._start((0, SECOND))
+    assert player.state().is_paused is not paused
 
 
 def test_a_service_pauses(ear: Ear, start: Start, tmp_path: Path) -> None:
