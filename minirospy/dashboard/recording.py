@@ -114,13 +114,14 @@ class Recording:
 
     def state(self) -> RecordingState:
         """Return the state now."""
+        # First: of one that has ended the sizes are the last ones.
+        status = self._process.exit_code
         size = 0
         for path in self._paths:
             try:
                 size = max(size, path.stat().st_size)
             except OSError:
                 continue
-        status = self._process.exit_code
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
         # An interpreter that starts may also end without a fault.

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from std_msgs.msg import String
@@ -80,7 +80,7 @@ def client(serve: Callable[..., Served], folder: Path) -> Iterator[Callable[...,
         def start(served: Served | None = None, token: str = TOKEN) -> Client:
             names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
             address = f"ws://127.0.0.1:{(served or serve()).port}/"
-            socket = connect(address, subprotocols=names, compression=None, max_size=None)
+            socket = connect(address, subprotocols=names, compression=None, open_timeout=100, max_size=None)
             return Client(opened.enter_context(socket))
 
         yield start
@@ -193,7 +193,10 @@ def test_nothing_is_published_until_that_is_switched_on(
     page.next("state", lambda state: state["published"] == ["/chatter", "/map"] and state["clock"])
     # The latched one is long past, and late subscribers need it.
     wait_until(lambda: map_ == ["the map"])
-    page.send("play", seek=0, paused=False, rate=4)
+    # Slowly, until the other one is connected.
+    page.send("play", seek=0, paused=False, rate=0.1)
+    wait_until(lambda: chatter)
+    page.send("play", paused=False, rate=4)
     wait_until(lambda: chatter[-1:] == ["message 39"])
     page.send("publish", topics=[], clock=False)
     page.next("state", lambda state: not state["published"] and not state["clock"])
@@ -373,6 +376,24 @@ def test_recorder_that_ends_without_a_file_has_saved_nothing(
     wait_until(lambda: "up" in started._lines)
     asyncio.run(started.stop())
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
+
+
+def test_size_of_a_recording_that_ends_as_it_is_looked_at_is_its_last_one(tmp_path: Path) -> None:
+    path = tmp_path / "run.bag"
+
+    class Ending:
+        is_ending = True
+
+        @property
+        def exit_code(self) -> int:
+            path.write_bytes(b"whole")
+            return 0
+
+    ended = Recording.__new__(Recording)
+    ended._path, ended._paths, ended._topics = path, (path,), ("/a",)
+    ended._process, ended._seconds = cast("Process", Ending()), 1.0
+    state = ended.state()
+    assert (state.size, state.is_ended, state.error) == (5, True, "")
 
 
 def test_bag_is_closed_where_its_page_closes_while_it_opens(
