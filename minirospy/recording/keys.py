@@ -34,7 +34,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
         stop.set()
         if thread:
             # It restores the terminal.
-            thread.join(1.0)
+            thread.join(10.0)
 
 
 def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
