@@ -249,7 +249,7 @@ def hint_near(name: str, known: Iterable[str]) -> None:
     """Print the names similar to ``name`` on stderr, below the warning that it is awaited."""
     near = did_you_mean(name, (each for each in known if each != name))
     if near:
-        print(escaped(near.removeprefix("; ")), file=sys.stderr)
+        print(escaped(f"{near.removeprefix('; ')}\n", "\n"), end="", file=sys.stderr)
 
 
 @contextlib.contextmanager

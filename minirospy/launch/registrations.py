@@ -19,7 +19,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-_ANSWER_SECONDS = 1.0
+_ANSWER_SECONDS = 5.0
 """A process of this machine that has exited refuses immediately: only one that hangs takes this long."""
 
 _AT_ONCE = 16

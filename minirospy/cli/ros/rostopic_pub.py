@@ -31,8 +31,8 @@ _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 _LATCH_SECONDS = 3.0
 _FILE_RATE = 10.0
 _CONNECT_SECONDS = 0.5
-_REGISTERED_CONNECT_SECONDS = 2.0
-_CLOCK_SECONDS = 1.0
+_REGISTERED_CONNECT_SECONDS = 5.0
+_CLOCK_SECONDS = 5.0
 
 
 class _PubParser(Parser):
