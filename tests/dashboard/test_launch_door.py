@@ -82,7 +82,9 @@ def client(
         def start(served: Served | None = None, token: str = TOKEN) -> Client:
             names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
             address = f"ws://127.0.0.1:{(served or serve()).port}/"
-            return Client(opened.enter_context(connect(address, subprotocols=names, compression=None)))
+            return Client(
+                opened.enter_context(connect(address, subprotocols=names, compression=None, open_timeout=100))
+            )
 
         yield start
 

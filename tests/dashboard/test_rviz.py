@@ -107,7 +107,9 @@ def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[obj
         assert served.dashboard
         served.dashboard.rviz.file = file
         names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
-        connecting = connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None)
+        connecting = connect(
+            f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None, open_timeout=100
+        )
         socket = sockets.enter_context(connecting)
 
         def send(operation: object) -> Any:

@@ -34,7 +34,7 @@ class Tools:
         names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
         self._stack = contextlib.ExitStack()
         self.socket = self._stack.enter_context(
-            connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None)
+            connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None, open_timeout=100)
         )
 
     def receive(self) -> dict[str, Any]:

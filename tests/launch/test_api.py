@@ -53,7 +53,7 @@ def test_a_program_launches_nodes(master: str) -> None:
     proxy.close()
     program = Path(__file__).parent / "api_program.py"
     done = subprocess.run(
-        [sys.executable, str(program)], capture_output=True, text=True, timeout=50, check=False
+        [sys.executable, str(program)], capture_output=True, text=True, timeout=200, check=False
     )
     assert done.stdout == SAID, done.stderr
 
@@ -92,7 +92,7 @@ def test_no_node_outlives_its_program(master: str, package: Path, end: str) -> N
     except psutil.NoSuchProcess:
         left = []
 
-    program.communicate(timeout=30)
+    program.communicate(timeout=100)
     _, left = psutil.wait_procs(left, timeout=30)
     assert not left
 
@@ -102,7 +102,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
     launch = roslaunch.scriptapi.ROSLaunch()
     launch.start()
     try:
-        node = roslaunch.core.Node("pkg", "stop.py", "a", args="3", respawn=True, respawn_delay=2.0)
+        node = roslaunch.core.Node("pkg", "stop.py", "a", args="3", respawn=True, respawn_delay=60.0)
         process = launch.launch(node)
         process.popen.wait(30)
         process.stop()
@@ -198,7 +198,7 @@ def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, packa
     )
     # Its output ends only when the node, which holds the pipe too, has ended.
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )
     assert "pid " in done.stdout
     assert done.returncode == 0

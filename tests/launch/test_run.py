@@ -267,6 +267,7 @@ def test_ros_home_that_cannot_be_made_stops_no_node(
 ) -> None:
     (tmp_path / "file").write_text("below a file nothing can be made")
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "file" / "home"))
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
     running = start('<node name="n" pkg="pkg" type="stop.py" args="0" output="screen" required="true"/>')
     said = running.read_until("out ")
     assert said.count("cannot be made") == 1

@@ -38,7 +38,7 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
     file.write_text(text)
     code = "import sys; from minirospy.cli.ros.rostest import rostest; sys.exit(rostest())"
     command = [sys.executable, "-c", code, "--package=p", f"--pkgdir={tmp_path}", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
     output = done.stdout.split("[ROSTEST]---")[1]
 
     for line in (

@@ -40,7 +40,7 @@ def start(command: str, *words: object) -> subprocess.Popen[str]:
 
 def ran(command: str, *words: object) -> tuple[int, str, str]:
     popen = start(command, *words)
-    out, err = popen.communicate(timeout=50)
+    out, err = popen.communicate(timeout=200)
     return popen.returncode, out, err
 
 
