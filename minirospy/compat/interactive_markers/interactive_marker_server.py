@@ -172,7 +172,8 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-        self.publish(message)
+            # Nothing with the new number comes before it.
+            self.publish(message)
         self.publishInit()
 
     def _apply(self, name: str, update: UpdateContext, message: InteractiveMarkerUpdate) -> None:
@@ -234,10 +235,11 @@ class InteractiveMarkerServer:
 
     def keepAlive(self, msg: object) -> None:
         """Publish an update without changes."""
-        self.publish(InteractiveMarkerUpdate(type=InteractiveMarkerUpdate.KEEP_ALIVE))
+        with self.mutex:
+            self.publish(InteractiveMarkerUpdate(type=InteractiveMarkerUpdate.KEEP_ALIVE))
 
     def publish(self, update: InteractiveMarkerUpdate) -> None:
-        """Publish an update with the server's name and the number of its last change."""
+        """Publish an update with the server's name and the number of its last change; the caller holds the lock."""
         update.server_id = self.server_id
         update.seq_num = self.seq_num
         self.update_pub.publish(update)
