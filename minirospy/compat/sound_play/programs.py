@@ -14,7 +14,7 @@ from minirospy.compat.sound_play.libsoundplay import SoundClient
 
 __all__ = ["is_speaking", "play", "playbuiltin", "playpackage", "say", "shutup"]
 
-_CONNECT_SECONDS = 1.0
+_CONNECT_SECONDS = 5.0
 _VOICE = "voice_kal_diphone"
 
 
