@@ -139,6 +139,13 @@ class RawClient:
         with self._changed:
             return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
 
+    def wait_told(self, id, name, seconds=30):
+        """Whether the lists come to tell this of a goal, or have since the last tell."""
+        with self._changed:
+            return self._changed.wait_for(
+                lambda: any(said.startswith(f"{name}(") for said in self.seen.get(id, ())), seconds
+            )
+
     def wait_gone(self, id, seconds=30):
         """Whether the list of statuses comes to leave a goal out."""
         with self._changed:

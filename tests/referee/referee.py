@@ -87,17 +87,17 @@ class Other:
         assert self.process.stdout
         return self.process.stdout.readline().rstrip("\n")
 
-    def close(self, seconds: float = 10.0) -> int:
-        """Close its input, and interrupt it where that does not end it; its exit status."""
+    def close(self, seconds: float = 30.0) -> int:
+        """Close its input, and interrupt it where that does not end it within some time; its exit status."""
         assert self.process.stdin
         assert self.process.stdout
         self.process.stdin.close()
         try:
-            self.process.wait(3.0)
+            self.process.wait(seconds)
         except subprocess.TimeoutExpired:
             self.process.terminate()
         try:
-            return self.process.wait(seconds)
+            return self.process.wait(30.0)
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.wait()

@@ -6,7 +6,6 @@ import actionlib
 import rospy
 from action_peer import RawClient, Story
 from actionlib.msg import TestAction
-from actionlib_msgs.msg import GoalStatus
 from referee import eventually, of_ten_looks, outcome, show
 
 rospy.init_node("case", argv=[], disable_rosout=True)
@@ -29,11 +28,11 @@ client = RawClient("server")
 # By default it would be five seconds.
 before = time.monotonic()
 client.goal("a", 1)
-show(client.wait_status("a", GoalStatus.SUCCEEDED))
+show(client.wait_told("a", "SUCCEEDED"))
 show(client.wait_gone("a"), 0.3 < time.monotonic() - before < 4.5)
 before = time.monotonic()
 client.cancel("b")
-show(client.wait_status("b", GoalStatus.RECALLING))
+show(client.wait_told("b", "RECALLING"))
 show(client.wait_gone("b"), 0.3 < time.monotonic() - before < 4.5)
 
 
@@ -63,7 +62,8 @@ show(auto.started)
 simple = actionlib.SimpleActionServer("simple_auto", TestAction)
 show(simple.action_server.started, simple.execute_thread)
 story.tell()
-show(RawClient("auto").arrays > 0, RawClient("simple_auto").arrays > 0)
+clients = [RawClient("auto"), RawClient("simple_auto")]
+show(*(eventually(lambda client=client: client.arrays > 0) for client in clients))
 
 show("== the client's")
 rospy.set_param("actionlib_client_pub_queue_size", 9)

@@ -84,5 +84,5 @@ stopped = []
 waiting = threading.Thread(target=lambda: stopped.append(client.wait_for_server()))
 waiting.start()
 rospy.signal_shutdown("the case is over")
-waiting.join(10)
+waiting.join(60)
 show("a shutdown ends it", stopped)

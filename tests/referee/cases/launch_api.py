@@ -151,7 +151,7 @@ tell(
     "one more",
     is_launched,
     int(more.name.rpartition("-")[2]) - first,
-    listener.died.wait(10),
+    listener.died.wait(60),
     eventually(lambda: parent.pm.dead_list),
     listener.codes,
 )

@@ -19,9 +19,9 @@ def live(name):
     show(rospy.has_param(f"/{name}/p"))
     ticks = threading.Event()
     timer = rospy.Timer(rospy.Duration(0.01), lambda event: ticks.set())
-    show("timer", ticks.wait(3.0))
+    show("timer", ticks.wait(60))
     rospy.signal_shutdown("end")
-    timer.join(3.0)
+    timer.join(60)
     show(timer.is_alive(), rospy.is_shutdown(), rospy.core.is_shutdown_requested())
 
 

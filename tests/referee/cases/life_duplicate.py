@@ -28,4 +28,4 @@ show(newer.read())
 for _ in range(4):
     show("older:", shown(older.read()))
 show("older ends:", older.close())
-show("newer ends:", newer.close())
+show("newer ends:", newer.close(3.0))

@@ -37,6 +37,6 @@ for thread in threads:
 rospy.sleep(0.3)
 rospy.signal_shutdown("x")
 for thread in threads:
-    thread.join(10)
+    thread.join(60)
 for label in CALLS:
     show(label, results.get(label))

@@ -20,8 +20,8 @@ class Robot:
     def drive(self):
         rospy.logwarn("method")
         rospy.logwarn_once("once")
-        rospy.logwarn_throttle(1, "throttle")
-        rospy.logwarn_throttle_identical(1, "identical")
+        rospy.logwarn_throttle(100, "throttle")
+        rospy.logwarn_throttle_identical(100, "identical")
         nameless = lambda: rospy.logwarn("lambda")  # noqa: E731 - its name is what is asked
         nameless()
 

@@ -119,12 +119,12 @@ show(
     pool.queue_task("failing", int, ("x",)),
     pool.queue_task(None, order.append, (1,), lambda result: done.set()),
 )
-show(done.wait(10), order)
+show(done.wait(60), order)
 held.set()
 done.clear()
 show(
     pool.queue_task("slow", len, ("abc",), lambda result: (order.append(result), done.set())),
-    done.wait(10),
+    done.wait(60),
     order,
 )
 show(

@@ -88,7 +88,7 @@ with contextlib.redirect_stderr(io.StringIO()):
         rosservice.rosservicemain(["rosservice", "type", "/none"])
     except SystemExit as error:
         show("SystemExit", error.code)
-other.close()
+other.close(3.0)
 show("# without a master")
 os.environ["ROS_MASTER_URI"] = "http://localhost:1"
 kind("type", lambda: rosservice.get_service_type("/x"))

@@ -26,7 +26,7 @@ def follows(name, value):
     show(
         name,
         value,
-        eventually(lambda: rospy.get_param_cached(name, "none") == value, 3),
+        eventually(lambda: rospy.get_param_cached(name, "none") == value),
         rospy.get_param(name, "none"),
     )
 

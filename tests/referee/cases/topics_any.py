@@ -19,7 +19,7 @@ def take(message):
 
 def wait(count):
     with arrived:
-        return arrived.wait_for(lambda: len(got) >= count, 10)
+        return arrived.wait_for(lambda: len(got) >= count, 60)
 
 
 show(rospy.AnyMsg._type, rospy.AnyMsg._md5sum, rospy.AnyMsg._has_header, repr(rospy.AnyMsg._full_text))

@@ -53,7 +53,7 @@ publisher = rospy.Publisher(
 )
 publisher.publish("x")
 rospy.Subscriber("/topic", String, lambda message: (got.append(message), arrived.set()))
-arrived.wait(10)
+arrived.wait(60)
 for name, value in sorted(got[0]._connection_header.items()):
     show("header", name, repr(value))
 

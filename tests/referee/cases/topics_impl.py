@@ -20,7 +20,7 @@ def take(message, *args):
 
 def taken(*expected):
     """Whether just these have come; forgets them."""
-    came = eventually(lambda: len(got) >= len(expected), 3.0) and sorted(got, key=str) == list(expected)
+    came = eventually(lambda: len(got) >= len(expected)) and sorted(got, key=str) == list(expected)
     found, got[:] = list(got), []
     return came or found
 

@@ -67,7 +67,7 @@ arrived = threading.Event()
 here = rospy.Publisher("/here", String, latch=True, queue_size=1)
 here.publish("in one node")
 rospy.Subscriber("/here", String, lambda message: (got.append(message.data), arrived.set()))
-show(arrived.wait(10), got)
+show(arrived.wait(60), got)
 
 p = rospy.Publisher("/shared", String, latch=True, queue_size=1)
 p.publish("kept")

@@ -27,7 +27,7 @@ def tell(*what):
 
 def wait(count):
     with changed:
-        return changed.wait_for(lambda: len(notified) >= count, 10)
+        return changed.wait_for(lambda: len(notified) >= count, 60)
 
 
 class Listener(rospy.SubscribeListener):

@@ -48,7 +48,7 @@ def note(key, *values):
 
 def wait(key, count):
     with arrived:
-        return arrived.wait_for(lambda: len(seen.get(key, ())) >= count, 10)
+        return arrived.wait_for(lambda: len(seen.get(key, ())) >= count, 60)
 
 
 plain = rospy.Subscriber("/chatter", Int32, lambda message: note("plain", message.data))
