@@ -425,6 +425,27 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
     pipe.resume.assert_called_once()
 
 
+def test_clients_are_pinged_before_they_are_disconnected() -> None:
+    """As after a suspend: the bytes that came last are old, and no ping has been sent since."""
+    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, ports=(1, 2))
+    site.check.return_value = Grant.READ
+    door = Mock()
+    door.select.return_value = "foxglove.sdk.v1"
+    site.doors = [door]
+    connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
+    connection.received(HANDSHAKE.encode())
+    loop.iterate()
+
+    loop.now = 1000.0
+    connection._ping()
+    loop.iterate()
+    assert pipe.write.call_args.args[0][-1].endswith(b"minirospy")
+    pipe.close.assert_not_called()
+    loop.now = 1020.0
+    connection._ping()
+    pipe.close.assert_called_once_with(flush=False)
+
+
 def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callable[..., Running]) -> None:
     limit = 3_000_000
     bridge = run_bridge(limits=Limits(queue=limit))

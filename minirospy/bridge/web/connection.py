@@ -107,6 +107,8 @@ class Connection:
         self._second = 0.0
         self._in_second = 0
         self._received = loop.time()
+        # Since bytes of the client have come.
+        self._is_pinged = False
         self._progressed = loop.time()
         self._timer = loop.call_later(site.limits.handshake_seconds, self._handshake_late)
         self._limits = site.limits
@@ -128,6 +130,7 @@ class Connection:
         if self._is_closing:
             return
         self._received = self._loop.time()
+        self._is_pinged = False
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # one request a connection
@@ -443,11 +446,14 @@ class Connection:
         """See whether the client is there: it answers a ping, or takes what is sent."""
         now = self._loop.time()
         stuck = self._pipe.is_full and now - self._progressed > self._limits.silent_seconds
-        if stuck or now - self._received > self._limits.silent_seconds:
+        # After a suspend the last bytes are old, and the client has not been pinged since.
+        silent = self._is_pinged and now - self._received > self._limits.silent_seconds
+        if stuck or silent:
             _log.info("%s %s: disconnected", self.peer, "reads nothing" if stuck else "does not answer")
             self._abort()
             return
         if not self._pipe.is_full:
+            self._is_pinged = True
             self._protocol.send_ping(b"minirospy")
             self._answer_protocol()
         self._watch(self._ping)
