@@ -21,29 +21,33 @@ _OPEN_FILES = Path("/proc/self/fd" if sys.platform == "linux" else "/dev/fd")
 _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
+_LOOKS = 10
+"""How often a file is examined: Zenoh creates the socket, connects it, and sets SO_LINGER only then."""
 
 
 class LingerRemover:
     """Finds the links that Zenoh has opened in this process."""
 
     def __init__(self) -> None:
-        self._seen: set[tuple[int, int]] = set()
+        self._looks: dict[tuple[int, int], int] = {}
+        """How often each open file has been examined."""
 
     def look(self) -> int:
         """Remove SO_LINGER from the links that are new; return how many. Without effect on Windows."""
         if sys.platform == "win32":
             return 0
-        seen, count = set(), 0
+        looks: dict[tuple[int, int], int] = {}
+        count = 0
         with contextlib.suppress(OSError):
             for name in os.listdir(_OPEN_FILES):
                 # Others open and close files meanwhile.
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino
-                    seen.add(identity)
-                    if identity not in self._seen and _removes(int(name), file):
+                    looks[identity] = min(self._looks.get(identity, 0) + 1, _LOOKS + 1)
+                    if looks[identity] <= _LOOKS and _removes(int(name), file):
                         count += 1
-        self._seen = seen
+        self._looks = looks
         return count
 
 
