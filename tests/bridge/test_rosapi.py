@@ -15,13 +15,16 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 from tf2_web_republisher.msg import TFSubscriptionAction, TFSubscriptionGoal
+from tf2_web_republisher.srv import RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionClient, GoalError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import describe
 from minirospy.bridge.tf_republisher.pairs import FramePair
+from minirospy.bridge.tf_republisher.republisher import Republisher
 from minirospy.idl.load import message_class
+from minirospy.times import Duration
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running
@@ -165,6 +168,23 @@ def test_parameters_are_json(api: Callable[..., Any]) -> None:
     assert api("get_time")["time"]["secs"] > 0
 
 
+def test_topic_of_a_request_is_registered_before_the_answer(bridge: Running) -> None:
+    node = bridge.node("republisher")
+
+    async def request() -> bool:
+        republisher = Republisher(node)
+        await republisher.start()
+        answer: Any = await republisher._republish(
+            RepublishTFsRequest(source_frames=["/camera"], target_frame="world", timeout=Duration(60))
+        )
+        topic = node._published.get(answer["topic_name"])
+        is_registered = topic is not None and topic._registration.done()
+        await republisher.close()
+        return is_registered
+
+    assert bridge.run(request())
+
+
 def test_transforms_are_sent_by_action_and_by_topic(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(transforms=True)
     node = bridge.node("robot")
@@ -176,7 +196,7 @@ def test_transforms_are_sent_by_action_and_by_topic(run_bridge: Callable[..., Ru
 
     wanted = {"source_frames": ["/camera"], "target_frame": "world", "rate": 100.0}
     client = bridge.rosbridge()
-    answer = client.call("/republish_tfs", {**wanted, "timeout": {"secs": 5, "nsecs": 0}})
+    answer = client.call("/republish_tfs", {**wanted, "timeout": {"secs": 60, "nsecs": 0}})
     topic = answer["values"]["topic_name"]
     assert topic == "/tf2_web_republisher/tf_repub_0"
     client.send(op="subscribe", topic=topic)

@@ -18,6 +18,7 @@ from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionServer, GoalError, ServerGoal
 from minirospy.aio.node import Node
+from minirospy.aio.topics import Publisher
 from minirospy.bridge.tasks import Faults
 from minirospy.bridge.tf_republisher.pairs import FramePair, pairs_of
 from minirospy.errors import BridgeError, ServiceException, TransformException
@@ -94,25 +95,32 @@ class Republisher:
         except BridgeError as error:
             raise ServiceException(str(error)) from error
         topic = f"{self._name}/tf_repub_{next(self._ids)}"
-        task = asyncio.ensure_future(self._serve(request, pairs, topic))
+        publisher = self.node.advertise(topic, TFArray, queue_size=10, latch=True)
+        task = asyncio.ensure_future(self._serve(request, pairs, publisher))
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._faults.of_task)
+        # A client of rosbridge subscribes without a type: the master must know the topic by then.
+        await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
 
-    async def _serve(self, request: RepublishTFsRequest, pairs: list[FramePair], topic: str) -> None:
+    async def _serve(
+        self, request: RepublishTFsRequest, pairs: list[FramePair], publisher: Publisher[TFArray]
+    ) -> None:
         period = _period(request.rate)
         timeout = request.timeout.to_sec()
         loop = asyncio.get_running_loop()
-        async with self.node.advertise(topic, TFArray, queue_size=10, latch=True) as publisher:
+        async with publisher:
             wanted = loop.time()
             while True:
                 if publisher.num_connections:
                     wanted = loop.time()
                 elif loop.time() - wanted > timeout:
                     self.node.log.info(
-                        "No subscribers on tf topic for %g seconds. Unadvertising topic:%s", timeout, topic
+                        "No subscribers on tf topic for %g seconds. Unadvertising topic:%s",
+                        timeout,
+                        publisher.topic,
                     )
                     return
                 transforms = await self._changed(pairs)
