@@ -201,6 +201,7 @@ class SharedGraph:
         self._listeners: list[GraphListener] = []
         self._publishers: dict[str, _SharedPublisher] = {}
         self._look_soon = asyncio.Event()
+        self._looking = asyncio.Lock()
         self._faults = Faults(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -251,19 +252,21 @@ class SharedGraph:
 
     async def look(self) -> None:
         """Look at the graph, and report what has changed. Raises MasterUnreachableError, RpcError."""
-        found = await fetch(self.node._node.master)
-        await self._look_up_services(found)
-        after = found.filtered(self.filters.topics, self.filters.services)
-        before, self.snapshot = self.snapshot, after
-        changes = compare(before, after)
-        is_first, self._is_first_look = self._is_first_look, False
-        has_types, self._has_new_types = self._has_new_types, False
-        if changes or is_first or has_types or before.types != after.types:
-            for listener in tuple(self._listeners):
-                try:
-                    listener(changes)
-                except Exception as error:  # noqa: BLE001 - of one client: the others are notified
-                    self._faults.report(error)
+        # One at a time: a look that started earlier must not replace the snapshot of a later one.
+        async with self._looking:
+            found = await fetch(self.node._node.master)
+            await self._look_up_services(found)
+            after = found.filtered(self.filters.topics, self.filters.services)
+            before, self.snapshot = self.snapshot, after
+            changes = compare(before, after)
+            is_first, self._is_first_look = self._is_first_look, False
+            has_types, self._has_new_types = self._has_new_types, False
+            if changes or is_first or has_types or before.types != after.types:
+                for listener in tuple(self._listeners):
+                    try:
+                        listener(changes)
+                    except Exception as error:  # noqa: BLE001 - of one client: the others are notified
+                        self._faults.report(error)
 
     async def _watch(self) -> None:
         pause = FASTEST_LOOK
