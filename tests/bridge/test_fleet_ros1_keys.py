@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Iterable
+from unittest.mock import AsyncMock, Mock
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +26,8 @@ from minirospy.bridge.fleet.ros1_keys import (
     parse_namespace,
     shared_topics,
 )
+from minirospy.bridge.fleet.ros1_side import Ros1Side
+from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.errors import BridgeError
 from tests.bridge.test_fleet_hostile import CLAIM
 
@@ -113,6 +119,34 @@ def test_a_resource_is_lost_after_its_last_beacon() -> None:
     assert seen.forget_lost(101.1 + LOST_SECONDS)
     assert list(seen) == []
     assert seen.received(CHAT, 200.0)
+
+
+def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Zenoh's thread delivers the beacons of that time after the loop has gone on."""
+    clock = Mock()
+    clock.monotonic.return_value = 0.0
+    monkeypatch.setattr(ros1_side, "time", clock)
+    side = Ros1Side(*(Mock() for _ in range(6)), GatewayRules(), "*", set, Mock())  # type: ignore[arg-type]
+    monkeypatch.setattr(side, "_adjust", AsyncMock())
+    side._sightings.received(CHAT, 0.0)
+
+    def beat(times: Iterable[float]) -> list[Resource]:
+        """Let the beats come at these times; return what is known after them."""
+        left = [*times]
+
+        async def sleep(_: float) -> None:
+            if not left:
+                raise EOFError
+            clock.monotonic.return_value = left.pop(0)
+
+        monkeypatch.setattr(ros1_side, "asyncio", Mock(sleep=sleep))
+        with pytest.raises(EOFError):
+            asyncio.run(side._beat())
+        return list(side._sightings)
+
+    assert beat([0.2, 100.0]) == [CHAT]
+    # Its beacons do not come again.
+    assert beat([100.0 + 0.2 * number for number in range(30)]) == []
 
 
 def test_resources_of_others_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:

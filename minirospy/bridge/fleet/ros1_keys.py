@@ -219,6 +219,10 @@ class Sightings:
         self._seen[resource] = now
         return is_new
 
+    def extend(self, seconds: float, now: float) -> None:
+        """Keep all for ``seconds`` longer, counted from ``now`` at most."""
+        self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
+
     def forget_lost(self, now: float) -> bool:
         """Forget what has had no beacon for too long; return whether there was any."""
         lost = [resource for resource, at in self._seen.items() if now - at > LOST_SECONDS]

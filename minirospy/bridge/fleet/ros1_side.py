@@ -23,6 +23,7 @@ from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken
 from minirospy.bridge.fleet.network import Beacon, FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.robot_graph import RobotGraph
 from minirospy.bridge.fleet.ros1_keys import (
+    PERIOD,
     Beacons,
     Resource,
     Sightings,
@@ -219,10 +220,15 @@ class Ros1Side:
 
     async def _beat(self) -> None:
         """Put the beacons that are due, and follow those of others."""
+        expected = time.monotonic()
         while True:
             now = time.monotonic()
+            late, expected = now - expected, now + _BEAT_SECONDS
             with self._lock:
                 due = self._beacons.due(now)
+                if late > PERIOD:
+                    # The process did not run: the beacons of that time have not been delivered yet.
+                    self._sightings.extend(late, now)
                 has_news = self._sightings.forget_lost(now) or self._has_news
             for key in due:
                 self._outlets[key].put()
