@@ -197,7 +197,7 @@ def test_a_query_is_answered_whatever_its_handler_raises() -> None:
             await asyncio.Event().wait()
             return b""
 
-        await network._answer(query, fails, network._calls)
+        await network._answer(query, fails)
         assert (replies, dropped) == ([b"the gateway failed: ZeroDivisionError"], [1])
         network._start_answer(query, hangs, network._calls)
         await asyncio.sleep(0)
@@ -320,6 +320,8 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
         for query in queries:
             arrived["call"](query)
         assert await queries[-1].answer == f"the gateway is answering {_QUERIES} other queries".encode()
+        # The others of the burst are answered.
+        assert not any(query.answer.done() for query in queries[:-1])
         ping = Query()
         arrived["ping"](ping)
         assert await ping.answer == b"pong"

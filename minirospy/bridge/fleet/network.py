@@ -362,8 +362,11 @@ class FleetNetwork:
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        task = asyncio.ensure_future(self._answer(query, handler, share, key))
-        for tasks in (self._answering, share.tasks):
+        # Decided here: in a burst all tasks are created before the first of them runs.
+        is_full = len(share.tasks) >= share.limit
+        refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
+        task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
+        for tasks in [self._answering] if is_full else [self._answering, share.tasks]:
             tasks.add(task)
             task.add_done_callback(tasks.discard)
 
@@ -371,14 +374,14 @@ class FleetNetwork:
         self,
         query: Query,
         handler: Callable[[str, bytes], Awaitable[bytes]],
-        share: _Share,
         own_key: str = "",
+        refusal: str = "",
     ) -> None:
         key, payload = str(query.key_expr), query.payload
         reply: Callable[[], object] | None = None
         try:
-            if len(share.tasks) > share.limit:
-                raise QueryFailed(f"the gateway is answering {share.limit} other queries")
+            if refusal:
+                raise QueryFailed(refusal)
             if payload is not None and len(payload) > MOST_TEXT:
                 raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
             body = await handler(key, payload.to_bytes() if payload is not None else b"")
