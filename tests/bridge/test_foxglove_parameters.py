@@ -102,3 +102,26 @@ def test_parameters_of_a_master_without_any_are_read_again() -> None:
     graph.change("/", {})
     assert one.reports == [[Parameter("/a", is_set=False)]]
     assert everything.reports == []
+
+
+def test_requests_to_the_master_are_sent_in_order() -> None:
+    graph, listener, requests = Graph(), Listener(), []
+
+    async def add(_: str) -> None:
+        requests.append("add")
+
+    async def remove(_: str) -> None:
+        for _turn in range(10):
+            await asyncio.sleep(0)
+        requests.append("remove")
+
+    async def run() -> None:
+        await asyncio.gather(*graph.spawned)
+
+    graph.node.parameters.add, graph.node.parameters.remove = add, remove
+    parameters = Parameters(graph)  # type: ignore[arg-type]
+    parameters.subscribe(listener, ())
+    parameters.forget(listener)
+    parameters.subscribe(listener, ())
+    asyncio.run(run())
+    assert requests == ["add", "remove", "add"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable
 from typing import Protocol
 
 from minirospy.bridge.foxglove.protocol import Parameter
@@ -28,6 +29,7 @@ class Parameters:
         self._wanted: dict[ParameterListener, set[str] | None] = {}
         """The names that a client subscribes to; None: all."""
         self._is_watching = False
+        self._at_master = asyncio.Lock()
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
         """Return parameters, all that are set where ``names`` is empty. Raises MasterUnreachableError, RpcError."""
@@ -73,7 +75,7 @@ class Parameters:
         if not self._is_watching:
             self._is_watching = True
             self._graph.node.parameters.listeners.append(self._changed)
-            self._graph.spawn(self._graph.node.parameters.add(_ROOT))
+            self._graph.spawn(self._in_order(self._graph.node.parameters.add))
 
     def count(self, listener: ParameterListener) -> int:
         """Return the number of names that a client subscribes to."""
@@ -94,7 +96,12 @@ class Parameters:
         if not self._wanted and self._is_watching:
             self._is_watching = False
             self._graph.node.parameters.listeners.remove(self._changed)
-            self._graph.spawn(self._graph.node.parameters.remove(_ROOT))
+            self._graph.spawn(self._in_order(self._graph.node.parameters.remove))
+
+    async def _in_order(self, request: Callable[[str], Awaitable[object]]) -> None:
+        """Subscribe at the master, or unsubscribe, after the requests before it: each may use its own connection."""
+        async with self._at_master:
+            await request(_ROOT)
 
     def _changed(self, name: str, value: object) -> None:
         """Report a change at ``name``, a parameter or a namespace; ``{}`` is one that was deleted, or an empty one."""
