@@ -24,13 +24,14 @@ from websockets.exceptions import ConnectionClosed
 
 from minirospy import Node
 from minirospy.aio.raw import raw_class
+from minirospy.aio.services import Service
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosbridge import png, protocol
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
 from minirospy.errors import ServiceException
 from minirospy.wire.tcpros import InterfaceType
-from tests.waiting import until
+from tests.waiting import until, wait_until
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running
@@ -413,6 +414,35 @@ def test_client_offers_a_service(bridge: Running) -> None:
 
     client.send(op="unadvertise_service", service="/ours")
     assert client.next("status", level="info")["msg"] == "Unadvertised service /ours."
+
+
+def test_service_of_a_client_that_has_left_is_offered_by_another(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closing, may_close = asyncio.Event(), asyncio.Event()
+    close = Service.close
+
+    async def close_late(self: Service) -> None:
+        closing.set()
+        await may_close.wait()
+        await close(self)
+
+    monkeypatch.setattr(Service, "close", close_late)
+    first, second = bridge.rosbridge(), bridge.rosbridge()
+    offer = {"op": "advertise_service", "service": "/ours", "type": "std_srvs/SetBool"}
+    for client in (first, second):
+        client.send(op="set_level", level="info")
+        client.synchronize()
+    first.send(**offer)
+    assert first.next("status")["msg"] == "Advertised service /ours."
+    first.close()
+    bridge.run(closing.wait())  # type: ignore[arg-type]
+
+    (connection,) = bridge.bridge.listeners["rosbridge"].connections
+    second.send(**offer)
+    wait_until(lambda: bridge.call(lambda: connection.traffic.received) == 3)
+    bridge.call(may_close.set)
+    assert second.next("status")["msg"] == "Advertised service /ours."
 
 
 def test_call_fails_when_the_offering_client_leaves(bridge: Running) -> None:

@@ -54,6 +54,7 @@ class RosbridgeDoor:
         self.sessions: list[RosbridgeSession] = []
         self.services: dict[str, ClientService] = {}
         """Services that clients offer, by name."""
+        self._closing: dict[str, asyncio.Task[None]] = {}
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
         self._types = ArrivingTypes()
@@ -88,6 +89,21 @@ class RosbridgeDoor:
     def release(self, publication: Publication) -> None:
         """End a publication after the time that a client may need to advertise it again."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
+
+    def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
+        """Start to end a service of a client; return the task."""
+        name = service.name
+        del self.services[name]
+        task = self._closing[name] = self.graph.spawn(service.close(why))
+        task.add_done_callback(lambda _: self._closing.pop(name))
+        return task
+
+    async def free_service(self, name: str, why: str) -> None:
+        """End the service that a client offers by this name, and wait until the name is free."""
+        while name in self.services or name in self._closing:
+            if name in self.services:
+                self.close_service(self.services[name], why)
+            await asyncio.wait([self._closing[name]])
 
     def forget_topic(self, topic: str) -> None:
         """Forget the last message of a topic."""

@@ -133,8 +133,7 @@ class RosbridgeSession:
         self._published.clear()
         for name, service in list(self._door.services.items()):
             if service.session is self:
-                del self._door.services[name]
-                self._graph.spawn(service.close(f"the client that offers {name} has disconnected"))
+                self._door.close_service(service, f"the client that offers {name} has disconnected")
         self._inbox.clear()
         for task in list(self._tasks):
             task.cancel()
@@ -408,12 +407,11 @@ class RosbridgeSession:
         return self._offer(event)
 
     async def _offer(self, event: protocol.AdvertiseService) -> None:
-        old = self._door.services.pop(event.service, None)
-        if old:
+        if event.service in self._door.services:
             self.status(
                 StatusLevel.WARNING, f"Duplicate service advertised. Overwriting {event.service}.", event.id
             )
-            await old.close("Duplicate advertiser.")
+        await self._door.free_service(event.service, "Duplicate advertiser.")
         self._door.services[event.service] = ClientService(self, self._graph, event.service, event.type)
         self.status(StatusLevel.INFO, f"Advertised service {event.service}.", event.id)
 
@@ -423,9 +421,10 @@ class RosbridgeSession:
             raise OperationError(
                 f"Service {event.service} has not been advertised via rosbridge, can't unadvertise.", event.id
             )
-        del self._door.services[event.service]
+        why = f"Service {event.service} was unadvertised with a service call in progress"
+        closing = self._door.close_service(service, why)
         self.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
-        return service.close(f"Service {event.service} was unadvertised with a service call in progress")
+        return _ended(closing)
 
     def _service_response(self, event: protocol.ServiceResponse) -> None:
         service = self._own_service(event.service)
@@ -466,6 +465,10 @@ class RosbridgeSession:
     def _require_write(self, what: str) -> None:
         if not self.client.may_write:
             raise BridgeError(f"{what} is not allowed: this token is read-only")
+
+
+async def _ended(task: asyncio.Task[None]) -> None:
+    await asyncio.wait([task])
 
 
 def _check_name(kind: str, name: str) -> None:
