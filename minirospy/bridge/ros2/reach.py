@@ -9,6 +9,7 @@ client that was made later shows that those before were found, too.
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
@@ -59,7 +60,7 @@ class Reach:
             self._ready_at = None
             self._reaching = asyncio.ensure_future(self._reach())
 
-    async def wait(self, seconds: float = _MOST_SECONDS) -> None:
+    async def wait(self, seconds: float = math.inf) -> None:
         """Return once the responses of the servers of this moment arrive, or after so many seconds.
 
         That is after ten seconds at most: servers that have not answered by then do not hold up each request.
