@@ -205,10 +205,13 @@ def test_an_action_runs_on_a_robot_and_is_cancelled(fleet: Fleet) -> None:
 
     async def act() -> None:
         async with (
-            ActionServer(server_node, "fibonacci", FibonacciAction, execute),
+            ActionServer(server_node, "fibonacci", FibonacciAction, execute) as server,
             ActionClient(client_node, "robot1/fibonacci", FibonacciAction) as client,
         ):
             await client.wait_for_server(SECONDS)
+            # The status alone has come by then.
+            await server._feedback.wait_for_subscribers(1, SECONDS)
+            await server._result.wait_for_subscribers(1, SECONDS)
             goal = client.send(FibonacciGoal(order=3))
             assert list((await anext(aiter(goal))).sequence) == [0, 1]
             assert list((await goal).sequence) == [0, 1, 1]
