@@ -163,13 +163,15 @@ def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> N
     try:
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=quick))
         found = collect(fleet, control, "/robot1/map", String)
-        fleet.until(lambda: len(found) == 1)
+        # A machine that stands still for two seconds loses the link, too.
+        fleet.until(lambda: len(found) >= 1)
 
         proxy.cut()
         fleet.until(lambda: not importer.robots)
+        count = len(found)
         proxy.mend()
         # The subscriber gets the latched message again, as from a publisher that was started again.
-        fleet.until(lambda: len(found) == 2)
+        fleet.until(lambda: len(found) > count)
     finally:
         fleet.run(proxy.close())
 
@@ -197,11 +199,24 @@ def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
     return called
 
 
+async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
+    """Return a call of /robot1/slow that has arrived; repeat one that fails before, as where the machine stood still."""
+    from std_srvs.srv import Trigger
+
+    while True:
+        await client.wait_for_service("/robot1/slow", SECONDS)
+        calling = asyncio.ensure_future(client.call("/robot1/slow", Trigger))
+        arriving = asyncio.ensure_future(called.wait())
+        await asyncio.wait({calling, arriving}, return_when=asyncio.FIRST_COMPLETED)
+        arriving.cancel()
+        if called.is_set():
+            return calling
+        assert isinstance(calling.exception(), ServiceException)
+
+
 def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     fleet: Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from std_srvs.srv import Trigger
-
     for name in ("presence._REGULAR_SECONDS", "presence._LOST_SECONDS", "presence._ROUND_SECONDS"):
         monkeypatch.setattr(f"minirospy.bridge.fleet.{name}", 0.2)
     monkeypatch.setattr("minirospy.bridge.fleet.importer._PING_SECONDS", 1.0)
@@ -216,14 +231,12 @@ def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     try:
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=str(slow)))
         client = control.node("client")
-        fleet.run(client.wait_for_service("/robot1/slow", SECONDS))
         fleet.until(lambda: importer._presence._answered)
         # All are queried under one key, and each answers under its own.
         fleet.until(partial(_answers, importer))
 
         async def call() -> str:
-            calling = asyncio.ensure_future(client.call("/robot1/slow", Trigger))
-            await called.wait()
+            calling = await call_never(client, called)
             proxy._open.clear()
             try:
                 await calling
@@ -242,18 +255,14 @@ def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
 
 
 def test_a_call_ends_when_the_robot_is_lost(fleet: Fleet, quick: str) -> None:
-    from std_srvs.srv import Trigger
-
     robot, control = fleet.place(), fleet.place()
     called = serve_never(fleet, robot)
     gateway_of(control, "", NetworkOptions(listen=(fleet.endpoint,), config=quick))
     gateway = gateway_of(robot, "robot1", NetworkOptions(connect=(fleet.endpoint,), config=quick))
     client = control.node("client")
-    fleet.run(client.wait_for_service("/robot1/slow", SECONDS))
 
     async def call() -> str:
-        calling = asyncio.ensure_future(client.call("/robot1/slow", Trigger))
-        await called.wait()
+        calling = await call_never(client, called)
         fleet.gateways.remove(gateway)
         await gateway.close()
         try:
@@ -380,7 +389,7 @@ def test_what_is_not_of_the_form_is_left_out(fleet: Fleet) -> None:
         assert secret == []
         fleet.until(lambda: importer.contents.refused >= 4)
         assert list(importer.robots) == ["robot1"]
-        status = fleet.run(fleet_status(stranger, 5.0))
+        status = fleet.run(fleet_status(stranger, SECONDS))
         assert status[0][0].status["topics"] == 1
     finally:
         fleet.run(stranger.close())
@@ -469,6 +478,14 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, text
 
 
+def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[int, str]:
+    """Return the end of a command that has reached the fleet: on a busy machine connecting takes longer than it waits."""
+    while True:
+        code, text = ended(start(*words))
+        if "nothing of the fleet answers" not in text and "no answer within" not in text:
+            return code, text
+
+
 def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subprocess.Popen[str]]) -> None:
     robot, control = fleet.place(), fleet.place()
     publisher(fleet, robot, "/chat", String)
@@ -481,13 +498,13 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     assert router.stdout.readline() == f"router of the fleet at tcp/{endpoint}\n"
     fleet.until_shown(control, "/robot1/chat")
 
-    code, text = ended(start("status", "--connect", endpoint))
+    code, text = answered(start, "status", "--seconds", "60", "--connect", endpoint)
     assert code == 0
     assert text.startswith("1 robot, 1 control room\nrobot1 (")
     assert "1 topic, 0 services, clock " in text
     fleet.run(robot.nodes[0].set_param("/speed", 1.5))
-    assert ended(start("param", "robot1", "/speed", "--connect", endpoint)) == (0, "1.5\n")
-    code, text = ended(start("param", "robot1", "/nothing", "--connect", endpoint))
+    assert answered(start, "param", "robot1", "/speed", "--connect", endpoint) == (0, "1.5\n")
+    code, text = answered(start, "param", "robot1", "/nothing", "--connect", endpoint)
     assert (code, text) == (1, "minirospy fleet: ERROR: robot [robot1]: Parameter [/nothing] is not set\n")
 
     gateway.kill()
