@@ -108,7 +108,10 @@ class Ros1Peer:
     def call(self, type_: str, md5sum: str, name: str, request: bytes) -> bytes:
         """Return the first reply. Raise RuntimeError with an error reply, or without any."""
         replies = self.session.get(
-            self.key(type_, md5sum, name), payload=request, allowed_destination=zenoh.Locality.REMOTE
+            self.key(type_, md5sum, name),
+            payload=request,
+            allowed_destination=zenoh.Locality.REMOTE,
+            timeout=60,
         )
         for reply in replies:
             if reply.ok is None:

@@ -11,6 +11,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, SetBool, SetBoolResponse
 
 from minirospy.bridge.access import NameFilter
+from minirospy.bridge.fleet import ros1_keys
+from minirospy.bridge.fleet.ros1_keys import LOST_SECONDS
 from minirospy.bridge.fleet.ros1_side import Ros1Side
 from minirospy.bridge.fleet.ros1_topic import MARK
 from minirospy.bridge.fleet.rules import GatewayRules
@@ -24,6 +26,13 @@ from tests.bridge.ros1_peer import Ros1Peer
 STRING = "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1"
 SWITCH = "std_srvs/SetBool", "09fb03525b03e7ea1fd3992bafd87e16"
 EMPTY = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lose nothing, where the machine stands still, and repeat no line of the log."""
+    monkeypatch.setattr(ros1_keys, "LOST_SECONDS", SECONDS)
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1000.0)
 
 
 @pytest.fixture
@@ -239,8 +248,9 @@ def test_a_service_of_this_master_is_not_replaced(fleet: Fleet, peer: Callable[.
 
 
 def test_what_ends_there_leaves_this_master_and_comes_again(
-    fleet: Fleet, peer: Callable[..., Ros1Peer]
+    fleet: Fleet, peer: Callable[..., Ros1Peer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(ros1_keys, "LOST_SECONDS", LOST_SECONDS)
     place = fleet.place()
     gateway(place, listens=True)
     robot = peer()
@@ -281,6 +291,9 @@ def test_what_ends_here_is_announced_no_more(fleet: Fleet, peer: Callable[..., R
     )
     fleet.run(chat.close())
     fleet.until(lambda: running.status()["announced"] == 1)
+    # A beacon that was on its way comes before that of a later topic.
+    publisher(fleet, place, "/later", String, name="later")
+    fleet.until(lambda: robot.has_received("pub", *STRING, "/later"))
     robot.received.clear()
     fleet.until(lambda: sum(robot.received.values()) >= 3)
     assert not robot.has_received("pub", *STRING, "/chat")
