@@ -128,7 +128,12 @@ def test_the_graph_is_that_of_the_tokens(node: RmwNode, side: ZenohSide) -> None
     leaving = node.end(2, "MS", CHATTER)
     node.end(3, "SS", SWITCH)
     wait_until(
-        lambda: side.services() and side.ends("/chatter").subscribers and side.ends("/chatter").publishers
+        lambda: (
+            side.nodes()
+            and side.services()
+            and side.ends("/chatter").subscribers
+            and side.ends("/chatter").publishers
+        )
     )
     assert side.nodes() == [("peer", "/")]
     assert side.topics() == {"/chatter": ("std_msgs/String",)}
