@@ -28,6 +28,12 @@ if TYPE_CHECKING:
     from tests.bridge.conftest import Running
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait longer for an image than a machine may stand still for."""
+    monkeypatch.setattr("minirospy.bridge.video.pages._SNAPSHOT_SECONDS", 60.0)
+
+
 def image(encoding: str, array: np.ndarray[Any, Any]) -> Image:
     height, width = array.shape[:2]
     return Image(
