@@ -17,6 +17,13 @@ from tests.waiting import until
 LIMIT = 60.0
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait for nodes that are silent. A test of a limit sets it after this."""
+    for name in ("_QUERY_SECONDS", "_AGAIN_SECONDS"):
+        monkeypatch.setattr(node_queries, name, LIMIT)
+
+
 class Nodes:
     """Nodes that answer with their name in capitals; those in ``silent`` only once they may, those in ``dead`` never."""
 
