@@ -21,6 +21,22 @@ from minirospy.runtime.transport.loop import LoopThread
 _T = TypeVar("_T")
 FOXGLOVE = Subprotocol("foxglove.websocket.v1")
 
+_PATIENCE = 60.0
+"""Seconds: a machine that runs tests may stand still for some."""
+_LIMITS = (
+    "aio.topics._JOIN_SECONDS",
+    "bridge.fleet.definitions._SECONDS",
+    "bridge.foxglove.channels._SECONDS",
+    "bridge.node_queries._QUERY_SECONDS",
+    "bridge.ros2.action_to_ros1._SERVER_SECONDS",
+    "bridge.ros2.action_to_ros2._ACCEPT_SECONDS",
+    "bridge.ros2.bridge._JOIN_SECONDS",
+    "bridge.ros2.bridge._QUERY_SECONDS",
+    "bridge.ros2.services._QUERY_SECONDS",
+    "cli.bridge_status._SECONDS",
+)
+"""What gives up, or goes on without an answer, after some seconds."""
+
 
 class Running:
     """A bridge and other nodes of the same graph, on one loop."""
@@ -221,6 +237,13 @@ class RosbridgeClient:
 
 def _has(message: dict[str, Any], op: str, fields: dict[str, Any]) -> bool:
     return message.get("op") == op and all(message.get(name) == value for name, value in fields.items())
+
+
+@pytest.fixture(autouse=True)
+def _patient_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait longer than a machine may stand still for. A test of a limit sets it after this."""
+    for name in _LIMITS:
+        monkeypatch.setattr(f"minirospy.{name}", _PATIENCE)
 
 
 @pytest.fixture

@@ -133,6 +133,12 @@ def test_rules_name_actions_and_their_fields() -> None:
 # --- the bridge
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Send no request before the server is reached."""
+    monkeypatch.setattr("minirospy.bridge.ros2.reach._MOST_SECONDS", LIMIT)
+
+
 def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
     side = FakeSide()
 
@@ -433,6 +439,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     """A result takes some of the executor's rounds: a server that is destroyed before leaves its client waiting."""
+    monkeypatch.setattr("minirospy.bridge.ros2.rclpy_actions._CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()
 

@@ -555,7 +555,9 @@ def test_what_came_from_ros2_is_not_sent_back() -> None:
 
 
 @pytest.mark.usefixtures("master")
-def test_publishers_that_do_not_answer_keep_no_topic_waiting() -> None:
+def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.bridge.ros2.bridge._QUERY_SECONDS", 1.0)
+
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         topics = [f"/dead{number}" for number in range(40)]
         with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
@@ -565,7 +567,7 @@ def test_publishers_that_do_not_answer_keep_no_topic_waiting() -> None:
                     await dead._node.master("registerPublisher", topic, "std_msgs/String", uri)
             await node.advertise("/live", raw("std_msgs/String"))
             side.graph = {topic: Ros2Topic(subscribers=(STRING,)) for topic in [*topics, "/live"]}
-            await asyncio.wait_for(bridge.look(), 30.0)
+            await asyncio.wait_for(bridge.look(), 60.0)
             assert side.publishers.keys() == {*topics, "/live"}
 
     bridged(scene)

@@ -67,6 +67,12 @@ def test_renamed_service_types_find_their_partner() -> None:
 # --- the bridge
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Send no request before the server is reached."""
+    monkeypatch.setattr("minirospy.bridge.ros2.reach._MOST_SECONDS", LIMIT)
+
+
 def bridged(
     scene: Callable[[Node, FakeSide, Ros2Bridge], Any],
     services: NameFilter | None = None,
@@ -221,7 +227,7 @@ def test_calls_that_come_as_their_link_is_closed_are_answered() -> None:
         await asyncio.ensure_future(bridge.services.close())
         assert before.cancelled()
         with pytest.raises(BridgeError, match="not bridged any more"):
-            await asyncio.wait_for(asyncio.wrap_future(there.answer(b"\0\1\0\0\1\0\0\0")), 5.0)
+            await asyncio.wait_for(asyncio.wrap_future(there.answer(b"\0\1\0\0\1\0\0\0")), LIMIT)
 
     bridged(scene)
 

@@ -56,12 +56,7 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait longer than a machine may stop everything for."""
-    for module, name in (
-        ("action_to_ros1", "_SERVER_SECONDS"),
-        ("action_to_ros2", "_ACCEPT_SECONDS"),
-        ("zenoh_actions", "_CLOSE_SECONDS"),
-        ("zenoh_parameters", "_SECONDS"),
-    ):
+    for module, name in (("zenoh_actions", "_CLOSE_SECONDS"), ("zenoh_parameters", "_SECONDS")):
         monkeypatch.setattr(f"minirospy.bridge.ros2.{module}.{name}", LIMIT)
 
 

@@ -41,12 +41,6 @@ STATIC = "1:1:,1:,:,:,,"
 """The quality of service of a topic that is reliable and transient local, with a depth of 1."""
 
 
-@pytest.fixture(autouse=True)
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer than a machine may stop everything for."""
-    monkeypatch.setattr("minirospy.bridge.ros2.bridge._JOIN_SECONDS", LIMIT)
-
-
 def key_of(topic: str) -> str:
     return f"0{topic}/{KEYS[topic]}"
 

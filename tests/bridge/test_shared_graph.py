@@ -37,7 +37,10 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
     bridge.run(advertise_and_close())
 
 
-def test_nodes_that_do_not_answer_keep_nobody_from_the_others(bridge: Running) -> None:
+def test_nodes_that_do_not_answer_keep_nobody_from_the_others(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.bridge.foxglove.channels._SECONDS", 1.0)
     bridge.publisher(bridge.node("talker"), "/chatter", String)
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
