@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import json
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, TypeVar
@@ -36,6 +37,11 @@ _LIMITS = (
     "cli.bridge_status._SECONDS",
 )
 """What gives up, or goes on without an answer, after some seconds."""
+
+# A client of a test may read nothing for long. websockets has sent pings of its own accord since version 15.
+_PATIENT_CLIENT: dict[str, Any] = {"open_timeout": _PATIENCE}
+if "ping_interval" in inspect.signature(connect).parameters:
+    _PATIENT_CLIENT["ping_interval"] = None
 
 
 class Running:
@@ -132,7 +138,7 @@ class Client:
         subprotocols: tuple[Subprotocol, ...] | None = (FOXGLOVE,),
         **options: Any,
     ) -> None:
-        options.setdefault("max_size", None)
+        options = {"max_size": None, **_PATIENT_CLIENT, **options}
         self._stack = contextlib.ExitStack()
         opening = connect(
             f"{scheme}://127.0.0.1:{port}{path}", subprotocols=subprotocols, compression=None, **options
@@ -201,7 +207,8 @@ class RosbridgeClient:
 
     def __init__(self, port: int, *, path: str = "/", **options: Any) -> None:
         self._stack = contextlib.ExitStack()
-        opening = connect(f"ws://127.0.0.1:{port}{path}", compression=None, max_size=None, **options)
+        options = {"max_size": None, **_PATIENT_CLIENT, **options}
+        opening = connect(f"ws://127.0.0.1:{port}{path}", compression=None, **options)
         self.socket: ClientConnection = self._stack.enter_context(opening)
         self._kept: list[dict[str, Any]] = []
 

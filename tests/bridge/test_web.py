@@ -448,7 +448,7 @@ def test_clients_are_pinged_before_they_are_disconnected() -> None:
 
 def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callable[..., Running]) -> None:
     limit = 3_000_000
-    bridge = run_bridge(limits=Limits(queue=limit))
+    bridge = run_bridge(limits=Limits(queue=limit, silent_seconds=1000.0))
     publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
     small = bridge.publisher(bridge.node("small"), "/small", String)
     clients = [bridge.client() for _ in range(9)]
@@ -484,7 +484,8 @@ def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callabl
     stuck.next("removeStatus")
 
 
-def test_disconnected_client_leaves_no_messages_in_memory(bridge: Running) -> None:
+def test_disconnected_client_leaves_no_messages_in_memory(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(silent_seconds=1000.0))
     publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
     stuck = bridge.client(max_queue=1)
     stuck.subscribe("/image")
