@@ -7,6 +7,7 @@ import contextlib
 import inspect
 import json
 from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
 from typing import Any, TypeVar
 
 import cbor2
@@ -14,6 +15,7 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+import minirospy.bridge
 from minirospy import Node
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.bridge import Bridge, BridgeOptions
@@ -123,7 +125,7 @@ class Running:
         for node in reversed(self._nodes):
             await node.close()
         left = asyncio.all_tasks() - {asyncio.current_task()}
-        assert not [task for task in left if "bridge" in repr(task.get_coro())], left
+        assert not [task for task in left if _is_of_the_bridge(task)], left
 
 
 class Client:
@@ -240,6 +242,12 @@ class RosbridgeClient:
 
     def close(self) -> None:
         self._stack.close()
+
+
+def _is_of_the_bridge(task: asyncio.Task[Any]) -> bool:
+    """Return whether a task runs a coroutine function of minirospy.bridge."""
+    code = getattr(task.get_coro(), "cr_code", None)
+    return code is not None and Path(minirospy.bridge.__path__[0]) in Path(code.co_filename).parents
 
 
 def _has(message: dict[str, Any], op: str, fields: dict[str, Any]) -> bool:
