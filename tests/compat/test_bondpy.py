@@ -10,7 +10,7 @@ import pytest
 from minirospy.compat.bondpy.machine import Action, Event, State, next_state
 
 PROGRAM = """
-import queue, threading
+import logging, queue, threading
 import rospy
 from bond.msg import Status
 from bondpy.bondpy import Bond, Timeout, as_float_duration, as_ros_duration
@@ -55,10 +55,19 @@ rospy.set_param("/bond_disable_heartbeat_timeout", True)
 held = Bond("bonds", "held")
 held.heartbeat_timeout = 0.1
 held.start()
+disabled = threading.Event()
+
+def watch(record):
+    if record.getMessage().startswith("Heartbeat timeout is disabled."):
+        disabled.set()
+    return True
+
+logging.getLogger("rosout").addFilter(watch)
 while third.get_num_connections() < 1:
     rospy.sleep(0.05)
 while not held.wait_until_formed(0.2):
     third.publish(Status(id="held", instance_id="silent", active=True))
+disabled.wait(60)
 print(held.wait_until_broken(0.5))
 rospy.set_param("/bond_disable_heartbeat_timeout", False)
 print(held.wait_until_broken(30))

@@ -309,14 +309,13 @@ nodes = [subprocess.Popen(program + words) for words in chain]
 try:
     rospy.set_param("/kept", True)
     publisher = rospy.Publisher("/camera", Image, queue_size=1)
-    got = []
+    got, kinds = [], set()
     rospy.Subscriber("/last", Image, got.append)
-    rospy.Subscriber("/jpeg/compressed", CompressedImage, lambda message: got or kinds.add(message.format))
-    kinds = set()
+    rospy.Subscriber("/jpeg/compressed", CompressedImage, lambda message: kinds.add(message.format))
     rate = rospy.Rate(20)
     sent = Image(height=2, width=2, encoding="rgb8", step=6, data=bytes(range(12)))
     sent.header.frame_id = "camera"
-    while not got:
+    while not (got and kinds):
         publisher.publish(sent)
         rate.sleep()
     print(got[0].encoding, got[0].header.frame_id, list(got[0].data) == list(range(12)), got[0].header.seq > 0)

@@ -13,6 +13,7 @@ import pytest
 
 from minirospy.compat.sound_play.players import PLAYERS, SPEAKERS, play_command, say_command
 from minirospy.compat.sound_play.tones import BUILTIN, wav_of
+from tests.waiting import wait_until
 
 SCRIPTS = Path(__file__).parents[2] / "msgs" / "sound_play" / "scripts"
 
@@ -82,7 +83,7 @@ def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, *words],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
         stdin=subprocess.DEVNULL,
         env={**os.environ, **environment},
@@ -221,7 +222,8 @@ def players(tmp_path: Path) -> tuple[Path, Path]:
         program.write_text(
             f"#!{sys.executable}\nimport sys, time\nsaid = {text}\n"
             f"open({str(log)!r}, 'a').write(' '.join([{name!r}, *sys.argv[1:]]) + (' | ' + said if said else '') + chr(10))\n"
-            "time.sleep(0.1)\n"
+            # The last one sends feedback while it plays.
+            "time.sleep(2 if said == 'once' else 0.1)\n"
         )
         program.chmod(0o755)
     return folder, log
@@ -246,8 +248,8 @@ def test_node_plays_by_the_players_of_this_machine(players: tuple[Path, Path], m
             before = len(log.read_text().splitlines())
             script = run(str(SCRIPTS / words[0]), *words[1:])
             assert script.returncode == 0, script.stderr
-            while len(log.read_text().splitlines()) == before:
-                assert node.poll() is None
+            wait_until(lambda n=before: len(log.read_text().splitlines()) > n or node.poll() is not None)
+            assert node.poll() is None
             assert log.read_text().splitlines()[before].startswith(line)
     finally:
         node.terminate()

@@ -333,7 +333,8 @@ viewed.start()
 
 def wait_for(*keys):
     for _ in range(1000):
-        if all(any(each.startswith(key) for each in found) for key in keys):
+        # Whole words: "/SM_ROOT" is not "/SM_ROOT/INNER".
+        if all(any(f"{each} ".startswith(f"{key} ") for each in found) for key in keys):
             return True
         pause.wait(0.02)
     return sorted(found)
