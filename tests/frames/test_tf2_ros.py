@@ -47,11 +47,12 @@ class TestListener:
 static = tf2_ros.StaticTransformBroadcaster()
 static.sendTransform(stamped("map", "odom", 0, 1.0))
 static.sendTransform([stamped("base", "laser", 0, 5.0)])
-buffer = tf2_ros.Buffer()
+# Keeps all of them: the stamps advance by 1 s each 10 ms.
+buffer = tf2_ros.Buffer(rospy.Duration(10000))
 listener = tf2_ros.TransformListener(buffer)
 broadcaster = tf2_ros.TransformBroadcaster()
 def send():
-    for n in range(1, 1000):
+    for n in range(1, 10000):
         broadcaster.sendTransform([stamped("odom", "base", n, n), stamped("base", "wheel", n, 0.5)])
         if done.wait(0.01):
             break
@@ -368,7 +369,7 @@ class TestServer:
         said = run("""
 buffer = tf2_ros.Buffer()
 server = tf2_ros.BufferServer(buffer, "server", True)
-client = tf2_ros.BufferClient("server")
+client = tf2_ros.BufferClient("server", timeout_padding=rospy.Duration(60))
 print(client.wait_for_server(LONG))
 for n in (1, 2, 3):
     buffer.set_transform(stamped("map", "base", n, n), "me")
