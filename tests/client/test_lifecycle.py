@@ -202,6 +202,8 @@ def test_one_signal_ends_a_program_that_python_can_interrupt(master: str, what: 
 
     def program() -> float:
         status, output, errors, seconds = signalled(script, number)
+        # On a machine that stalls, it reports after two seconds what it waits for.
+        errors = re.sub(r"\Ashutdown: still waiting for .*\n", "", errors) if seconds > 2 else errors
         assert (status, output.split(), errors) == (0, prints.split(), "")
         assert not is_known(master, "/program")
         return seconds
@@ -518,7 +520,7 @@ rospy.init_node("still")
 rospy.on_shutdown(lambda: print("hook", flush=True))
 print("ready", flush=True)
 signal.raise_signal(signal.SIGTERM)
-for _ in range(10):
+for _ in range(3):
     time.sleep(0.02)
 print("done", flush=True)
 """)

@@ -86,11 +86,12 @@ import rospy.rostime
 threading.excepthook = lambda args: print(args.exc_type.__name__, args.exc_value)
 rospy.set_param("/use_sim_time", True)
 rospy.init_node("case")
-rospy.rostime._set_rostime(rospy.Time(5))
+rospy.rostime._set_rostime(rospy.Time(100000))
 timer = rospy.Timer(rospy.Duration(1), print)
+second = 100000
 while timer.is_alive():  # it may not have started
-    for second in (5, 4):
-        rospy.rostime._set_rostime(rospy.Time(second))
-        timer.join(0.05)
+    second -= 1
+    rospy.rostime._set_rostime(rospy.Time(second))
+    timer.join(0.05)
 """
     assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards"]

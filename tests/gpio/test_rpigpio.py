@@ -418,7 +418,7 @@ def test_wait_for_edge(bcm: Gpio, board: Board) -> None:
 
 def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     bcm.setup(7, GPIO.OUT)
-    edges = board.watch([7], timeout=30)
+    edges = board.watch([7], timeout=100)
     wave = Wave(bcm, bcm.output_pin(7), 20)
     with pytest.raises(RuntimeError, match=r"^A PWM object already exists for this GPIO channel$"):
         bcm.output_pin(7)
@@ -434,7 +434,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
         several = [next(edges) for _ in range(11)]
         high = [after.time - edge.time for edge, after in itertools.pairwise(several) if edge.level]
     wave.set(duty=100)
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 100
     while not heard(board, 7) and time.monotonic() < deadline:
         next(edges)
     wave.stop()

@@ -85,8 +85,8 @@ def listener() -> Iterator[socket.socket]:
         yield server
 
 
-def fault_at(uri: str) -> Fault:
-    master = MasterProxy(uri, "/test", 0.3)
+def fault_at(uri: str, timeout: float = 60.0) -> Fault:
+    master = MasterProxy(uri, "/test", timeout)
     try:
         master.get_pid()
     except (MasterUnreachableError, RpcError) as error:
@@ -100,7 +100,7 @@ def test_why_an_address_does_not_answer(listener: socket.socket) -> None:
     port = listener.getsockname()[1]
     assert fault_at("http://127.0.0.1:1") is Fault.REFUSED
     assert fault_at("http://no-such-host.invalid:1") is Fault.NAME
-    assert fault_at(f"http://127.0.0.1:{port}") is Fault.LATE
+    assert fault_at(f"http://127.0.0.1:{port}", 0.3) is Fault.LATE
     assert trouble_of(TimeoutError()).fault is Fault.SILENT
     assert trouble_of(RpcUnreachable("http://x:1", "odd")).fault is Fault.OTHER
 
