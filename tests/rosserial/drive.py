@@ -14,6 +14,7 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 import tty
 from io import BytesIO
 
@@ -210,6 +211,9 @@ def main(program: list[str]) -> None:
         stderr=subprocess.DEVNULL,
     )
     try:
+        # Answer once /rosout is connected. It is latched: of the lines before, the last one is certain to come.
+        while not lines:
+            rospy.sleep(0.02)
         topics(device, subscriber, chatter, lamp)
         services(device)
         requests(device)
@@ -217,6 +221,10 @@ def main(program: list[str]) -> None:
         process.send_signal(signal.SIGINT)
         device.receive("is asked to stop")
         process.wait(SECONDS)
+        # Its last lines may still be on their way.
+        end = time.monotonic() + SECONDS
+        while not any("shutdown hook" in line for line in lines) and time.monotonic() < end:
+            time.sleep(0.02)
     finally:
         process.kill()
         process.wait()
