@@ -62,7 +62,9 @@ def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
                 await until_paths_are(node, FREE)
                 board.move_person((0.5, 0.0))
                 await until_paths_are(node, WARNING)
-                await node.publish("person", Point(x=0.3))
+                person = await node.advertise("person", Point)
+                await person.wait_for_subscribers()
+                await person.publish(Point(x=0.3))
                 await until_paths_are(node, PROTECTIVE)
                 await until_person_is(board, (0.3, 0.0))
                 answer = await node.call("move_person", MovePerson, True, 2.0, -1.0)
@@ -79,9 +81,9 @@ def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
                 assert (await node.call("move_person", MovePerson, present=False)).success
 
                 await until_person_is(board, None)
-                await node.publish("person", Point(x=0.3))
+                await person.publish(Point(x=0.3))
                 await until_paths_are(node, PROTECTIVE)
-                await node.publish("person", Point(x=math.nan))
+                await person.publish(Point(x=math.nan))
                 await until_paths_are(node, FREE)
 
     asyncio.run(asyncio.wait_for(main(), SECONDS))

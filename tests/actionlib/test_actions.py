@@ -34,7 +34,7 @@ print("end")
 
 def run(code: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-c", BEGIN + code + END], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", BEGIN + code + END], capture_output=True, text=True, timeout=200, check=False
     )
     assert done.stdout.endswith("end\n"), done.stdout + done.stderr
     return done.stdout[: -len("end\n")] + done.stderr

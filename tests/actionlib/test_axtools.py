@@ -56,7 +56,12 @@ def command(name: str) -> list[str]:
 
 def ask(answers: str, *words: str) -> tuple[str, str, int]:
     done = subprocess.run(
-        [*command("axclient"), *words], input=answers, capture_output=True, text=True, timeout=30, check=False
+        [*command("axclient"), *words],
+        input=answers,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
     )
     return done.stdout, done.stderr, done.returncode
 
