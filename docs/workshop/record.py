@@ -19,6 +19,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import random
 import re
 import select
 import shutil
@@ -226,6 +227,15 @@ class Terminal:
             process.kill()
 
 
+def _free_port() -> int:
+    """Return a port below the ephemeral range: between two pages no connection of another program gets it."""
+    while True:
+        port = random.randrange(20_000, 32_000)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+
+
 class Player:
     """A student: a home folder, terminals, a port for the master. `environment` is added to that of the terminals."""
 
@@ -233,9 +243,7 @@ class Player:
         self.record: list[str] = []
         """The session so far, as text."""
         self._home = home.resolve()
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = str(probe.getsockname()[1])
+        self._port = str(_free_port())
         self._environment = {
             "HOME": str(self._home),
             "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]),
