@@ -179,8 +179,8 @@ def wait(event, seconds):
         buffer.set_transform(stamped("map", "other", 1), "me")
     print(event.is_set())
 module.wait_for_event = wait
-print(buffer.lookup_transform("map", "base", rospy.Time(1), rospy.Duration(7)).header.stamp)
-print(len(waits), all(6 < each <= 7 for each in waits))
+print(buffer.lookup_transform("map", "base", rospy.Time(1), rospy.Duration(70)).header.stamp)
+print(len(waits), all(0 < each <= 70 for each in waits))
 """)
         assert said == "True\nTrue\n1000000000\n2 True\n"
 
