@@ -76,7 +76,7 @@ class Relay:
     def _received(self, message: AnyMsg) -> None:
         self._output.advertise(message)
         with self._lock:
-            is_wanted = self._output.has_subscribers or not (self._is_lazy or self._is_stealthy)
+            is_wanted = not (self._is_lazy or self._is_stealthy) or self._output.has_subscribers
             if not is_wanted:
                 self._input.close()
         if is_wanted:

@@ -181,7 +181,7 @@ class Filter:
     def _received(self, message: AnyMsg) -> None:
         self._output.advertise(message)
         with self._lock:
-            is_wanted = self._output.has_subscribers or not self._is_lazy
+            is_wanted = not self._is_lazy or self._output.has_subscribers
             if not is_wanted:
                 self._input.close()
         if is_wanted and self._passes(self._clock(), len(message._buff or b"")):
