@@ -194,7 +194,7 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 40.0) -> None:
 def interrupt(process: subprocess.Popen[str]) -> str:
     """Ctrl-C: the process ends by itself, soon, with status 0 and without a traceback."""
     process.send_signal(CTRL_C)
-    # 0.2 s on a quiet machine; a program that does not hear of its end goes on for ever.
+    # 0.2 s on a quiet machine; a program that is not notified of its end goes on for ever.
     output, _ = process.communicate(timeout=100)
     assert "Traceback" not in output, output
     assert process.returncode == 0, output

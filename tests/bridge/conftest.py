@@ -40,7 +40,7 @@ _LIMITS = (
 )
 """What gives up, or goes on without an answer, after some seconds."""
 
-# A client of a test may read nothing for long. websockets has sent pings of its own accord since version 15.
+# A client of a test may read nothing for long. websockets sends pings without being asked since version 15.
 _PATIENT_CLIENT: dict[str, Any] = {"open_timeout": _PATIENCE}
 if "ping_interval" in inspect.signature(connect).parameters:
     _PATIENT_CLIENT["ping_interval"] = None
