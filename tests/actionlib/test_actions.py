@@ -61,10 +61,19 @@ print(client.get_result().result)
 
     def test_a_done_callback_that_raises_holds_nobody_up(self) -> None:
         said = run("""
+import logging
+class Reported(logging.Handler):
+    def emit(self, record):
+        reported.set()
+reported = threading.Event()
 def done(state, result):
     raise ValueError("bad done callback")
+# The terminal's handler, which was added before this one, has written the line by then.
+logging.getLogger("rosout").addHandler(Reported(logging.ERROR))
 client.send_goal(TestGoal(4), done)
 print(client.wait_for_result(second), client.simple_state)
+# A program that shuts down before it is reported does not report it.
+reported.wait(30)
 """)
         assert said.startswith("True 2\n")
         assert "ValueError: bad done callback" in said
