@@ -520,11 +520,15 @@ rospy.init_node("still")
 rospy.on_shutdown(lambda: print("hook", flush=True))
 print("ready", flush=True)
 signal.raise_signal(signal.SIGTERM)
+# The hook runs in the middle of this; what is granted after it has begun where it ends.
+time.sleep(0.15)
+print("granted", flush=True)
 for _ in range(3):
     time.sleep(0.02)
 print("done", flush=True)
 """)
     assert read_line(process) == "hook\n"
+    assert read_line(process) == "granted\n"
     process.send_signal(signal.SIGSTOP)
     time.sleep(1.0)
     process.send_signal(signal.SIGCONT)
