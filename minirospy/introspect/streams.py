@@ -81,12 +81,12 @@ class ToolNode:
 
         try:
             self._loop.run(self._node.start())
+            if ros_time:
+                self._follow_clock(environment.master_uri)
         except BaseException:
-            self._loop.close()
+            # Ctrl-C may interrupt this once the node's servers are open.
+            self.close()
             raise
-
-        if ros_time:
-            self._follow_clock(environment.master_uri)
 
     def __enter__(self) -> ToolNode:
         return self

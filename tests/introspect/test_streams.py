@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from typing import Any
+from urllib.parse import urlsplit
 
 import genpy
 import pytest
@@ -11,8 +14,11 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from minirospy.environment import Environment
+from minirospy.introspect.doctor.own_node import DoctorNode
 from minirospy.introspect.streams import ToolNode
+from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 
@@ -57,3 +63,38 @@ def test_clock_of_another_type_is_ignored(master: str) -> None:
             node.listen("/clock", lambda *_: arrived.set())
             assert arrived.wait(30)
             assert node.clock.now() == 0
+
+
+@pytest.mark.usefixtures("master")
+@pytest.mark.parametrize(
+    "starts",
+    [
+        pytest.param(lambda: ToolNode(Environment.read(), "tool"), id="a command's"),
+        pytest.param(lambda: DoctorNode(Environment.read()).__enter__(), id="the doctor's"),
+    ],
+)
+def test_a_node_that_is_interrupted_as_it_starts_is_closed(
+    starts: Callable[[], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nodes: list[Node] = []
+    start, run = Node.start, LoopThread.run
+
+    async def started(node: Node) -> None:
+        await start(node)
+        nodes.append(node)
+
+    def interrupted(thread: LoopThread, coroutine: Coroutine[object, object, Any]) -> Any:
+        is_first = not nodes
+        outcome = run(thread, coroutine)
+        if is_first:
+            raise KeyboardInterrupt
+        return outcome
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Node, "start", started)
+        patched.setattr(LoopThread, "run", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            starts()
+    address = urlsplit(nodes[0].uri)
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection((address.hostname or "", address.port or 0), timeout=30)

@@ -65,6 +65,8 @@ class DoctorNode:
         try:
             self._loop.run(self.node.start())
         except BaseException:
+            # Ctrl-C may interrupt this once the node's servers are open.
+            self._loop.run(self.node.close())
             self._loop.close()
             raise
         return self

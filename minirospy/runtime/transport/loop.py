@@ -40,8 +40,12 @@ class LoopThread:
         try:
             with naming_thread_limit():
                 self._thread.start()
-        except BaseException:
+        except Exception:
             self.loop.close()
+            raise
+        except BaseException:
+            # Ctrl-C while the thread starts, which closes the loop itself.
+            self.post(self._end.set)
             raise
 
     def run(self, coroutine: Coroutine[object, object, _T], timeout: float | None = None) -> _T:

@@ -10,7 +10,8 @@ from types import FrameType
 
 import pytest
 
-from minirospy.runtime.transport.loop import LoopClosedError, LoopThread
+from minirospy.runtime.transport import loop as loop_module
+from minirospy.runtime.transport.loop import LoopClosedError, LoopThread, new_event_loop
 
 
 def test_a_call_while_the_loop_closes_gets_an_error() -> None:
@@ -106,3 +107,25 @@ def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
     assert inner == [2] * (at - 1)
     assert at > 20
     thread.close()
+
+
+def test_a_thread_that_is_interrupted_as_it_starts_closes_its_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread runs by then: a loop that is closed under it would raise RuntimeError there."""
+    threads: list[threading.Thread] = []
+    faults: list[threading.ExceptHookArgs] = []
+    start = threading.Thread.start
+
+    def interrupted(thread: threading.Thread) -> None:
+        threads.append(thread)
+        start(thread)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(threading, "excepthook", faults.append)
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    loop = new_event_loop()
+    monkeypatch.setattr(loop_module, "new_event_loop", lambda: loop)
+    with pytest.raises(KeyboardInterrupt):
+        LoopThread("test-loop")
+    threads[0].join(30)
+    assert loop.is_closed()
+    assert not faults
