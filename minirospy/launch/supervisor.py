@@ -39,6 +39,12 @@ class _RemoteExited(NamedTuple):
     code: int
 
 
+class _Ended(NamedTuple):
+    """A process was ended by :meth:`Supervisor.end_process`."""
+
+    process: Process
+
+
 class _Stop(NamedTuple):
     """A signal, or a caller, stops the run."""
 
@@ -49,7 +55,7 @@ class _NoMoreNodes(NamedTuple):
     """No further node will be started: the run ends with those that there are."""
 
 
-_Event = _Exited | _RemoteExited | _Stop | _NoMoreNodes
+_Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
 
 
 class Supervisor:
@@ -145,6 +151,9 @@ class Supervisor:
                 case _Exited(process):
                     status = self._exited(process)
                     self.on_change()
+                case _Ended(process):
+                    self._forget_restart(process)
+                    self.on_change()
                 case _RemoteExited():
                     status = self._remote_exited(event)
             if status is not None:
@@ -167,6 +176,7 @@ class Supervisor:
         process.is_ending = True
         self.on_change()
         end_processes([process], self._timeouts, self._output.warn)
+        self._events.put(_Ended(process))
 
     # --- helpers
 
@@ -243,6 +253,13 @@ class Supervisor:
             return None
         self._output.warn(f"{_BAR}\nREQUIRED process [{event.name}] has died!\nInitiating shutdown!\n{_BAR}")
         return 0 if event.code == 0 else 1
+
+    def _forget_restart(self, process: Process) -> None:
+        """Watch a process that has been ended, and waits to be started again, no more."""
+        others = [each for each in self._restarts if each[1] is not process]
+        if len(others) < len(self._restarts) and not process.is_restarting:
+            self._restarts = others
+            self.processes.remove(process)
 
     def _restart(self, process: Process) -> None:
         """Start a node that has exited again, in its place among the others."""

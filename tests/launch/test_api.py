@@ -102,7 +102,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
     launch = roslaunch.scriptapi.ROSLaunch()
     launch.start()
     try:
-        node = roslaunch.core.Node("pkg", "stop.py", "a", args="3", respawn=True, respawn_delay=60.0)
+        node = roslaunch.core.Node("pkg", "stop.py", "a", args="3", respawn=True, respawn_delay=1000.0)
         process = launch.launch(node)
         process.popen.wait(30)
         process.stop()
