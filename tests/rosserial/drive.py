@@ -123,9 +123,18 @@ def services(device: Device) -> None:
     rospy.wait_for_service("switch", SECONDS)
     found: queue.Queue[object] = queue.Queue()
     proxy = rospy.ServiceProxy("switch", SetBool)
-    # The node knows the id of the requests a moment after it offers the service.
-    rospy.sleep(0.5)
-    threading.Thread(target=lambda: found.put(proxy(True)), daemon=True).start()
+
+    def call() -> None:
+        # The node knows the id of the requests a moment after it offers the service, and refuses calls until then.
+        rospy.sleep(0.5)
+        while True:
+            try:
+                found.put(proxy(True))
+                return
+            except rospy.ServiceException:
+                rospy.sleep(0.05)
+
+    threading.Thread(target=call, daemon=True).start()
     device.receive("call", SetBoolRequest)
     device.send(SERVER_OUT, SetBoolResponse(True, "on"))
     print("node: response", str(found.get(timeout=SECONDS)).replace("\n", "; "), flush=True)

@@ -102,12 +102,13 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             assert status.name == "joy_node: Joystick Driver Status"
             if status.message == "OK":
                 break
-        second = await press(pad, states)
-        assert second.header.frame_id == str(link)
-        async for twist in twists:
-            if twist.linear.x:
-                assert twist.linear.x == pytest.approx(0.8)
-                break
+        moving = asyncio.ensure_future(first_motion(twists))
+        # Again until teleop_node, which publishes before it subscribes, has a state.
+        while not moving.done():
+            second = await press(pad, states)
+            assert second.header.frame_id == str(link)
+            await asyncio.wait({moving}, timeout=0.2)
+        assert moving.result() == pytest.approx(0.8)
 
         pad.unplug()
         async for array in node.subscribe("/diagnostics", DiagnosticArray):
@@ -127,6 +128,12 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             pad.send(EVENT_BUTTON, 0, 1)
             await asyncio.wait({waiting}, timeout=0.2)
         return waiting.result()
+
+    async def first_motion(twists: object) -> float:
+        async for twist in twists:  # type: ignore[attr-defined]
+            if twist.linear.x:
+                return float(twist.linear.x)
+        raise AssertionError
 
     async def first(states: object) -> Joy:
         async for state in states:  # type: ignore[attr-defined]
