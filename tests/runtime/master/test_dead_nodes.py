@@ -13,12 +13,8 @@ from minirospy.runtime.master import dead_nodes
 from minirospy.runtime.master import master as masters
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.server import RpcServer
+from tests.conftest import free_port
 from tests.waiting import until
-
-
-def closed_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,7 +40,7 @@ def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pyt
                 f"http://127.0.0.1:{live.port}/",
                 f"http://127.0.0.1:{slow.getsockname()[1]}/",
             )
-            dead_uri = f"http://127.0.0.1:{closed_port()}/"
+            dead_uri = f"http://127.0.0.1:{free_port()}/"
             master.dispatch("registerSubscriber", ["/live", "/t0", "a/B", live_uri])
             master.dispatch("registerPublisher", ["/slow", "/t0", "a/B", slow_uri])
             master.dispatch("registerPublisher", ["/dead", "/t0", "a/B", dead_uri])

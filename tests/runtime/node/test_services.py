@@ -17,6 +17,7 @@ from minirospy.runtime.node.service_client import ServiceClient, parse_service_u
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import ANY, InterfaceType
+from tests.conftest import free_port
 
 TYPE = InterfaceType("a/B", "0" * 32)
 TYPES = {"request_type": "a/BRequest", "response_type": "a/BResponse"}
@@ -213,10 +214,8 @@ def test_refusals(scene: Scene) -> None:
     with pytest.raises(HandshakeRefused, match=r"\[/n\] is not a provider of  \[/nothing\]"):
         scene.client("/nothing")
     scene.client("/worker", md5sum=ANY).close()
-    with socket.create_server(("127.0.0.1", 0)) as closed:
-        port = closed.getsockname()[1]
     with pytest.raises(OSError, match="refused"):
-        ServiceClient(f"rosrpc://localhost:{port}", "/s", ANY, "/test")
+        ServiceClient(f"rosrpc://localhost:{free_port()}", "/s", ANY, "/test")
 
 
 Serve = Callable[[bytes], str]
