@@ -10,6 +10,8 @@ import tokenize
 from pathlib import Path
 from typing import Any, get_type_hints
 
+import pytest
+
 from minirospy.idl.protocols import Message
 
 PROGRAM = """
@@ -111,6 +113,7 @@ def test_any_stays_rare() -> None:
     assert len(lines) < 200, "\n".join(sorted(lines))
 
 
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 replaces the constructor of a protocol")
 def test_message_protocol_takes_any_constructor() -> None:
     # pyright compares constructors of protocols, too: with `object` it refuses Publisher("x", Twist).
     hints = get_type_hints(Message.__init__)

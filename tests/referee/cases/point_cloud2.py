@@ -177,4 +177,8 @@ for points in (
 ):
     outcome(type(points).__name__, lambda: made_of(points))
 outcome("fractions", lambda: made_of([(1.5,)], [("a", 0, 4, 1)]))
-outcome("too large", lambda: made_of([(70000,)], [("a", 0, 4, 1)]))
+try:
+    made_of([(70000,)], [("a", 0, 4, 1)])
+except struct.error:
+    # Its text depends on the version of Python.
+    show("too large raises struct.error")
