@@ -1,7 +1,5 @@
 """sensor_msgs.point_cloud2, provided by minirospy: the points of clouds. Source: http://wiki.ros.org/sensor_msgs."""
 
-from sensor_msgs.msg import PointCloud2, PointField
-
 from minirospy.compat.sensor_msgs.point_cloud2 import (
     _DATATYPES,
     _get_struct_fmt,
@@ -11,6 +9,7 @@ from minirospy.compat.sensor_msgs.point_cloud2 import (
     read_points_list,
     read_points_numpy,
 )
+from sensor_msgs.msg import PointCloud2, PointField
 
 __all__ = [
     "PointCloud2",
