@@ -84,6 +84,8 @@ class NodeQueries(Generic[_Key, _Found]):
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        # Those that had just ended report it only afterwards.
+        self._tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
         """Query once; return whether there is an answer to what is still present."""
@@ -102,7 +104,7 @@ class NodeQueries(Generic[_Key, _Found]):
         return False
 
     def _ended(self, key: _Key, _: object) -> None:
-        del self._tasks[key]
+        self._tasks.pop(key, None)
 
     def _failed(self, key: _Key) -> None:
         if key in self._present:
