@@ -18,7 +18,7 @@ from types import CodeType
 import pytest
 
 from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls, without_comments
-from tools.release import faults_of_metadata
+from tools.release import faults_of_metadata, unpack
 
 ROOT = Path(__file__).parents[1]
 MOST_BYTES = 3_000_000
@@ -226,7 +226,7 @@ def test_one_address_is_in_sdist_and_wheel(tmp_path: Path) -> None:
     address = "https://git.example.org/robots/ours"
     sdist = _build(tmp_path, "--sdist", ROOT, {ADDRESS_VARIABLE: address})
     with tarfile.open(sdist) as archive:
-        archive.extractall(tmp_path)
+        unpack(archive, tmp_path)
     source = tmp_path / sdist.name.removesuffix(".tar.gz")
     wheel = _build(tmp_path / "wheel", "--wheel", source, {ADDRESS_VARIABLE: ""})
 

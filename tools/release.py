@@ -164,6 +164,12 @@ def _metadata(wheel: Path) -> str:
         return archive.read(name).decode()
 
 
+def unpack(archive: tarfile.TarFile, folder: Path) -> None:
+    """Unpack an archive as data, which Python 3.14 does by default and the first releases of 3.10 and 3.11 cannot."""
+    archive.extraction_filter = getattr(tarfile, "data_filter", lambda member, _: member)
+    archive.extractall(folder)
+
+
 def _build(folder: Path, commit: str, epoch: str, *, elsewhere: bool = False) -> list[Path]:
     """Build a commit, the wheel out of the unpacked sdist; return both files.
 
@@ -172,7 +178,7 @@ def _build(folder: Path, commit: str, epoch: str, *, elsewhere: bool = False) ->
     source = folder / "minirospy"
     archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
-        tar.extractall(source)
+        unpack(tar, source)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
     other = {"TZ": "Asia/Kathmandu", "LC_ALL": "C", "PYTHONHASHSEED": "4711"} if elsewhere else {}
     before = os.umask(0o077) if elsewhere else None
