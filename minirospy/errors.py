@@ -89,6 +89,7 @@ __all__ = [
     "McapUnindexedError",
     "MessageException",
     "MinirospyError",
+    "NoThreadsAtEndError",
     "NodeUnreachableError",
     "NotFoundError",
     "ROSException",
@@ -439,6 +440,19 @@ class ThreadLimitError(ROSException):
         return (
             f"the system starts no more threads for this process, which has {self.threads}{known}: raise the limit, or "
             "use fewer subscribers, services and timers in one process"
+        )
+
+
+class NoThreadsAtEndError(ThreadLimitError):
+    """Python 3.12.0 to 3.12.2 start no more threads once the main thread has ended (CPython issue 113964)."""
+
+    def __init__(self) -> None:
+        super().__init__(0, [])
+
+    def __str__(self) -> str:
+        return (
+            "Python 3.12.0 to 3.12.2 start no more threads once the main thread has ended, which nodes need until their "
+            "end: use 3.12.3 or later"
         )
 
 

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy.errors import ThreadLimitError
+from minirospy.errors import NoThreadsAtEndError, ThreadLimitError
 
 __all__ = ["explain", "is_file_limit", "naming_thread_limit"]
 
@@ -25,6 +25,8 @@ def naming_thread_limit() -> Iterator[None]:
         # Of a Python that is exiting; from 3.13 on it has its own error.
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise
+        if "interpreter shutdown" in str(error):
+            raise NoThreadsAtEndError from error
         raise ThreadLimitError(threading.active_count(), _thread_limits()) from error
 
 

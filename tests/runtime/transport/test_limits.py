@@ -65,6 +65,15 @@ def started(loop: LoopThread, master: str, name: str) -> Node:
     return node
 
 
+def test_a_python_that_starts_no_threads_at_its_end_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't create new thread at interpreter shutdown")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    with pytest.raises(ThreadLimitError, match=r"^Python 3\.12\.0 to 3\.12\.2 .*: use 3\.12\.3 or later$"):
+        Workers().start(print)
+
+
 def test_a_thread_over_the_limit_is_a_ros_exception_that_names_it(limit: Limit) -> None:
     limit.is_reached = True
     with pytest.raises(
