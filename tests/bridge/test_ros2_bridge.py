@@ -598,7 +598,8 @@ def test_types_that_do_not_map_are_listed_with_the_reason() -> None:
 @pytest.mark.usefixtures("master")
 def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
-        await node.subscribe_raw("/t", lambda *_: None)
+        # Kept: a subscription that the program drops leaves the graph.
+        subscription = await node.subscribe_raw("/t", lambda *_: None)
         side.graph["/t"] = Ros2Topic(publishers=(STRING,))
 
         def subscribe(*_: object, **__: object) -> FakeSubscription:
@@ -608,6 +609,7 @@ def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
         await bridge.look()
         assert list(bridge.topics.refused.values()) == ["no room"]
         assert "/t" not in (await fetch(node._node.master)).publishers
+        assert subscription.topic == "/t"
 
     bridged(scene)
 
