@@ -172,6 +172,7 @@ class Node:
         for table in (self.publications, self.subscriptions, self.services):
             for part in table.values():
                 part.close()
+        await asyncio.gather(*(subscription.wait_closed() for subscription in self.subscriptions.values()))
         if self._server:
             await self._server.close()
         await self._rpc.close()

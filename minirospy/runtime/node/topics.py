@@ -323,6 +323,10 @@ class Subscription:
         for uri in [*self._links, *self._leaving]:
             self._disconnect(uri)
 
+    async def wait_closed(self) -> None:
+        """Wait, after :meth:`close`, for the end of what was being connected."""
+        await asyncio.gather(*self._connecting.values(), return_exceptions=True)
+
     def _settle(self) -> None:
         """Forget publishers that the master does not list, unless the link is up: nodes of rospy never register again."""
         self._settling = None

@@ -909,6 +909,30 @@ def test_subscription_closed_while_connecting_leaves_no_link() -> None:
     run(scene)
 
 
+def test_a_closed_node_connects_to_nothing_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was being connected has ended by then: its task would be left to the program's loop."""
+    ended: list[str] = []
+
+    async def connect(_: Subscription, uri: str) -> None:
+        try:
+            await asyncio.sleep(60)
+        finally:
+            await asyncio.sleep(0.1)
+            ended.append(uri)
+
+    async def scene() -> None:
+        monkeypatch.setattr(Subscription, "_open_link", connect)
+        async with graph("/a", "/b") as (_, (a, b)):
+            await publish(a, "/t")
+            subscription = await listen(b, "/t", Box())
+            await until(lambda: subscription._connecting)
+            await asyncio.sleep(0)
+            await b.close()
+            assert ended == [a.uri]
+
+    run(scene)
+
+
 def test_a_subscriber_that_comes_again_takes_the_place_of_its_stalled_link() -> None:
     async def scene() -> None:
         async with graph("/a") as (_, (a,)):
