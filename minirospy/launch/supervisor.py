@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -17,11 +16,13 @@ from minirospy.launch.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_WINDOWS = sys.platform == "win32"
 _RESPAWN_SECONDS = 0.1
 """Shortest time between two starts of a node that exits immediately."""
 
-_WATCH_SECONDS = 0.5
+_SLICE = 0.5
+"""Seconds. The main thread, where signals arrive, waits in slices: one that arrives just before the wait starts, and on Windows
+any, is noticed only after it. Changed files and the processes on other machines are looked after in between."""
+
 _BAR = "=" * 80
 
 
@@ -191,13 +192,9 @@ class Supervisor:
 
     def _next_event(self) -> _Event | None:
         """Return what happened; None after a while without events, when restarts and files have been looked after."""
-        due = min((when for when, _ in self._restarts), default=None)
-        # Windows delivers no signal to a thread that waits without a limit; remote processes are polled.
-        pauses = [0.5] if _WINDOWS or self._is_remote_running() else []
-        pauses += [_WATCH_SECONDS] if self._files else []
-        pauses += [max(0.0, due - self._clock())] if due is not None else []
+        pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
-            return self._events.get(timeout=min(pauses, default=None))
+            return self._events.get(timeout=min(pauses))
         except queue.Empty:
             pass
 

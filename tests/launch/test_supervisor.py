@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import queue
+import signal
+import sys
+import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -44,15 +48,17 @@ class Clock:
 
 
 class Events(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue whose timeouts pass immediately on the test's clock if it is empty; without a timeout it waits."""
+    """A queue whose timeouts pass immediately on the test's clock if it is empty; while no node is to respawn it waits."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, supervisor: Supervisor) -> None:
         self.clock = clock
+        self.supervisor = supervisor
         self.before_wait: Callable[[], object] = lambda: None
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
-        if timeout is None:
+        if not self.supervisor._restarts:
             return super().get(timeout=30)
+        assert timeout is not None
         self.before_wait()
         try:
             return super().get(block=False)
@@ -72,7 +78,7 @@ class Scene:
         self.supervisor = Supervisor(
             self.start, lambda _: None, Output(title=False), Timeouts(), clock=self.clock
         )
-        self.events = Events(self.clock)
+        self.events = Events(self.clock, self.supervisor)
         self.supervisor._events = self.events
 
     def start(self, node: NodeSpec, name: str) -> Process:
@@ -138,3 +144,26 @@ def test_a_stop_ends_a_run_that_waits_to_respawn() -> None:
     assert scene.supervisor.watch() == 0
     assert scene.supervisor.stopped_by == "SIGINT"
     assert len(scene.started) == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal to a thread")
+def test_a_signal_that_interrupts_no_wait_is_noticed() -> None:
+    """One that arrives just before the wait starts does not interrupt it, and neither does one that another thread receives."""
+    supervisor = Scene().supervisor
+    supervisor._events = queue.SimpleQueue()
+    before = signal.signal(signal.SIGUSR1, lambda *_: supervisor.stop("SIGUSR1"))
+    too_late = threading.Timer(20.0, supervisor.stop, ("timeout",))
+
+    def send() -> None:
+        # Until the main thread waits.
+        time.sleep(0.1)
+        signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
+
+    try:
+        too_late.start()
+        threading.Thread(target=send).start()
+        assert supervisor.watch(forever=True) == 0
+    finally:
+        too_late.cancel()
+        signal.signal(signal.SIGUSR1, before)
+    assert supervisor.stopped_by == "SIGUSR1"
