@@ -465,6 +465,8 @@ def test_the_status_names_what_is_passed(fleet: Fleet, peer: Callable[..., Ros1P
     fleet.until(lambda: robot.has_received("sub", *STRING, "/chat"))
     robot.publisher(*STRING, "/chat").put(text("hello"))
     fleet.until(lambda: found)
+    # The robot's next beacon may come after its message.
+    fleet.until(lambda: running.status()["seen"])
     status: Any = running.status()
     assert status["namespace"] == "*"
     assert (status["announced"], status["seen"], status["refused"]) == (1, 1, 0)
