@@ -3,7 +3,7 @@
 The fields are laid out as the bytes have them, nested messages opened up. Values of fixed size that follow each
 other, and the length of what comes after them, share one compiled ``struct``; an array of messages of fixed size
 is one ``iter_unpack``. Reading takes no byte that is not there: ``struct`` refuses, a slice comes out short and is
-found at the end, and a count of elements that take no bytes is checked before the loop.
+found at the end, and a count of elements that only slices read, or that take no bytes, is checked before the loop.
 """
 
 from __future__ import annotations
@@ -465,7 +465,8 @@ class _Reader:
 
     def _elements(self, type_: FieldType, target: str, count: str) -> None:
         spec = None if type_.is_primitive else self._lookup(type_.base)
-        if spec and not _least_size(spec, self._lookup):
+        least = _least_size(spec, self._lookup) if spec else 0
+        if spec and not least:
             # Elements without bytes: a short message could ask for any number of them.
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
@@ -487,6 +488,10 @@ class _Reader:
             self._fixed_elements(type_.base, spec, values, each, count)
             return
 
+        if least and type_.length is None:
+            # Elements whose bytes are slices: those come out short, and only the end of the message shows it.
+            with self._source.block(f"if {_times(count, least)} > len(data) - end:"):
+                self._line('raise genpy.DeserializationError("a length is longer than the message")')
         with self._source.block(f"for _ in range({count}):"):
             self._line(f"{each} = {self._new(type_.base)}")
             self._line(f"{values}.append({each})")

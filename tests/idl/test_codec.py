@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import tracemalloc
 from io import BytesIO
 from typing import Any
 
@@ -182,6 +183,27 @@ def test_lengths_that_32_bits_do_not_hold_are_refused(text: str, length: int) ->
     data = length.to_bytes(4, "little")
     with pytest.raises(DeserializationError):
         class_from_text("p/M1", text)().deserialize(data * 2 if "[] a" in text else data)
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        pytest.param("p/M2[3] b\n", id="messages"),
+        pytest.param("time[3] b\n", id="times"),
+        pytest.param("p/M2[2] b\nduration[1] c\n", id="both"),
+    ],
+)
+def test_elements_that_only_slices_read_are_not_made_without_bytes(element: str) -> None:
+    """A slice beyond the end is empty: four bytes could ask for millions of elements, which filled the memory."""
+    text = f"\n{SEPARATOR}\n".join(["p/M1[] a\n", f"MSG: p/M1\n{element}", "MSG: p/M2\nint8 d\n"])
+    length = 5_000_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(DeserializationError):
+            class_from_text("p/M0", text)().deserialize(length.to_bytes(4, "little"))
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()
 
 
 @given(full_texts())
