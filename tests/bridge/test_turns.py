@@ -158,3 +158,26 @@ def test_fault_of_one_client_leaves_the_others_their_turns(caplog: pytest.LogCap
         machine.iterate()
     assert machine.done == ["good"] * 3
     assert "a fault" in caplog.text
+
+
+def test_client_does_not_pay_while_other_processes_have_the_processor() -> None:
+    now, used = 100.0, 0.0
+    soon: list[Callable[[], None]] = []
+    done: list[str] = []
+    turns = FairTurns(soon.append, lambda: now, meter=lambda: used, turn=0.004, slice_=0.001)
+
+    def join(name: str, cpu: float, wall: float) -> Share:
+        def work(_: float) -> bool:
+            nonlocal now, used
+            done.append(name)
+            now, used = now + wall, used + cpu
+            return True
+
+        return turns.join(work)
+
+    unlucky, greedy = join("unlucky", 0.001, 0.5), join("greedy", 0.003, 0.003)
+    turns.start(unlucky)
+    turns.start(greedy)
+    while len(done) < 101:
+        soon.pop(0)()
+    assert done.count("unlucky") > 2 * done.count("greedy")
