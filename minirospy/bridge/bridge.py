@@ -184,6 +184,7 @@ class Bridge:
             await asyncio.gather(self._reporting, return_exceptions=True)
         for listener in self.listeners.values():
             await listener.close()
+        self.rosbridge.close()
         for part in self._beside:
             await part.close()
         await self.graph.close()

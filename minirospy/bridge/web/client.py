@@ -52,6 +52,8 @@ class Limits:
     """
 
     message: int = 64_000_000
+    read_only_message: int = 64 * 1024
+    """Bytes of a message of a client that may not write: it subscribes, and sends nothing large."""
     unfinished: int = 256_000_000
     """Bytes of messages that have not arrived whole yet, of all clients."""
     messages_a_second: int = 20_000
@@ -189,6 +191,14 @@ class WebClient:
     def discard(self, key: Hashable) -> None:
         """Drop what waits under a key."""
         self._connection.queue.discard(key)
+
+    def pause(self) -> None:
+        """Handle no more of what the client sends, until :meth:`resume`."""
+        self._connection.hold(is_held=True)
+
+    def resume(self) -> None:
+        """Go on with what the client sends."""
+        self._connection.hold(is_held=False)
 
     def close(self, code: int = 1000, reason: str = "") -> None:
         """End the connection after what waits; ``reason`` is cut to 123 bytes."""

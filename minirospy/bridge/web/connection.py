@@ -100,6 +100,10 @@ class Connection:
         self._fragments = bytearray()
         self._is_held_back = False
         # The client has sent as many frames as it may in this second.
+        self._is_paused = False
+        # Its session works on what came before,
+        self._worked_on = 0
+        # a message of so many bytes.
         self._opcode = Opcode.BINARY
         self._is_scheduled = False
         self._is_closing = False
@@ -135,7 +139,7 @@ class Connection:
         if self.exchange:
             return  # one request a connection
         self._protocol.feed(data)
-        if self._is_held_back or self._site.turns.start(self._share):
+        if self._is_held_back or self._is_paused or self._site.turns.start(self._share):
             self._pipe.pause()
         self._count_unfinished()
 
@@ -204,6 +208,17 @@ class Connection:
         self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
         self._discard_unfinished()
 
+    def hold(self, *, is_held: bool) -> None:
+        """Handle no more frames while the session is busy with one; the client's bytes stay in its socket."""
+        self._is_paused = is_held
+        if is_held:
+            self._pipe.pause()
+            return
+        self._worked_on = 0
+        self._count_unfinished()
+        if not self._is_over and not self._is_held_back:
+            self._site.turns.start(self._share)
+
     def abort(self) -> None:
         """End the connection now."""
         self._abort()
@@ -214,7 +229,7 @@ class Connection:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
-        while self.client and not self._is_closing:
+        while self.client and not self._is_closing and not self._is_paused:
             if self._is_over_rate():
                 break
             frame = self._protocol.next_frame()
@@ -229,7 +244,7 @@ class Connection:
             if self._protocol.state in (State.CLOSING, State.CLOSED):
                 self.close_when_sent()
         self._count_unfinished()
-        if not self._is_held_back and not self._is_over:
+        if not self._is_held_back and not self._is_paused and not self._is_over:
             self._pipe.resume()
         return False
 
@@ -270,6 +285,8 @@ class Connection:
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
         if self.client.may_write:
             self._share.weight = WRITER_WEIGHT
+        else:
+            self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
         self._watch(self._ping)
         self.session = self._door.open(self.client)
 
@@ -374,15 +391,19 @@ class Connection:
         except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
             _log.exception("a message of %s could not be handled", self.peer)
             self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on this message")
+        if self._is_paused:
+            self._worked_on = len(data)
 
     def _count_unfinished(self) -> None:
-        grown = len(self._protocol.reader.buffer) + len(self._fragments) - self.unfinished
+        waiting = len(self._protocol.reader.buffer) + len(self._fragments) + self._worked_on
+        grown = waiting - self.unfinished
         self.unfinished += grown
         self._site.unfinished_grew(grown)
 
     def _discard_unfinished(self) -> None:
         self._protocol.reader.buffer.clear()
         self._fragments.clear()
+        self._worked_on = 0
         self._count_unfinished()
 
     def _is_over_rate(self) -> bool:
@@ -400,7 +421,8 @@ class Connection:
 
     def _go_on(self) -> None:
         self._is_held_back = False
-        self._site.turns.start(self._share)
+        if not self._is_paused:
+            self._site.turns.start(self._share)
 
     def _schedule(self) -> None:
         # What arrives in the same turn of the loop goes out with one call.
@@ -483,6 +505,13 @@ class _FrameByFrame(ServerProtocol):
         next(self.parser)
         events = self.events_received()
         return events[0] if events and isinstance(events[0], Frame) else None
+
+    def limit(self, size: int) -> None:
+        """Refuse larger messages from now on."""
+        # The name of the attribute depends on the library's release.
+        for name in ("max_message_size", "max_size"):
+            if hasattr(self, name):
+                setattr(self, name, size)
 
     def parse(self) -> Generator[None]:
         """See the library's: called once, before anything is read."""
