@@ -192,6 +192,10 @@ async def serve() -> None:
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.dashboard.dashboard import Dashboard
 
+    with contextlib.suppress(ImportError):  # older trees
+        from minirospy.bridge.serve import prefer_the_loop
+
+        prefer_the_loop()
     access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN, requires_token=True)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
     async with Node("bench_dashboard", rosout=False) as node:
