@@ -62,6 +62,7 @@ _log = logging.getLogger(__name__)
 
 _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
+_PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
 _PONG = 0x8A
 
 
@@ -434,7 +435,11 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
+        written = 0
         while not self._pipe.is_full:
+            if written >= _PUMP_BYTES:
+                self._schedule()
+                return
             batch: list[Piece] = []
             size = 0
             while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES:
@@ -448,6 +453,7 @@ class Connection:
                     self._pipe.close()
                 return
             self._progressed = self._loop.time()
+            written += size
             self._pipe.write(batch)
             if self._is_over:
                 return
