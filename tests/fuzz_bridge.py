@@ -111,6 +111,14 @@ PAGES = [
 ]
 
 
+def tcp_pair() -> tuple[socket.socket, socket.socket]:
+    """Return two ends of a TCP connection: Unix sockets have no ports, which a request names."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        ours, _ = server.accept()
+    return ours, theirs
+
+
 class Kind(NamedTuple):
     """The inputs of one protocol: the first bytes of a connection, text messages and binary ones."""
 
@@ -176,7 +184,7 @@ class Target:
         assert self._parts
         bridge = self._parts[2]
         listener = bridge.listeners[kind]
-        ours, theirs = socket.socketpair()
+        ours, theirs = tcp_pair()
         ours.setblocking(False)
 
         with theirs:
