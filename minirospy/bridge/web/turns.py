@@ -96,6 +96,11 @@ class FairTurns:
         """Return the number of clients whose work is queued."""
         return sum(not entry.share.is_closed for entry in self._queue)
 
+    @property
+    def is_busy(self) -> bool:
+        """Return whether a client waits for its turn."""
+        return bool(self._queue)
+
     def join(self, work: Work) -> Share:
         """Return the share of a new client: it has no advantage over clients that have been idle."""
         return Share(work, self._served)
