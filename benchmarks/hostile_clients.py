@@ -2,11 +2,12 @@
 
     python benchmarks/hostile_clients.py [--clients 8 64 250] [--seconds N] [--writers] [ATTACK ...]
 
-Each row is a new server that so many clients attack, which have the read-only token (``--writers``: the other one). Beside them
-a reader and a writer send a request every 50 ms and wait for its answer. A page drives a robot at 20 Hz, which is a subscriber of
-plain sockets, and at the end falls silent. Columns: the longest wait of the reader and of the writer, the longest gap between two
-velocities at the robot, the time from the last command to the zero velocity (0.5 s are intended), in milliseconds, and the
-server's memory (RSS) at its height in MiB. Each attack ends by itself; everything is on loopback.
+Each row is a new server that so many clients attack, which have the read-only token (``--writers``: none, which on loopback is
+the right to write). Beside them a reader, and a writer that has the read-write token, send a request every 50 ms and wait for its
+answer. A page drives a robot at 20 Hz, which is a subscriber of plain sockets, and at the end falls silent. Columns: the longest
+wait of the reader and of the writer, the longest gap between two velocities at the robot, the time from the last command to the
+zero velocity (0.5 s are intended), in milliseconds, and the server's memory (RSS) at its height in MiB. Each attack ends by
+itself; everything is on loopback.
 """
 
 from __future__ import annotations
@@ -202,7 +203,7 @@ async def serve() -> None:
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.dashboard.dashboard import Dashboard
 
-    access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN, requires_token=True)
+    access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
     async with Node("bench_dashboard", rosout=False) as node:
         dashboard = Dashboard(node, options)
@@ -483,7 +484,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Hostile clients of the dashboard and of rosbridge.")
     parser.add_argument("--clients", type=int, nargs="+", default=[8, 64, 250])
     parser.add_argument("--seconds", type=float, default=4.0, help="of each attack (default: 4)")
-    parser.add_argument("--writers", action="store_true", help="the attackers have the read-write token")
+    parser.add_argument(
+        "--writers", action="store_true", help="the attackers may write, as on loopback without a token"
+    )
     parser.add_argument("--json", action="store_true", help="print a JSON object for each row")
     parser.add_argument("names", nargs="*", metavar="ATTACK", help=f"of: {', '.join(attacks())}")
     parser.add_argument("--role", nargs=2, help=argparse.SUPPRESS)
@@ -501,7 +504,7 @@ def main() -> int:
         parser.error(f"there is no attack {', '.join(sorted(unknown))}")
     clients = [min(max(1, each), 250) for each in options.clients]  # a listener keeps 256 connections
     seconds = min(options.seconds, 60.0)
-    token = WRITE_TOKEN if options.writers else READ_TOKEN
+    token = "" if options.writers else READ_TOKEN
     if not options.json:
         print(f"{'attack':22} clients  reader  writer     gap    stop  memory")
     with master() as environ:

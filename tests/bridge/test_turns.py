@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.bridge.web.turns import WRITER_WEIGHT, FairTurns
+from minirospy.bridge.web.turns import FairTurns
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.turns import Share
@@ -77,7 +77,7 @@ def test_work_of_all_clients_in_one_iteration_is_bounded() -> None:
         assert machine.now - start <= 0.005
 
 
-@pytest.mark.parametrize(("weight", "most"), [(1.0, 251), (WRITER_WEIGHT, 17)])
+@pytest.mark.parametrize(("weight", "most"), [(1.0, 251), (16.0, 17)])
 def test_client_that_sends_little_waits_for_a_slice_of_each_other_at_most(weight: float, most: int) -> None:
     machine = Machine()
     machine.join("good", 0.0002)

@@ -39,7 +39,6 @@ from minirospy.bridge.web.client import (
 )
 from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
-from minirospy.bridge.web.turns import WRITER_WEIGHT
 from minirospy.escape import escaped
 
 if TYPE_CHECKING:
@@ -65,6 +64,8 @@ _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
 _PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
 _PONG = 0x8A
+_WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
+"""Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
 
 
 @dataclass
@@ -293,9 +294,8 @@ class Connection:
         self._protocol.send_response(response)
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
-        if self.client.may_write:
-            self._share.weight = WRITER_WEIGHT
-        else:
+        self._share.weight = _WEIGHTS[grant]
+        if not self.client.may_write:
             self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
         self._watch(self._ping)
         self.session = self._door.open(self.client)

@@ -5,7 +5,8 @@ together use less than half of the time; beyond that it is queued, and each iter
 milliseconds of it. The order is fair queueing: a client's tag is the time that it has used, a client that was idle starts at
 the tag that is served now, and the one goes first that will end first, if its work takes as long as before. So a client that uses
 less than its part of the time waits at most for one slice of each other client, and not for long messages of others. A client
-that may write has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time Fair Queueing, SIGCOMM 1996.
+that has more rights has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time Fair Queueing,
+SIGCOMM 1996.
 """
 
 from __future__ import annotations
@@ -17,13 +18,12 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-__all__ = ["WRITER_WEIGHT", "FairTurns", "Share", "cpu_meter"]
+__all__ = ["FairTurns", "Share", "cpu_meter"]
 
 _log = logging.getLogger(__name__)
 
 TURN_SECONDS = 0.004  # of each iteration of the loop, for the queued work of all clients together
 SLICE_SECONDS = 0.0001  # of one client before the next client's work: 250 of them are a wait of 25 ms
-WRITER_WEIGHT = 16.0  # of a client that may drive a robot: it goes before clients that may only look
 NEW_PIECES = 8  # of work, by which a client is known; before it is expected to do as the last new clients did
 EXPECTED_DECAY = 0.9  # of what is expected, with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
