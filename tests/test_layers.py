@@ -37,6 +37,7 @@ LAYERS = [
     {
         "child_lifetime",
         "clock",
+        "closing",
         "environment",
         "installation",
         "keyboard",

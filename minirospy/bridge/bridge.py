@@ -23,6 +23,7 @@ from minirospy.bridge.video.pages import VideoPages
 from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
+from minirospy.closing import close_all
 from minirospy.environment import DISTRO
 from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import fetch
@@ -182,11 +183,8 @@ class Bridge:
         if self._reporting:
             self._reporting.cancel()
             await asyncio.gather(self._reporting, return_exceptions=True)
-        for listener in self.listeners.values():
-            await listener.close()
-        for part in self._beside:
-            await part.close()
-        await self.graph.close()
+        parts = [*self.listeners.values(), *self._beside, self.graph]
+        await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
         """Return what the bridge serves and to whom, as JSON has it."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 
+from minirospy.closing import close_each
 from minirospy.environment import split_uri
 from minirospy.errors import (
     SUSPENDED,
@@ -167,9 +168,14 @@ class Publication:
             latched = self._latched if self.latch else None
             if latched is not None:
                 link.send(latched)
-        link.open()
-        if self._on_link:
-            self._on_link(link, True)
+        try:
+            link.open()
+            if self._on_link:
+                self._on_link(link, True)
+        except BaseException:
+            # The caller closes the socket: a link without one must not be counted, or be closed later.
+            link.close()
+            raise
         return None
 
     def forget_latched(self) -> None:
@@ -179,8 +185,7 @@ class Publication:
 
     def close(self) -> None:
         """End all links (on the loop)."""
-        for link in self.links:
-            link.close()
+        close_each([link.close for link in self.links])
 
     def _link_closed(self, link: OutLink) -> None:
         self.links = tuple(other for other in self.links if other is not link)

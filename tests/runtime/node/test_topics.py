@@ -28,6 +28,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
@@ -1035,3 +1036,26 @@ def test_a_publisher_that_registers_again_is_connected_once(
         await foreign.close()
 
     run_manually(scene)
+
+
+def test_subscriber_whose_listener_fails_is_not_counted_and_the_fault_is_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The fault is in the publisher's own function: the connection ends, and the node still closes."""
+
+    async def scene() -> None:
+        async with graph("/talker") as (_, (talker,)):
+            publication = Publication("/t", STRING, on_link=fail)
+            await talker.advertise(publication)
+            sock = await raw_subscriber(talker)
+            with sock, contextlib.suppress(ConnectionResetError):
+                while await asyncio.get_running_loop().sock_recv(sock, 1000):
+                    pass
+            assert publication.links == ()
+
+    def fail(_link: OutLink, is_up: bool) -> None:
+        if is_up:
+            raise LookupError("a faulty listener")
+
+    run(scene)
+    assert caplog.text.count("LookupError: a faulty listener") == 1
