@@ -60,8 +60,8 @@ class Publisher(Topic[_M_co]):
     ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
     number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets
     the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
-    subscribers, in a thread of the library, one event after the other. Raises ValueError on a bad name, class
-    or queue_size.
+    subscribers, in a thread of the library, one event after the other; an object that is not a listener is ignored,
+    with a warning. Raises ValueError on a bad name, class or queue_size.
     """
 
     impl: PublishedTopic | None
@@ -86,6 +86,9 @@ class Publisher(Topic[_M_co]):
             )
 
         size = _checked_size(queue_size)
+        if subscriber_listener and not _is_listener(subscriber_listener):
+            warnings.warn(_not_a_listener(subscriber_listener), SyntaxWarning, stacklevel=2)
+            subscriber_listener = None
         fields = dict(headers or {})
         with self._session.lock:
             state = self._session.published.get(self.resolved_name)
@@ -224,8 +227,11 @@ class PublishedTopic(SharedTopic):
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Notify ``l`` of subscribers that connect and disconnect from now on."""
-        self.subscriber_listeners.append(l)
+        """Notify ``l`` of subscribers that connect and disconnect from now on; ignore, with a warning, what is not a listener."""
+        if _is_listener(l):
+            self.subscriber_listeners.append(l)
+        else:
+            warnings.warn(_not_a_listener(l), SyntaxWarning, stacklevel=2)
 
     def check_initialized(self) -> None:
         """Raise ROSException before init_node."""
@@ -349,11 +355,34 @@ class PublishedTopic(SharedTopic):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
+        # Looked up in the worker: a listener's attribute may be a property, which is the user's code.
         for listener in list(self.subscriber_listeners):
             if is_up:
-                self._events.start(listener.peer_subscribe, topic, publish_to_all, publish_to_peer)
+                self._events.start(
+                    _notify, listener, "peer_subscribe", topic, publish_to_all, publish_to_peer
+                )
             else:
-                self._events.start(listener.peer_unsubscribe, topic, len(self.publication.links))
+                self._events.start(_notify, listener, "peer_unsubscribe", topic, len(self.publication.links))
+
+
+def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
+    """Call a listener's method for an event; a listener that lacks the method ignores the event."""
+    method = getattr(listener, event, None)
+    if method is not None:
+        method(*args)
+
+
+def _is_listener(value: object) -> bool:
+    """Return whether an object has a method of SubscribeListener; programs need not inherit from it."""
+    return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
+
+
+def _not_a_listener(value: object) -> str:
+    """Return the warning about an argument for which rospy refuses every subscriber."""
+    text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
+    if isinstance(value, int):
+        return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"
+    return text
 
 
 def _checked_size(queue_size: int | None) -> int | None:

@@ -212,7 +212,8 @@ class Session:
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
-            self._loop.close()
+            finally:
+                self._loop.close()
         if self._master:
             self._master.close()
 
