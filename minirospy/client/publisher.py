@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy.client.connection import Connection, connection_to_subscriber
-from minirospy.client.session import Session
+from minirospy.client.session import Session, current_session
 from minirospy.client.topic import (
     AnyMsg,
     SharedTopic,
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
+_OF_THE_LIBRARY = frozenset({"/rosout", "/statistics"})
+"""Topics on which the library itself publishes: a program needs no error about them."""
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
@@ -99,7 +101,7 @@ class Publisher(Topic[_M_co]):
             state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
 
         self.impl = state
-        self._session.when_ready(state.register)
+        self._session.when_ready(state.register, state.title)
 
     def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
@@ -204,6 +206,11 @@ class PublishedTopic(SharedTopic):
         unregister_from_master(wait)
 
     @property
+    def title(self) -> str:
+        """The topic's publisher, as an error names it."""
+        return f"the publisher of {self.resolved_name}"
+
+    @property
     def queue_size(self) -> int | None:
         """Return the last queue_size that a Publisher was given; None where publish() waits for the sockets."""
         return self.publication.queue_size
@@ -234,8 +241,11 @@ class PublishedTopic(SharedTopic):
             warnings.warn(_not_a_listener(l), SyntaxWarning, stacklevel=2)
 
     def check_initialized(self) -> None:
-        """Raise ROSException before init_node."""
-        if not self._registered and not self._session.is_shutdown():
+        """Raise ROSException before init_node. In a fork of the node, log that the topic is the parent's."""
+        if self._session.is_abandoned:
+            if self.resolved_name not in _OF_THE_LIBRARY:
+                current_session().report_fork(self.title)
+        elif not self._registered and not self._session.is_shutdown():
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
 
     def publish(self, message: Message) -> None:
@@ -254,10 +264,12 @@ class PublishedTopic(SharedTopic):
     def forget_subscribers(self) -> None:
         """Publish to no subscriber from now on: this process is a fork, and the subscribers are its parent's."""
         self.publication.links = ()
-        self._had_subscriber = True
+        self._registered = False
 
     def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
         """See :meth:`Publisher.wait_for_subscribers`."""
+        if self._session.is_abandoned:
+            raise ROSException(current_session().why_fork_has_no_effect(self.title))
         self.check_initialized()
         enough = SignalSafeEvent()
 
