@@ -48,6 +48,7 @@ LAYERS = [
         "steps",
         "times",
         "tree_svg",
+        "xml_text",
     },
     {"errors", "escape"},
     {"suggestions"},

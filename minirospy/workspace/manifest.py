@@ -17,6 +17,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from minirospy.errors import ManifestError
+from minirospy.xml_text import MAX_LEVELS, XmlError, new_parser
 
 __all__ = [
     "PACKAGE_NAME",
@@ -190,10 +191,11 @@ class _Element:
 def _parse(text: bytes | str, path: Path) -> _Element:
     top = _Element("", {}, 0)
     stack = [top]
-    parser = expat.ParserCreate()
-    parser.buffer_text = True
+    parser = new_parser()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(stack) > MAX_LEVELS:
+            raise XmlError(parser.CurrentLineNumber, f"tags are nested deeper than {MAX_LEVELS} levels")
         element = _Element(tag, attributes, parser.CurrentLineNumber)
         stack[-1].children.append(element)
         stack.append(element)
@@ -210,6 +212,8 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     parser.CharacterDataHandler = data
     try:
         parser.Parse(text, True)
+    except XmlError as error:
+        raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
         # A name of an encoding that Python does not know is a LookupError.
         code = getattr(error, "code", None)
