@@ -387,6 +387,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
+_MAX_BRACKETS = 50  # in a condition; each level recurses three times
 _COMPARE = {
     "==": str.__eq__,
     "!=": str.__ne__,
@@ -404,6 +405,7 @@ class _Condition:
         self._variables = variables
         self._tokens = list(_TOKEN.finditer(text.rstrip()))
         self._next = 0
+        self._open = 0
 
     def value(self) -> bool:
         result = self._any()
@@ -425,7 +427,11 @@ class _Condition:
 
     def _one(self) -> bool:
         if self._took("("):
+            self._open += 1
+            if self._open > _MAX_BRACKETS:
+                raise ValueError(f"brackets are nested deeper than {_MAX_BRACKETS} levels")
             result = self._any()
+            self._open -= 1
             if not self._took(")"):
                 raise ValueError("')' is missing")
             return result
