@@ -49,6 +49,7 @@ LAYERS = [
         "times",
         "tree_svg",
         "xml_text",
+        "yaml_text",
     },
     {"errors", "escape"},
     {"suggestions"},

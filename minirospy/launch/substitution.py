@@ -185,13 +185,13 @@ def convert(text: str, type_: str) -> object:
     if kind == "yaml":
         import yaml
 
-        from minirospy.introspect.values import check_yaml
+        from minirospy.yaml_text import fast_loader, load
 
         try:
-            check_yaml(text)
-            return yaml.safe_load(text)
+            loaded: object = load(text, fast_loader())
         except yaml.YAMLError as error:
             raise ValueError(f"not YAML: {getattr(error, 'problem', None) or error}") from None
+        return loaded
     raise ValueError(f"Unknown type '{type_}': there are str, int, double, bool, yaml and auto")
 
 
