@@ -49,6 +49,8 @@ LAYERS = [
         "steps",
         "times",
         "tree_svg",
+        "xml_text",
+        "yaml_text",
     },
     {"errors", "escape"},
     {"suggestions"},

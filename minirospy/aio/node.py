@@ -37,6 +37,7 @@ from minirospy.times import Duration, Time
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.yaml_text import one_line, safe_load
 
 __all__ = ["Node"]
 
@@ -491,7 +492,12 @@ class Node:
         import yaml
 
         for key, text in self._arguments.parameters.items():
-            await self.set_param("~" + key, yaml.safe_load(text))
+            try:
+                value = safe_load(text)
+            except yaml.YAMLError as error:
+                why = one_line(error)
+                raise ROSInitException(f"invalid command-line parameters: [_{key}:={text}]: {why}") from error
+            await self.set_param("~" + key, value)
 
     async def _follow_clock(self, simulated: SimulatedTime) -> None:
         from rosgraph_msgs.msg import Clock
