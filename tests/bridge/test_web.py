@@ -25,6 +25,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access, Grant
 from minirospy.bridge.web.connection import Connection, Limits
+from minirospy.bridge.web.pipe import Endpoints
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.errors import BridgeError
 from tests.waiting import wait_until
@@ -393,7 +394,7 @@ class Turns:
 
 
 def test_messages_that_take_long_are_handled_in_turns() -> None:
-    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, ports=(1, 2))
+    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
     site.check.return_value = Grant.READ
     handled: list[str] = []
 
@@ -427,7 +428,7 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
 
 def test_clients_are_pinged_before_they_are_disconnected() -> None:
     """As after a suspend: the bytes that came last are old, and no ping has been sent since."""
-    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, ports=(1, 2))
+    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
     site.check.return_value = Grant.READ
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"

@@ -73,8 +73,9 @@ class HttpRequest(NamedTuple):
     headers: Mapping[str, str]
     peer: str
     peer_port: int = 0
+    address: str = ""
     port: int = 0
-    """The ports of the client and of the server."""
+    """The client's port, and the server's address and port, of this connection; see Endpoints in pipe.py."""
 
 
 class Session(Protocol):

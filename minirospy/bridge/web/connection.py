@@ -302,7 +302,8 @@ class Connection:
             return grant
         parts = urlsplit(request.path)
         query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
-        return HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.ports), grant, is_page
+        seen = HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.endpoints)
+        return seen, grant, is_page
 
     def _watch(self, check: Callable[[], None]) -> None:
         """Call ``check`` from now on in place of what watched the connection until now."""

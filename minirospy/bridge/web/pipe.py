@@ -11,15 +11,23 @@ import contextlib
 import socket
 import ssl
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from minirospy.bridge.web.queue import Piece
 
-__all__ = ["Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
+__all__ = ["Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
 _RECEIVE = 256 * 1024
 _MOST_PIECES = 128
 """Pieces of one call of sendmsg; a system takes 1024 at most."""
+
+
+class Endpoints(NamedTuple):
+    """The peer's port, and the address and port of this end; empty if the connection has ended."""
+
+    peer_port: int = 0
+    address: str = ""
+    port: int = 0
 
 
 class PipeEvents(Protocol):
@@ -36,7 +44,7 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet; ``ports``: of the peer, and one's own."""
+    """One connection. ``is_full``: what was written is not with the kernel yet."""
 
     @property
     def is_full(self) -> bool: ...
@@ -45,7 +53,7 @@ class Pipe(Protocol):
     def unsent(self) -> int: ...
 
     @property
-    def ports(self) -> tuple[int, int]: ...
+    def endpoints(self) -> Endpoints: ...
 
     def write(self, pieces: Sequence[Piece]) -> None: ...
 
@@ -79,9 +87,9 @@ class PlainPipe:
         return sum(map(len, self._rest))
 
     @property
-    def ports(self) -> tuple[int, int]:
-        """The ports of the peer and of this end."""
-        return _ports(self._sock)
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces, or keep what the kernel does not take now."""
@@ -164,11 +172,11 @@ class PlainPipe:
         self._events.ended()
 
 
-def _ports(sock: socket.socket) -> tuple[int, int]:
+def _endpoints(sock: socket.socket) -> Endpoints:
     try:
-        return sock.getpeername()[1], sock.getsockname()[1]
+        return Endpoints(sock.getpeername()[1], *sock.getsockname()[:2])
     except OSError:  # it has disconnected
-        return 0, 0
+        return Endpoints()
 
 
 def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
@@ -198,9 +206,9 @@ class TlsPipe(asyncio.Protocol):
         return self._transport.get_write_buffer_size() if self._transport else 0
 
     @property
-    def ports(self) -> tuple[int, int]:
-        """The ports of the peer and of this end."""
-        return _ports(self._transport.get_extra_info("socket")) if self._transport else (0, 0)
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._transport.get_extra_info("socket")) if self._transport else Endpoints()
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces."""
