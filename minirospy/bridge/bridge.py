@@ -183,7 +183,7 @@ class Bridge:
         if self._reporting:
             self._reporting.cancel()
             await asyncio.gather(self._reporting, return_exceptions=True)
-        parts = [*self.listeners.values(), *self._beside, self.graph]
+        parts = [*self.listeners.values(), self.rosbridge, *self._beside, self.graph]
         await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:

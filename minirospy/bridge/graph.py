@@ -142,9 +142,10 @@ class Publication:
             await asyncio.wait([self._shared.joining])
 
     def publish(self, body: bytes) -> None:
-        """Publish a serialized message. Does not wait."""
-        if self._shared:
-            self._shared.publisher.publish_raw(body)
+        """Publish a serialized message. Does not wait. For any thread."""
+        shared = self._shared
+        if shared:
+            shared.publisher.publish_raw(body)
 
     def publish_when_joined(self, body: bytes) -> None:
         """Publish once the subscribers of that moment are connected, in order. Does not wait; the newest messages are kept."""

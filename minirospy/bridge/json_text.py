@@ -1,21 +1,112 @@
-"""JSON of clients, with a limit: a text of `[]` fifty million times would take gigabytes, and hold up all clients. Pure."""
+"""JSON of clients, with a limit: a text of `[]` fifty million times would take gigabytes, and hold up all clients. Pure.
+
+The library's parser keeps Python's global interpreter lock (GIL) until it has parsed the whole text, and so stops all threads of
+the process. A large text is parsed in pieces instead, by :func:`load_json_in_pieces` in a thread of its own.
+"""
 
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
+from json.scanner import py_make_scanner  # type: ignore[attr-defined]
 
-__all__ = ["load_json"]
+__all__ = ["MAX_QUICK_CHARACTERS", "is_quick_text", "load_json", "load_json_in_pieces"]
 
-_MOST_VALUES = 8_000_000
-_MOST_COLLECTIONS = 1_000_000
+_MAX_VALUES = 8_000_000
+_MAX_COLLECTIONS = 1_000_000
+MAX_QUICK_CHARACTERS = 64 * 1024  # of any text that is parsed immediately: 2 ms at most
+MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters of a text that has few values, such as an image in base64
+MAX_QUICK_VALUES = 20_000
+_PIECE = 32 * 1024  # characters of numbers that are parsed in one call
+
+_SPACE = re.compile(r"[ \t\n\r]*")
+_MARKS = re.compile(r'[\[\]{}"]')
 
 
-def load_json(text: str | bytes) -> object:
+def is_quick_text(text: str) -> bool:
+    """Return whether a text is parsed in a few milliseconds."""
+    if len(text) <= MAX_QUICK_CHARACTERS:
+        return True
+    # Also the marks within strings are counted: what is large is one string of base64, which has none.
+    return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
+
+
+def load_json(
+    text: str | bytes, *, max_values: int = _MAX_VALUES, max_collections: int = _MAX_COLLECTIONS
+) -> object:
     """Return the value of a text. Raise ValueError, also where it has too many values, and RecursionError."""
-    if isinstance(text, str) and len(text) > _MOST_COLLECTIONS:
-        # Also those within strings are counted: what is large is one string of base64, which has none.
-        for marks, most in ((",", _MOST_VALUES), ("[{", _MOST_COLLECTIONS)):
-            if sum(map(text.count, marks)) > most:
-                raise ValueError(f"more than {most} values")
+    if isinstance(text, str):
+        _check_counts(text, max_values, max_collections)
     found: object = json.loads(text)
+    return found
+
+
+def load_json_in_pieces(text: str) -> object:
+    """Do the same without keeping the GIL for long: for a thread beside the event loop."""
+    _check_counts(text, _MAX_VALUES, _MAX_COLLECTIONS)
+    found: object = _PiecewiseDecoder().decode(text)
+    return found
+
+
+def _check_counts(text: str, max_values: int, max_collections: int) -> None:
+    """Raise ValueError if a text has too many values; the marks within strings are counted, too."""
+    for marks, most in ((",", max_values), ("[{", max_collections)):
+        if len(text) > most and sum(map(text.count, marks)) > most:
+            raise ValueError(f"more than {most} values")
+
+
+class _PiecewiseDecoder(json.JSONDecoder):
+    """The library's decoder in Python, which lets other threads run, with long arrays of numbers by its parser in C."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.parse_array = _array
+        self.scan_once = py_make_scanner(self)
+
+
+def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object, int]]) -> tuple[object, int]:
+    """Return the array that starts behind its bracket, and the index behind it. Raise JSONDecodeError, StopIteration."""
+    text, at = start
+    values: list[object] = []
+    at = _skip_space(text, at)
+    if text[at : at + 1] == "]":
+        return values, at + 1
+
+    while True:
+        mark = _MARKS.search(text, at, at + _PIECE)
+        if mark and mark[0] == "]":
+            return values + _numbers(text, at, mark.start()), mark.end()
+        # Before another value than a number, or where the piece ends.
+        comma = text.rfind(",", at, mark.start() if mark else at + _PIECE)
+        if comma >= 0:
+            values += _numbers(text, at, comma)
+            at = comma + 1
+            if mark is None:
+                continue
+
+        try:
+            value, at = scan_once(text, _skip_space(text, at))
+        except StopIteration as error:
+            raise json.JSONDecodeError("Expecting value", text, error.value) from None
+        values.append(value)
+        at = _skip_space(text, at)
+        if text[at : at + 1] == "]":
+            return values, at + 1
+        if text[at : at + 1] != ",":
+            raise json.JSONDecodeError("Expecting ',' delimiter", text, at)
+        at += 1
+
+
+def _skip_space(text: str, at: int) -> int:
+    found = _SPACE.match(text, at)
+    assert found
+    return found.end()
+
+
+def _numbers(text: str, start: int, end: int) -> list[object]:
+    """Return the values of a part of an array. Raise JSONDecodeError, also where there are none."""
+    found: list[object] = json.loads(f"[{text[start:end]}]")
+    if not found:
+        raise json.JSONDecodeError("Expecting value", text, start)
     return found

@@ -18,7 +18,15 @@ from minirospy.signal_dispatch import interrupt_signals
 if TYPE_CHECKING:
     from minirospy.bridge.bridge import Bridge
 
-__all__ = ["Part", "announce", "exit_status", "require_libraries", "run", "run_program"]
+__all__ = [
+    "Part",
+    "announce",
+    "exit_status",
+    "prefer_the_loop",
+    "require_libraries",
+    "run",
+    "run_program",
+]
 
 
 class Part(Protocol):
@@ -30,6 +38,15 @@ class Part(Protocol):
 
 
 _P = TypeVar("_P", bound=Part)
+
+_SWITCH_SECONDS = (
+    0.0005  # a thread keeps the GIL; with Python's 5 ms the loop waits so long after each of its calls
+)
+
+
+def prefer_the_loop() -> None:
+    """Let this process's event loop wait less for threads that work on large messages."""
+    sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
 
 
 def require_libraries() -> None:
@@ -87,6 +104,7 @@ def run(
     it would import message classes.
     """
     loop = new_event_loop()
+    prefer_the_loop()
     try:
         words = sys.argv[1:] if argv is None else argv
         node = Node(name, argv=words, rosout=imports_messages, simulated_time=imports_messages)

@@ -4,21 +4,26 @@ A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, y
 "buttons": [...]}``, again and again while something is held, and ``{"leave": topic}`` for a topic that it drives no more. The
 server sends ``{"writes": bool}`` at first, ``{"stopped": topic}`` where it has stopped what was silent, and
 ``{"error": text, "topic"}``.
-The last message of each topic is zero, whatever happens to the client: it is published by this process.
+The last message of each topic is zero, whatever happens to the client: it is published by this process, and for a client that
+is silent by a thread of its own (:mod:`minirospy.bridge.stop_guard`), whatever holds up the event loop.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import math
+import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Protocol
 
-from minirospy.errors import BridgeError
+from minirospy.bridge.stop_guard import StopGuard
+from minirospy.errors import BridgeError, ROSException
 from minirospy.introspect.graph import why_illegal
 from minirospy.wire.tcpros import InterfaceType
 
@@ -150,6 +155,7 @@ class DriveDoor:
 
     def __init__(self, graph: Callable[[], SharedGraph]) -> None:
         self._graph = graph
+        self._guard = StopGuard()
 
     def select(self, offered: Sequence[str]) -> str:
         """Return the sub-protocol to use. Raise LookupError."""
@@ -159,15 +165,16 @@ class DriveDoor:
 
     def open(self, client: WebClient) -> DriveSession:
         """Start serving a client."""
-        return DriveSession(client, self._graph())
+        return DriveSession(client, self._graph(), self._guard)
 
 
 class DriveSession:
     """One client. On the loop."""
 
-    def __init__(self, client: WebClient, graph: SharedGraph) -> None:
+    def __init__(self, client: WebClient, graph: SharedGraph, guard: StopGuard) -> None:
         self._client = client
         self._graph = graph
+        self._guard = guard
         self._driven: dict[str, _Driven] = {}
         self._send(writes=client.may_write)
 
@@ -209,7 +216,7 @@ class DriveSession:
         if driven is None:
             if len(self._driven) >= _MOST_TOPICS:
                 raise BridgeError(f"a client may drive {_MOST_TOPICS} topics")
-            driven = _Driven(self._graph, command.topic, command.held, self._stopped)
+            driven = _Driven(self._graph, self._guard, command.topic, command.held, self._stopped)
             self._driven[command.topic] = driven
         driven.hold(command.held)
 
@@ -222,11 +229,12 @@ class DriveSession:
 
 
 class _Driven:
-    """A topic that a client drives."""
+    """A topic that a client drives. Commands come on the loop; the guard's thread stops what is silent."""
 
     def __init__(
         self,
         graph: SharedGraph,
+        guard: StopGuard,
         topic: str,
         held: Velocity | Joystick,
         stopped: Callable[[str], None],
@@ -234,28 +242,38 @@ class _Driven:
         """Raise BridgeError where the topic may not be published, or has another type."""
         self.kind = type(held)
         self._graph = graph
+        self._guard = guard
         self._topic = topic
         self._stopped = stopped
+        self._loop = asyncio.get_running_loop()
+        self._lock = threading.Lock()
+        # For what follows: a command on the loop and the guard's zero are published one after the other.
         self._last = held.zero()
+        self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
-        self._timer: asyncio.TimerHandle | None = None
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Velocity | Joystick) -> None:
-        """Publish what is held; it is zero where no more comes in time."""
-        if self._timer:
-            self._timer.cancel()
-            self._timer = None
-        self._publish(held)
-        if not held.is_zero:
-            self._timer = asyncio.get_running_loop().call_later(SILENT_SECONDS, self._silent)
+        """Publish what is held; it is zero where no more comes in time. Raise BridgeError where nothing could stop it."""
+        deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
+        if held.is_zero:
+            self._guard.disarm(self._silent)
+        else:
+            # Before it moves: what cannot be stopped is not driven.
+            self._guard.arm(self._silent, deadline)
+        with self._lock:
+            self._deadline = deadline
+            self._publish(held)
+        if not self._publication.has_joined and self._joining is None:
+            self._joining = self._graph.spawn(self._publish_joined())
 
     def close(self) -> None:
         """Stop, and leave the topic."""
-        if self._timer:
-            self._timer.cancel()
-        if not self._last.is_zero:
-            self._publish(self._last.zero())
+        self._guard.disarm(self._silent)
+        with self._lock:
+            self._deadline = math.inf
+            if not self._last.is_zero:
+                self._publish(self._last.zero())
         if self._joining and not self._joining.done():
             # The zero is published by that task; the topic stays until then.
             self._joining.add_done_callback(lambda _: self._publication.close())
@@ -263,21 +281,27 @@ class _Driven:
             self._publication.close()
 
     def _silent(self) -> None:
-        self._timer = None
-        self._publish(self._last.zero())
-        self._stopped(self._topic)
+        """Stop what is silent, in the guard's thread."""
+        with self._lock:
+            if self._deadline > time.monotonic():
+                return  # a command has come at this moment, or the topic was left
+            self._deadline = math.inf
+            # The topic is closed where the node has ended: then nothing is published there any more.
+            with contextlib.suppress(ROSException):
+                self._publish(self._last.zero())
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Velocity | Joystick) -> None:
-        """Publish now, or, while subscribers are being connected, the newest as soon as they are."""
+        """Publish now, or, while subscribers are being connected, the newest as soon as they are. With the lock."""
         self._last = held
         if self._publication.has_joined:
             self._publication.publish(self._body())
-        elif self._joining is None:
-            self._joining = self._graph.spawn(self._publish_joined())
 
     async def _publish_joined(self) -> None:
         await self._publication.joined()
-        self._publication.publish(self._body())
+        with self._lock:
+            self._publication.publish(self._body())
 
     def _body(self) -> bytes:
         buffer = BytesIO()

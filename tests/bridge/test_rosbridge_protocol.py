@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import itertools
 import json
 import math
 import re
@@ -501,3 +502,33 @@ def test_numbers_that_are_not_finite_are_refused(value: str) -> None:
     with pytest.raises(OperationError, match="field throttle_rate is not a number") as caught:
         protocol.parse(fields)
     assert caught.value.id == "a"
+
+
+SHOWN = strategies.recursive(
+    strategies.none()
+    | strategies.booleans()
+    | strategies.integers()
+    | strategies.floats()
+    | strategies.text("ab'\"\\", max_size=400),
+    lambda inner: (
+        strategies.lists(inner, max_size=300)
+        | strategies.dictionaries(strategies.text("ab'", max_size=250), inner)
+    ),
+    max_leaves=300,
+)
+
+
+@given(SHOWN)
+def test_errors_show_the_start_of_a_value_as_rosbridge_does(value: object) -> None:
+    assert protocol._shown(value) == str(value)[:200]
+
+
+def test_errors_do_not_make_the_text_of_a_large_value() -> None:
+    shown = protocol._cut([[0] * 1_000_000, "a" * 1_000_000, {}], 200, itertools.count())
+    assert len(str(shown)) < 1000
+
+
+def test_id_that_is_a_long_list_is_refused() -> None:
+    with pytest.raises(OperationError, match="an id has 1000 characters at most"):
+        protocol.parse({"op": "unsubscribe", "topic": "/a", "id": [1] * 500})
+    assert protocol.parse({"op": "unsubscribe", "topic": "/a", "id": [1, {"a": 2}]}).id == "[1, {'a': 2}]"

@@ -7,6 +7,7 @@ import base64
 import gc
 import json
 import struct
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -18,7 +19,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from rosbridge_msgs.msg import ConnectedClients
 from sensor_msgs.msg import Image, LaserScan
-from std_msgs.msg import Int32, String
+from std_msgs.msg import Int32, Int64MultiArray, String
 from std_srvs.srv import SetBool, SetBoolResponse
 from websockets.exceptions import ConnectionClosed
 
@@ -100,6 +101,114 @@ def test_operations_of_a_client_on_one_topic_are_limited(bridge: Running) -> Non
     assert client.next("status", id="v200")["msg"] == "advertise_service: a client may offer 200 services"
     client.send(op="subscribe", topic="/" + "[" * 900_000, type="std_msgs/String", id="long")
     assert "4096 characters at most" in client.next("status", id="long")["msg"]
+
+
+@pytest.mark.parametrize("encoding", ["JSON", "CBOR", "fragments"])
+def test_large_messages_arrive_in_order_with_small_ones(bridge: Running, encoding: str) -> None:
+    node = bridge.node("listener")
+    messages = received(bridge, node, "/numbers", Int64MultiArray, 5)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/numbers", type="std_msgs/Int64MultiArray")
+    for number in range(5):
+        data = [number] * (100_000 if number % 2 else 1)
+        fields = {"op": "publish", "topic": "/numbers", "msg": {"data": data}}
+        if encoding == "CBOR":
+            client.socket.send(cbor2.dumps(fields))
+        elif encoding == "JSON":
+            client.send(**fields)
+        else:
+            text = json.dumps(fields)
+            for at, half in enumerate((text[:20], text[20:])):
+                client.send(op="fragment", id=f"f{number}", num=at, total=2, data=half)
+    assert [(each.data[0], len(each.data)) for each in messages()] == [
+        (0, 1),
+        (1, 100_000),
+        (2, 1),
+        (3, 100_000),
+        (4, 1),
+    ]
+
+
+def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> None:
+    node = bridge.node("listener")
+    messages = received(bridge, node, "/numbers", Int64MultiArray)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/numbers", type="std_msgs/Int64MultiArray")
+    client.synchronize()
+    released = threading.Event()
+    decode = protocol.decode_in_pieces
+
+    def blocked(data: str | bytes) -> Any:
+        assert released.wait(100)
+        return decode(data)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(protocol, "decode_in_pieces", blocked)
+        try:
+            client.send(op="publish", topic="/numbers", msg={"data": [7] * 100_000})
+            client.send(op="unsubscribe", topic=1, id="behind")
+            other = bridge.rosbridge()
+            other.synchronize()
+            # The message counts as one that is not finished, and what comes behind it is not read.
+            listener = bridge.bridge.listeners["rosbridge"]
+            wait_until(lambda: max(each.unfinished for each in listener.connections) > 300_000)
+        finally:
+            released.set()
+        assert len(messages()[0].data) == 100_000
+    assert "topic" in client.next("status", id="behind")["msg"]
+    assert not any(each.unfinished for each in listener.connections)
+
+
+def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Running) -> None:
+    server, client = bridge.rosbridge(), bridge.rosbridge()
+    server.send(op="advertise_service", service="/list", type="rosapi/Topics")
+    server.send(op="set_level", level="info")
+    server.synchronize()
+    names: list[str] = []
+    in_thread = bridge.bridge.rosbridge.in_thread
+
+    async def noting(work: Callable[[], Any]) -> Any:
+        def noted() -> Any:
+            names.append(threading.current_thread().name)
+            return work()
+
+        return await in_thread(noted)
+
+    bridge.bridge.rosbridge.in_thread = noting  # type: ignore[method-assign, assignment]
+    client.send(op="call_service", service="/list", id="c")
+    call = server.next("call_service")
+    topics = [f"/topic{number}" for number in range(30_000)]
+    server.send(
+        op="service_response",
+        service="/list",
+        id=call["id"],
+        values={"topics": topics, "types": []},
+        result=True,
+    )
+    assert client.next("service_response", id="c")["values"]["topics"] == topics
+    assert len(names) == 2
+    assert all(name.startswith("rosbridge-large") for name in names)
+
+
+def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Running]) -> None:
+    access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    bridge = run_bridge(access=access)
+    for opening in ("read-token-00", "write-token-0"):
+        client = bridge.rosbridge(path=f"/?token={opening}")
+        client.send(op="subscribe", topic="/" + "a" * 60_000, id="fits")
+        assert "4096 characters at most" in client.next("status", id="fits")["msg"]
+        client.send(op="subscribe", topic="/" + "a" * 70_000, id="large")
+        if opening == "write-token-0":
+            assert "4096 characters at most" in client.next("status", id="large")["msg"]
+            continue
+        with pytest.raises(ConnectionClosed, match=r"1009.*exceeds limit of 65536"):
+            client.next("status", id="large")
+        # Nor in parts.
+        client = bridge.rosbridge(path=f"/?token={opening}")
+        text = json.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 25_000})
+        for at, half in enumerate((text[:40_000], text[40_000:])):
+            client.send(op="fragment", id="f", num=at, total=2, data=half)
+        assert "is too large: this token is read-only" in client.next("status")["msg"]
 
 
 def test_publish_without_advertise_uses_the_topics_type(bridge: Running) -> None:

@@ -20,13 +20,14 @@ from unittest.mock import Mock
 import pytest
 from std_msgs.msg import String, UInt8MultiArray
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.frames import Opcode
+from websockets.frames import Frame, Opcode
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access, Grant
 from minirospy.bridge.web.connection import Connection, Limits
 from minirospy.bridge.web.pipe import Endpoints
 from minirospy.bridge.web.rate import ConnectionRate
+from minirospy.bridge.web.turns import FairTurns
 from minirospy.errors import BridgeError
 from tests.waiting import wait_until
 
@@ -376,6 +377,7 @@ class Turns:
 
     def __init__(self) -> None:
         self.now = 0.0
+        self.frames = 0
         self.soon: list[Callable[[], None]] = []
 
     def time(self) -> float:
@@ -394,7 +396,8 @@ class Turns:
 
 
 def test_messages_that_take_long_are_handled_in_turns() -> None:
-    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
+    loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
+    site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
     handled: list[str] = []
 
@@ -408,6 +411,7 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
     site.doors = [door]
     connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
     connection.received(HANDSHAKE.encode())
+    pipe.resume.reset_mock()
     texts = [str(number) for number in range(100)]
     frames = b"".join(bytes((0x81, 0x80 | len(text), 0, 0, 0, 0)) + text.encode() for text in texts)
 
@@ -426,9 +430,86 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
     pipe.resume.assert_called_once()
 
 
+EMPTY_FRAMES = {
+    "continuations": bytes((0x01, 0x80, 0, 0, 0, 0)) + bytes((0x00, 0x80, 0, 0, 0, 0)) * 9999,
+    "pings": bytes((0x89, 0x80, 0, 0, 0, 0)) * 10_000,
+    "pongs": bytes((0x8A, 0x80, 0, 0, 0, 0)) * 10_000,
+    "texts": bytes((0x81, 0x80, 0, 0, 0, 0)) * 10_000,
+}
+
+
+def connected(limits: Limits, seconds_of_frame: float) -> tuple[Turns, Connection, Mock]:
+    """Return a loop, a connection after its handshake, and its pipe; each frame takes some seconds of the loop's clock."""
+    loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
+    site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
+    site.check.return_value = Grant.READ
+    door = Mock()
+    door.select.return_value = "foxglove.sdk.v1"
+    site.doors = [door]
+    connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
+    connection.received(HANDSHAKE.encode())
+    loop.iterate()
+    pipe.reset_mock()
+    framed = connection._framed
+
+    def counted(frame: Frame) -> None:
+        loop.frames += 1
+        loop.now += seconds_of_frame
+        framed(frame)
+
+    connection._framed = counted  # type: ignore[method-assign]
+    return loop, connection, pipe
+
+
+@pytest.mark.parametrize("kind", EMPTY_FRAMES)
+def test_frames_of_any_kind_are_handled_in_turns(kind: str) -> None:
+    loop, connection, pipe = connected(Limits(), 0.00001)
+    connection.received(EMPTY_FRAMES[kind])
+    assert 0 < loop.frames <= 11
+    pipe.pause.assert_called()
+    while loop.frames < 10_000:
+        before = loop.frames
+        loop.iterate()
+        # Of one iteration: 4 ms of 10 us each, and a slice more.
+        assert before < loop.frames <= before + 411
+    loop.iterate()
+    pipe.resume.assert_called()
+    pipe.close.assert_not_called()
+
+
+@pytest.mark.parametrize("kind", EMPTY_FRAMES)
+def test_frames_of_any_kind_count_toward_the_rate(kind: str) -> None:
+    loop, connection, pipe = connected(Limits(messages_a_second=4000), 0.0)
+    connection.received(EMPTY_FRAMES[kind])
+    assert loop.frames == 4000
+    assert connection.traffic.held_back == 1
+    pipe.pause.assert_called()
+    pipe.resume.assert_not_called()
+    loop.now += 1.0
+    connection._go_on()
+    assert loop.frames == 8000
+    loop.now += 1.0
+    connection._go_on()
+    assert loop.frames == 10_000
+    pipe.resume.assert_called()
+
+
+def test_client_that_reads_no_pongs_leaves_the_newest_waiting() -> None:
+    _, connection, pipe = connected(Limits(), 0.0)
+    pipe.is_full = True
+    for number in range(5000):
+        connection.received(bytes((0x89, 0x84, 0, 0, 0, 0)) + number.to_bytes(4, "big"))
+    assert len(connection.queue) == 1
+    pipe.is_full = False
+    pipe.write.side_effect = lambda _: setattr(pipe, "is_full", True)
+    connection.writable()
+    assert b"".join(pipe.write.call_args.args[0]) == b"\x8a\x04" + (4999).to_bytes(4, "big")
+
+
 def test_clients_are_pinged_before_they_are_disconnected() -> None:
     """As after a suspend: the bytes that came last are old, and no ping has been sent since."""
-    loop, site, pipe = Turns(), Mock(limits=Limits()), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
+    loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
+    site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"

@@ -10,9 +10,11 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
+from xmlrpc.client import ServerProxy
 
 import pytest
 from geometry_msgs.msg import Twist
@@ -23,6 +25,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
+from minirospy.bridge.stop_guard import StopGuard
 from minirospy.dashboard.drive_door import SUBPROTOCOL, Command, DriveSession, Joystick, Velocity, parse
 
 if TYPE_CHECKING:
@@ -220,6 +223,71 @@ def test_robot_stops_when_the_dashboard_is_closed(serve: Callable[..., Served]) 
     client.socket.close()
 
 
+class RawSubscriber:
+    """A robot with a thread of its own: a subscriber of the dashboard's node, by XML-RPC and TCPROS."""
+
+    def __init__(self, served: Served, topic: str) -> None:
+        with ServerProxy(served.node_of_dashboard._node.uri) as node:
+            answer: Any = node.requestTopic("/raw", topic, [["TCPROS"]])
+        _, host, port = answer[2]
+        self.socket = socket.create_connection((host, port), 60)
+        fields = {"callerid": "/raw", "topic": topic, "type": Twist._type, "md5sum": Twist._md5sum}
+        parts = [f"{name}={value}".encode() for name, value in fields.items()]
+        header = b"".join(struct.pack("<I", len(part)) + part for part in parts)
+        self.socket.sendall(struct.pack("<I", len(header)) + header)
+        self.read()
+
+    def read(self) -> bytes:
+        """Return the next frame."""
+        (size,) = struct.unpack("<I", self._exactly(4))
+        return self._exactly(size)
+
+    def until(self, is_right: Callable[[Any], bool]) -> None:
+        while not is_right(Twist().deserialize(self.read())):
+            pass
+
+    def _exactly(self, size: int) -> bytes:
+        data = b""
+        while len(data) < size:
+            more = self.socket.recv(size - len(data))
+            assert more
+            data += more
+        return data
+
+
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_robot_stops_while_the_loop_of_the_server_is_blocked(robot: Any, is_lost: bool) -> None:
+    served, until = robot
+    client = RawClient(served.port)
+    client.send(AT_REST)
+    until(is_zero)
+    subscriber = RawSubscriber(served, "/cmd_vel")
+    client.send(FORWARD)
+    subscriber.until(moves)
+
+    released, blocked = threading.Event(), threading.Event()
+
+    def block() -> None:
+        blocked.set()
+        released.wait()
+
+    served._loop.loop.call_soon_threadsafe(block)
+    try:
+        assert blocked.wait(60)
+        if is_lost:
+            client.socket.close()
+        subscriber.until(is_zero)
+    finally:
+        released.set()
+    if not is_lost:
+        # It drives again as soon as commands are read again.
+        client.send(FORWARD)
+        subscriber.until(moves)
+        client.socket.close()
+        subscriber.until(is_zero)
+    subscriber.socket.close()
+
+
 def test_client_that_leaves_before_its_topic_is_connected_leaves_a_zero(robot: Any) -> None:
     served, until = robot
     client = RawClient(served.port)
@@ -282,7 +350,7 @@ def test_all_topics_are_stopped_where_one_cannot_be() -> None:
                 raise OSError("gone")
 
     client: Any = SimpleNamespace(may_write=True, send_text=lambda _: None)
-    session = DriveSession(client, cast("SharedGraph", None))
+    session = DriveSession(client, cast("SharedGraph", None), StopGuard())
     session._driven = {topic: cast("Any", Driven(topic)) for topic in ("/a", "/b")}
     session.ended()
     assert closed == ["/a", "/b"]

@@ -44,6 +44,10 @@ _Fields = Mapping[str, Any]
 _MOST_ITEMS = 100_000
 """Entries of one array of a client."""
 
+_MAX_VALUES = 1_000_000
+_MAX_COLLECTIONS = 100_000
+"""Of a text, marks within strings counted: parsing it takes 50 ms at most; the messages that clients publish are binary."""
+
 _UINT32 = (1 << 32) - 1
 _SERVICE_HEAD = struct.Struct("<BIII")
 _PLAYBACK_CONTROL = struct.Struct("<BBfBQI")
@@ -53,7 +57,7 @@ _CHANNEL_ID = struct.Struct("<BI")
 def parse_text(text: str | bytes) -> Event:
     """Return the event of a JSON message. Raise BridgeProtocolError."""
     try:
-        fields = load_json(text)
+        fields = load_json(text, max_values=_MAX_VALUES, max_collections=_MAX_COLLECTIONS)
     except (ValueError, RecursionError) as error:
         raise BridgeProtocolError(f"a message that is not JSON: {error}") from None
     if not isinstance(fields, dict):

@@ -6,8 +6,9 @@ import asyncio
 import json
 import logging
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.bridge.graph import Arrival, Publication, SharedGraph
 from minirospy.bridge.rosbridge import conversion, png
@@ -27,6 +28,8 @@ __all__ = ["RosbridgeDoor", "RosbridgeOptions"]
 
 _SUBPROTOCOL = "rosbridge_v2"
 _LOG_LINES = 20
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class RosbridgeDoor:
         self._closing: dict[str, asyncio.Task[None]] = {}
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
+        self._thread: ThreadPoolExecutor | None = None
+        self._is_in_thread = asyncio.Lock()
         self._types = ArrivingTypes()
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
         self._on_clients = on_clients
@@ -76,7 +81,21 @@ class RosbridgeDoor:
         self._on_clients(self.sessions)
         return session
 
+    def close(self) -> None:
+        """End the thread of large messages, after the one that it works on. Idempotent."""
+        if self._thread:
+            self._thread.shutdown(wait=False, cancel_futures=True)
+            self._thread = None
+
     # --- for sessions
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """Return what some work on a large message returns; one thread does it for all clients, one after another."""
+        # What waits is not with the thread: the message of a client that leaves is freed immediately.
+        async with self._is_in_thread:
+            if self._thread is None:
+                self._thread = ThreadPoolExecutor(1, "rosbridge-large")
+            return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def left(self, session: RosbridgeSession) -> None:
         """Forget a client."""

@@ -6,14 +6,15 @@ https://github.com/RobotWebTools/rosbridge_suite, branch ros1.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from minirospy.bridge.json_text import load_json
+from minirospy.bridge.json_text import MAX_QUICK_CHARACTERS, is_quick_text, load_json, load_json_in_pieces
 from minirospy.bridge.rosbridge import png
 from minirospy.bridge.rosbridge.cbor import decode_cbor, encode_cbor
 from minirospy.errors import BridgeProtocolError
@@ -36,8 +37,10 @@ __all__ = [
     "UnadvertiseService",
     "Unsubscribe",
     "decode",
+    "decode_in_pieces",
     "encode",
     "fragments",
+    "is_quick",
     "parse",
     "service_call",
     "service_response",
@@ -189,15 +192,29 @@ Fields = Mapping[str, Any]
 # --- in
 
 
+def is_quick(data: str | bytes) -> bool:
+    """Return whether a message is decoded in a few milliseconds."""
+    return is_quick_text(data) if isinstance(data, str) else len(data) <= MAX_QUICK_CHARACTERS
+
+
 def decode(data: str | bytes) -> Fields:
     """Return the object that a message is: JSON as text, CBOR as bytes. Raises OperationError."""
+    return _decode(data, load_json)
+
+
+def decode_in_pieces(data: str | bytes) -> Fields:
+    """Do the same for a thread beside the event loop, without keeping the GIL for long."""
+    return _decode(data, load_json_in_pieces)
+
+
+def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
     try:
-        found = load_json(data) if isinstance(data, str) else decode_cbor(data)
+        found = load(data) if isinstance(data, str) else decode_cbor(data)
     except (ValueError, RecursionError) as error:
         shown = data[:_SHOWN] if isinstance(data, str) else f"{len(data)} bytes of CBOR ({error})"
         raise OperationError(f"Unable to deserialize message from client: {shown}") from error
     if not isinstance(found, dict):
-        shown = str(found)[:_SHOWN]
+        shown = _shown(found)
         raise OperationError(f"Unable to deserialize message from client: {shown}")
     return found
 
@@ -209,9 +226,7 @@ def parse(fields: Fields) -> Event:
     if op is None:
         raise _without_op(fields, id_)
     if not isinstance(op, str) or op not in OPERATIONS:
-        raise OperationError(
-            f"Unknown operation: {str(op)[:_SHOWN]}.  Allowed operations: {list(OPERATIONS)}", id_
-        )
+        raise OperationError(f"Unknown operation: {_shown(op)}.  Allowed operations: {list(OPERATIONS)}", id_)
     try:
         if op in _READERS:
             return _READERS[op](fields, id_)
@@ -224,7 +239,7 @@ def parse(fields: Fields) -> Event:
 
 
 def _without_op(fields: Fields, id_: Id) -> OperationError:
-    shown = str(dict(fields))[:_SHOWN]
+    shown = _shown(dict(fields))
     if "receiver" in fields:
         return OperationError(
             "Received a rosbridge v1.0 message.  Please refer to rosbridge.org for the correct format of rosbridge "
@@ -237,11 +252,37 @@ def _without_op(fields: Fields, id_: Id) -> OperationError:
     )
 
 
+def _shown(value: object) -> str:
+    """Return the start of ``str(value)``, without making the text of all that is in it."""
+    return _text_of(value, _SHOWN)[:_SHOWN]
+
+
+def _text_of(value: object, most: int) -> str:
+    """Return ``str(value)``, or a text that has the same first ``most`` characters, and more."""
+    return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
+
+
+def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
+    """Return the first values in a value from JSON or CBOR: each has a character at least in the text."""
+    if isinstance(value, str) and len(value) > most:
+        # The quotes around a text depend on those in it, also behind the cut.
+        return value[: most + 1] + "".join(quote for quote in "'\"" if quote in value)
+    if isinstance(value, bytes):
+        return value[: most + 1]
+    if isinstance(value, list):
+        first = itertools.takewhile(lambda _: next(numbers) <= most, value)
+        return [_cut(each, most, numbers) for each in first]
+    if isinstance(value, dict):
+        pairs = itertools.takewhile(lambda _: next(numbers) <= most, value.items())
+        return {_cut(key, most, numbers): _cut(each, most, numbers) for key, each in pairs}
+    return value
+
+
 def _id(fields: Fields) -> Id:
     found = fields.get("id")
     if found is None or isinstance(found, bool | int | float):
         return found
-    text = str(found)
+    text = _text_of(found, _LONGEST_ID)
     if len(text) > _LONGEST_ID:
         raise OperationError(f"an id has {_LONGEST_ID} characters at most")
     return text
@@ -256,7 +297,7 @@ def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ..
         return default
     if not isinstance(found, types) or (isinstance(found, bool) and bool not in types):
         raise BridgeProtocolError(
-            f"Expected field {name} to be one of {types}. Invalid value: {str(found)[:_SHOWN]}"
+            f"Expected field {name} to be one of {types}. Invalid value: {_shown(found)}"
         )
     return found
 
@@ -288,9 +329,7 @@ def _number(fields: Fields, name: str, default: float | None = None) -> float:
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise BridgeProtocolError(
-            f"field {name} is not a number of seconds or milliseconds: {str(found)[:_SHOWN]}"
-        )
+        raise BridgeProtocolError(f"field {name} is not a number of seconds or milliseconds: {_shown(found)}")
     return number
 
 

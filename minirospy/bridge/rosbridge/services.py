@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.raw import service_header
@@ -18,11 +19,24 @@ if TYPE_CHECKING:
     from minirospy.aio.services import Service
     from minirospy.bridge.rosbridge.session import RosbridgeSession
 
-__all__ = ["ClientService", "call"]
+__all__ = ["ClientService", "InThread", "call"]
+
+_T = TypeVar("_T")
 
 
-async def call(graph: SharedGraph, name: str, arguments: object) -> Message:
-    """Return a service's response. Raises BridgeError, ServiceException, ROSSerializationException."""
+class InThread(Protocol):
+    """Runs work on a large message in a thread."""
+
+    async def __call__(self, work: Callable[[], _T]) -> _T: ...
+
+
+async def call(
+    graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
+) -> Message:
+    """Return a service's response. Raises BridgeError, ServiceException, ROSSerializationException.
+
+    ``in_thread`` runs the conversion of arguments that are large.
+    """
     service = graph.node.resolve(name)
     info = graph.service_info(service)
     if info:
@@ -36,10 +50,14 @@ async def call(graph: SharedGraph, name: str, arguments: object) -> Message:
             raise
     found = service_class(type_)
 
-    request = found._request_class()
-    conversion.fill(request, conversion.request_values(request, arguments), graph.node.now)
+    def body() -> bytes:
+        request = found._request_class()
+        conversion.fill(request, conversion.request_values(request, arguments), graph.node.now)
+        return serialized(request)
+
+    data = await in_thread(body) if in_thread else body()
     response = found._response_class()
-    response.deserialize(await graph.call(service, found._md5sum, serialized(request)))
+    response.deserialize(await graph.call(service, found._md5sum, data))
     return response
 
 
@@ -68,19 +86,43 @@ class ClientService:
 
     def answered(self, event: protocol.ServiceResponse) -> None:
         """Take over a client's answer. Raises BridgeError: values that do not fit, or no call waits for it."""
-        future = self._waiting.pop(event.id, None)
-        if future is None or future.done():
-            raise BridgeError(f"no call of service {self.name} with id {event.id} waits for a response")
+        future = self._taken(event)
         if not event.result:
             future.set_exception(ServiceException(str(event.values)))
             return
-        response = self._class._response_class()
         try:
-            conversion.fill(response, event.values, self._graph.node.now)
+            response = self._response(event)
         except conversion.ConversionError as error:
             future.set_exception(ServiceException(str(error)))
             raise
         future.set_result(response)
+
+    async def answered_large(self, event: protocol.ServiceResponse, in_thread: InThread) -> None:
+        """Do the same with a large answer, which is converted in a thread."""
+        future = self._taken(event)
+        try:
+            response = await in_thread(lambda: self._response(event)) if event.result else None
+        except conversion.ConversionError as error:
+            if not future.done():
+                future.set_exception(ServiceException(str(error)))
+            raise
+        if future.done():
+            return  # the call was given up meanwhile
+        if response is None:
+            future.set_exception(ServiceException(str(event.values)))
+        else:
+            future.set_result(response)
+
+    def _taken(self, event: protocol.ServiceResponse) -> asyncio.Future[Message]:
+        future = self._waiting.pop(event.id, None)
+        if future is None or future.done():
+            raise BridgeError(f"no call of service {self.name} with id {event.id} waits for a response")
+        return future
+
+    def _response(self, event: protocol.ServiceResponse) -> Message:
+        response: Message = self._class._response_class()
+        conversion.fill(response, event.values, self._graph.node.now)
+        return response
 
     async def _handle(self, request: Message) -> Message:
         id_ = f"service_request:{self.name}:{next(self._ids)}"

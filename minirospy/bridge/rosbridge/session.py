@@ -56,9 +56,9 @@ _Work = Coroutine[object, object, None]
 
 
 class _Pending(NamedTuple):
-    """The rest of an operation, which has to wait for something."""
+    """The rest of an operation, which has to wait for something; the event is None if it reports its faults itself."""
 
-    event: Event
+    event: Event | None
     work: _Work
 
 
@@ -98,6 +98,8 @@ class RosbridgeSession:
         self._inbox: deque[str | bytes] = deque()
         self._inbox_size = 0
         self._is_working = False
+        self._is_large = False
+        # The operation that is carried out came in a large message: a thread makes the ROS message of it, too.
         self._handlers: Mapping[type[Event], Callable[[Any], _Work | _Pending | None]] = {
             protocol.Advertise: self._advertise,
             protocol.Unadvertise: self._unadvertise,
@@ -196,15 +198,44 @@ class RosbridgeSession:
 
     def _begin(self, data: str | bytes) -> _Pending | None:
         """Carry out an operation; return what is left to be waited for."""
+        if not protocol.is_quick(data):
+            return self._begin_large(data)
         try:
             event = protocol.parse(protocol.decode(data))
-        except OperationError as error:
-            self.status(StatusLevel.ERROR, str(error), error.id)
-            return None
         except BridgeError as error:
-            self.status(StatusLevel.ERROR, str(error))
+            self._unreadable(error)
             return None
         return self._carry_out(event)
+
+    def _begin_large(self, data: str | bytes) -> _Pending | None:
+        """Parse a large message in a thread, so that no other client waits for it; nothing more is read meanwhile."""
+        if not self.client.may_write:
+            # What joined fragments or a PNG make: a message of this size is refused by the connection.
+            self.status(
+                StatusLevel.ERROR,
+                f"a message of {len(data)} characters is too large: this token is read-only",
+            )
+            return None
+        self.client.pause()
+        return _Pending(None, self._carry_out_large(data))
+
+    async def _carry_out_large(self, data: str | bytes) -> None:
+        try:
+            event = await self._door.in_thread(lambda: protocol.parse(protocol.decode_in_pieces(data)))
+        except BridgeError as error:
+            self._unreadable(error)
+            return
+        else:
+            self._is_large = True
+            pending = self._carry_out(event)
+            if pending is not None:
+                await self._finish(pending)
+        finally:
+            self._is_large = False
+            self.client.resume()
+
+    def _unreadable(self, error: BridgeError) -> None:
+        self.status(StatusLevel.ERROR, str(error), error.id if isinstance(error, OperationError) else None)
 
     def _carry_out(self, event: Event) -> _Pending | None:
         if not self._is_authenticated and not isinstance(event, protocol.Auth):
@@ -223,6 +254,7 @@ class RosbridgeSession:
         try:
             await pending.work
         except _REFUSALS as error:
+            assert pending.event is not None
             self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
@@ -277,15 +309,24 @@ class RosbridgeSession:
             await pending
 
     def _publish_to(self, published: _Published, event: protocol.Publish) -> _Work | None:
-        message = published.message_class()
-        conversion.fill(message, event.message, self._graph.node.now)
-        if is_stamped(message):
-            message.header.seq = next(published.numbers)
-        body = serialized(message)
+        if self._is_large:
+            return self._publish_large(published, event)
+        body = self._body(published, event)
         if published.publication.has_joined:
             published.publication.publish(body)
             return None
         return self._publish_when_joined(published.publication, body)
+
+    async def _publish_large(self, published: _Published, event: protocol.Publish) -> None:
+        body = await self._door.in_thread(lambda: self._body(published, event))
+        await self._publish_when_joined(published.publication, body)
+
+    def _body(self, published: _Published, event: protocol.Publish) -> bytes:
+        message = published.message_class()
+        conversion.fill(message, event.message, self._graph.node.now)
+        if is_stamped(message):
+            message.header.seq = next(published.numbers)
+        return serialized(message)
 
     async def _publish_when_joined(self, publication: Publication, body: bytes) -> None:
         await publication.joined()
@@ -380,13 +421,15 @@ class RosbridgeSession:
         def ended(_: object) -> None:
             self._calls -= 1
 
-        self._spawn(self._call(event)).add_done_callback(ended)
+        self._spawn(self._call(event, is_large=self._is_large)).add_done_callback(ended)
 
-    async def _call(self, event: protocol.CallService) -> None:
+    async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:
         try:
             self._require_write("calling services")
             _check_name("service", event.service)
-            values: object = conversion.values(await call(self._graph, event.service, event.arguments))
+            in_thread = self._door.in_thread if is_large else None
+            response = await call(self._graph, event.service, event.arguments, in_thread)
+            values: object = conversion.values(response)
             result = True
         except _REFUSALS as error:
             values, result = str(error), False
@@ -426,11 +469,14 @@ class RosbridgeSession:
         self.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
         return _ended(closing)
 
-    def _service_response(self, event: protocol.ServiceResponse) -> None:
+    def _service_response(self, event: protocol.ServiceResponse) -> _Work | None:
         service = self._own_service(event.service)
         if service is None:
             raise OperationError(f"Service {event.service} has not been advertised via rosbridge.", event.id)
+        if self._is_large:
+            return service.answered_large(event, self._door.in_thread)
         service.answered(event)
+        return None
 
     def _own_service(self, name: str) -> ClientService | None:
         service = self._door.services.get(name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from minirospy.bridge.access import Credentials, Grant, Refusal
 from minirospy.bridge.web.queue import DEFAULT_LIMIT, Piece, SendQueue
+from minirospy.bridge.web.turns import FairTurns
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.connection import Connection
@@ -44,16 +45,19 @@ PLAIN_HEADERS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one client: bytes of a message, messages a second, bytes that wait, seconds without progress.
+    """The limits of one client: bytes of a message, frames a second, bytes that wait, seconds without progress.
 
     ``connections`` is the number of all clients together; an address may open ``connections_a_second``, and at first
     ``connection_burst``.
     """
 
     message: int = 64_000_000
+    read_only_message: int = 64 * 1024
+    """Bytes of a message of a client that may not write: it subscribes, and sends nothing large."""
     unfinished: int = 256_000_000
     """Bytes of messages that have not arrived whole yet, of all clients."""
     messages_a_second: int = 20_000
+    """Frames of any kind: empty ones, pings and parts of a message are counted too."""
     queue: int = DEFAULT_LIMIT
     connections: int = 256
     connections_a_second: float = 50.0
@@ -109,6 +113,9 @@ class Site(Protocol):
 
     @property
     def doors(self) -> Sequence[Door]: ...
+
+    @property
+    def turns(self) -> FairTurns: ...
 
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal: ...
 
@@ -185,6 +192,14 @@ class WebClient:
     def discard(self, key: Hashable) -> None:
         """Drop what waits under a key."""
         self._connection.queue.discard(key)
+
+    def pause(self) -> None:
+        """Handle no more of what the client sends, until :meth:`resume`."""
+        self._connection.hold(is_held=True)
+
+    def resume(self) -> None:
+        """Go on with what the client sends."""
+        self._connection.hold(is_held=False)
 
     def close(self, code: int = 1000, reason: str = "") -> None:
         """End the connection after what waits; ``reason`` is cut to 123 bytes."""

@@ -1,7 +1,8 @@
 """One connection of a browser or program: HTTP request in, then an answer, a stream, or a WebSocket.
 
-The WebSocket's bytes are parsed by the library ``websockets`` (its part without sockets); frames are written here, so that a
-message goes into the socket without being copied for each client. Source: RFC 6455, RFC 9112.
+The WebSocket's bytes are parsed by the library ``websockets`` (its part without sockets), one frame at a time, in the client's
+turn (:mod:`minirospy.bridge.web.turns`). Frames are written here, so that a message goes into the socket without being copied for
+each client. Source: RFC 6455, RFC 9112.
 """
 
 from __future__ import annotations
@@ -10,8 +11,7 @@ import asyncio
 import http
 import logging
 import time
-from collections import deque
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -21,6 +21,7 @@ from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 from websockets.protocol import State
 from websockets.server import ServerProtocol
+from websockets.streams import StreamReader
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
 from minirospy.bridge.web.client import (
@@ -33,9 +34,11 @@ from minirospy.bridge.web.client import (
     Session,
     Site,
     WebClient,
+    frame_head,
     response_head,
 )
 from minirospy.bridge.web.queue import Piece, SendQueue
+from minirospy.bridge.web.turns import WRITER_WEIGHT
 from minirospy.escape import escaped
 
 if TYPE_CHECKING:
@@ -57,11 +60,9 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-_HEAD_END = b"\r\n\r\n"
 _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
-_TURN_SECONDS = 0.01
-"""After this a client's further messages wait for the loop's next iteration."""
+_PONG = 0x8A
 
 
 @dataclass
@@ -89,17 +90,20 @@ class Connection:
         self._site = site
         self._pipe = pipe
         self._loop = loop
-        self._protocol = ServerProtocol(
+        self._protocol = _FrameByFrame(
             select_subprotocol=lambda _, offered: self._select(offered),
             max_size=site.limits.message,
             logger=_QUIET,
         )
+        self._share = site.turns.join(self._work)
         self._door: Door | None = None
         self._fragments = bytearray()
-        self._frames: deque[Frame] = deque()
-        self._head_end = b""
-        self._is_head_read = False
-        self._is_waiting = False
+        self._is_held_back = False
+        # The client has sent as many frames as it may in this second.
+        self._is_paused = False
+        # Its session works on what came before,
+        self._worked_on = 0
+        # a message of so many bytes.
         self._opcode = Opcode.BINARY
         self._is_scheduled = False
         self._is_closing = False
@@ -134,23 +138,10 @@ class Connection:
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # one request a connection
-        if self._is_head_read:
-            self._parse(data)
-            self._count_unfinished()
-            return
-        # What follows the request is parsed once the request is accepted.
-        joined = self._head_end + data
-        end = joined.find(_HEAD_END)
-        if end < 0:
-            self._head_end = joined[-3:]
-            self._parse(data)
-            return
-        self._is_head_read = True
-        cut = end + len(_HEAD_END) - len(self._head_end)
-        self._parse(data[:cut])
-        if data[cut:] and self.client and not self._is_closing:
-            self._parse(data[cut:])
-            self._count_unfinished()
+        self._protocol.feed(data)
+        if self._is_held_back or self._is_paused or self._site.turns.start(self._share):
+            self._pipe.pause()
+        self._count_unfinished()
 
     def writable(self) -> None:
         """Send more."""
@@ -162,6 +153,7 @@ class Connection:
             return
         self._is_over = self._is_closing = True
         self._timer.cancel()
+        self._site.turns.leave(self._share)
         self._discard_unfinished()
         try:
             if self.session:
@@ -173,7 +165,6 @@ class Connection:
         self.session = self.exchange = None
         # The connection is part of reference cycles: what waited is freed now, not when they are collected.
         self.queue.clear()
-        self._frames.clear()
         self._site.left(self)
 
     # --- to the pipe
@@ -217,44 +208,53 @@ class Connection:
         self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
         self._discard_unfinished()
 
+    def hold(self, *, is_held: bool) -> None:
+        """Handle no more frames while the session is busy with one; the client's bytes stay in its socket."""
+        self._is_paused = is_held
+        if is_held:
+            self._pipe.pause()
+            return
+        self._worked_on = 0
+        self._count_unfinished()
+        if not self._is_over and not self._is_held_back:
+            self._site.turns.start(self._share)
+
     def abort(self) -> None:
         """End the connection now."""
         self._abort()
 
     # --- within
 
-    def _parse(self, data: bytes) -> None:
-        self._protocol.receive_data(data)
-        for event in self._protocol.events_received():
-            if isinstance(event, Request):
-                self._requested(event)
-                if self._is_closing or self.exchange:
-                    return
-            elif isinstance(event, Frame):
-                self._frames.append(event)
-        if self._protocol.handshake_exc and self.client is None:
+    def _work(self, end: float) -> bool:
+        """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
+        if self.client is None:
+            self._parse_head()
+        while self.client and not self._is_closing and not self._is_paused:
+            if self._is_over_rate():
+                break
+            frame = self._protocol.next_frame()
+            if frame is None:
+                break
+            self._in_second += 1
+            self._framed(frame)
+            if self._loop.time() >= end and self._protocol.reader.buffer and not self._is_closing:
+                return True
+        if self.client and not self._is_over:
+            self._answer_protocol()
+            if self._protocol.state in (State.CLOSING, State.CLOSED):
+                self.close_when_sent()
+        self._count_unfinished()
+        if not self._is_held_back and not self._is_paused and not self._is_over:
+            self._pipe.resume()
+        return False
+
+    def _parse_head(self) -> None:
+        request = self._protocol.next_request()
+        if request:
+            self._requested(request)
+        elif self._protocol.handshake_exc:
             why = self._protocol.handshake_exc.__cause__ or self._protocol.handshake_exc
             self._refuse(Refusal(400, f"not a request for this server: {escaped(str(why))[:200]}"))
-            return
-        self._handle_frames()
-
-    def _handle_frames(self) -> None:
-        """Handle what was received, as much of it as the client may send in a second; other clients have their turns."""
-        if self._is_waiting:
-            return
-        end = self._loop.time() + _TURN_SECONDS
-        while self._frames and not self._is_closing:
-            if self._is_held_back():
-                return
-            self._framed(self._frames.popleft())
-            if self._frames and self._loop.time() >= end:
-                self._is_waiting = True
-                self._pipe.pause()
-                self._loop.call_soon(self._go_on)
-                return
-        self._answer_protocol()
-        if self._protocol.state in (State.CLOSING, State.CLOSED) and self.client:
-            self.close_when_sent()
 
     def _answer_protocol(self) -> None:
         data = tuple(piece for piece in self._protocol.data_to_send() if piece)
@@ -283,6 +283,10 @@ class Connection:
         self._protocol.send_response(response)
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
+        if self.client.may_write:
+            self._share.weight = WRITER_WEIGHT
+        else:
+            self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
         self._watch(self._ping)
         self.session = self._door.open(self.client)
 
@@ -360,6 +364,10 @@ class Connection:
     def _framed(self, frame: Frame) -> None:
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
+        elif frame.opcode is Opcode.PING:
+            # Only the newest ping needs an answer (RFC 6455, 5.5.3): a client that reads nothing leaves one waiting.
+            self.stream(_PONG, (frame_head(_PONG, len(frame.data)), frame.data), newest_only=True)
+            return
         elif frame.opcode is not Opcode.CONT:
             return
         if frame.fin and not self._fragments:
@@ -374,7 +382,6 @@ class Connection:
     def _delivered(self, data: bytes) -> None:
         assert self.session
         self.traffic.received += 1
-        self._in_second += 1
         try:
             if self._opcode is Opcode.BINARY:
                 self.session.received_binary(data)
@@ -385,35 +392,38 @@ class Connection:
         except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
             _log.exception("a message of %s could not be handled", self.peer)
             self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on this message")
+        if self._is_paused:
+            self._worked_on = len(data)
 
     def _count_unfinished(self) -> None:
-        grown = len(self._protocol.reader.buffer) + len(self._fragments) - self.unfinished
+        waiting = len(self._protocol.reader.buffer) + len(self._fragments) + self._worked_on
+        grown = waiting - self.unfinished
         self.unfinished += grown
         self._site.unfinished_grew(grown)
 
     def _discard_unfinished(self) -> None:
         self._protocol.reader.buffer.clear()
         self._fragments.clear()
+        self._worked_on = 0
         self._count_unfinished()
 
-    def _is_held_back(self) -> bool:
+    def _is_over_rate(self) -> bool:
         """Return whether a client has sent what it may in this second; then it is read again in the next one."""
         now = self._loop.time()
         if now - self._second >= 1.0:
             self._second, self._in_second = now, 0
         if self._in_second < self._limits.messages_a_second:
             return False
-        self._is_waiting = True
+        self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
         self._loop.call_later(self._second + 1.0 - now, self._go_on)
         return True
 
     def _go_on(self) -> None:
-        self._is_waiting = False
-        self._handle_frames()
-        if not self._is_waiting and not self._is_over:
-            self._pipe.resume()
+        self._is_held_back = False
+        if not self._is_paused:
+            self._site.turns.start(self._share)
 
     def _schedule(self) -> None:
         # What arrives in the same turn of the loop goes out with one call.
@@ -473,6 +483,61 @@ class Connection:
     def _abort(self) -> None:
         self._is_closing = True
         self._pipe.close(flush=False)
+
+
+class _FrameByFrame(ServerProtocol):
+    """The library's protocol, which parses all that has come in one call, made to stop after each frame."""
+
+    reader: _GatedReader
+
+    def feed(self, data: bytes) -> None:
+        """Add bytes that were received."""
+        self.reader.feed_data(data)
+
+    def next_request(self) -> Request | None:
+        """Return the request, once it has come whole; else None, and ``handshake_exc`` is set if it is not one."""
+        next(self.parser)
+        events = self.events_received()
+        return events[0] if events and isinstance(events[0], Request) else None
+
+    def next_frame(self) -> Frame | None:
+        """Return the next frame that has come whole, None if there is none."""
+        self.reader.is_open = True
+        next(self.parser)
+        events = self.events_received()
+        return events[0] if events and isinstance(events[0], Frame) else None
+
+    def limit(self, size: int) -> None:
+        """Refuse larger messages from now on."""
+        # The name of the attribute depends on the library's release.
+        for name in ("max_message_size", "max_size"):
+            if hasattr(self, name):
+                setattr(self, name, size)
+
+    def parse(self) -> Generator[None]:
+        """See the library's: called once, before anything is read."""
+        self.reader = _GatedReader()
+        yield from super().parse()
+
+    def recv_frame(self, frame: Frame) -> None:
+        """Take over a frame, and stop; pings are answered by the connection."""
+        if frame.opcode is Opcode.PING:
+            self.events.append(frame)
+        else:
+            super().recv_frame(frame)
+        self.reader.is_open = False
+
+
+class _GatedReader(StreamReader):
+    """Stops the parser before each frame while it is not open."""
+
+    is_open = False
+
+    def at_eof(self) -> Generator[None, None, bool]:
+        """See the library's: called by the parser before each frame."""
+        while not self.is_open:
+            yield
+        return (yield from super().at_eof())
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:

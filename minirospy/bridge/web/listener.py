@@ -17,6 +17,7 @@ from minirospy.bridge.web.client import PLAIN_HEADERS, response_head
 from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
 from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
 from minirospy.bridge.web.rate import ConnectionRate
+from minirospy.bridge.web.turns import FairTurns, cpu_meter
 from minirospy.errors import BridgeError
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import is_file_limit
@@ -66,6 +67,7 @@ class Listener:
         self.rate = ConnectionRate(
             self.limits.connections_a_second, self.limits.connection_burst, time.monotonic
         )
+        self.turns = FairTurns(_call_soon, time.monotonic, meter=cpu_meter())
         self._unfinished = 0
 
         self.host = ""
@@ -223,6 +225,10 @@ class Listener:
         self.connections.add(connection)
         self._on_change(len(self.connections))
         return connection
+
+
+def _call_soon(work: Callable[[], None]) -> None:
+    asyncio.get_running_loop().call_soon(work)
 
 
 def _refuse(sock: socket.socket, answer: bytes) -> None:

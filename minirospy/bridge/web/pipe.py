@@ -17,7 +17,7 @@ from minirospy.bridge.web.queue import Piece
 
 __all__ = ["Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
-_RECEIVE = 256 * 1024
+_RECEIVE = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
 _MOST_PIECES = 128
 """Pieces of one call of sendmsg; a system takes 1024 at most."""
 

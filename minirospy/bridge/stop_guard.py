@@ -1,0 +1,78 @@
+"""A thread that stops what is driven when its commands stop: no event loop, and nothing that holds one up, delays it.
+
+A call that keeps Python's global interpreter lock (GIL) delays the thread, too: the servers limit what one call works on.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+from minirospy.errors import BridgeError
+
+__all__ = ["StopGuard"]
+
+_log = logging.getLogger(__name__)
+
+Stop = Callable[[], None]
+"""Stops what is driven; called in the guard's thread. It looks itself whether a command has come meanwhile."""
+
+
+class StopGuard:
+    """Calls each function whose deadline passes. Its thread runs while there are deadlines; all methods are for any thread."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock`` returns seconds."""
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._deadlines: dict[Stop, float] = {}
+        self._thread: threading.Thread | None = None
+        self._next = 0.0
+        # The deadline until which the thread waits.
+
+    def arm(self, stop: Stop, deadline: float) -> None:
+        """Have ``stop`` called at a time of the clock, in place of its deadline before. Raise BridgeError without a thread."""
+        with self._changed:
+            self._deadlines[stop] = deadline
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="stop-guard", daemon=True)
+                try:
+                    self._thread.start()
+                except RuntimeError as error:
+                    self._thread = None
+                    del self._deadlines[stop]
+                    raise BridgeError(
+                        f"nothing is driven: no thread can be started to stop it: {error}"
+                    ) from error
+            elif deadline < self._next:
+                self._changed.notify()
+
+    def disarm(self, stop: Stop) -> None:
+        """Have ``stop`` called no more. Idempotent."""
+        with self._changed:
+            self._deadlines.pop(stop, None)
+
+    def _run(self) -> None:
+        while due := self._wait():
+            for stop in due:
+                try:
+                    stop()
+                except Exception:  # noqa: BLE001 - whatever it is, the others are stopped
+                    _log.exception("what is driven could not be stopped")
+
+    def _wait(self) -> list[Stop]:
+        """Wait until deadlines have passed, and return what stops; empty once there are no deadlines."""
+        with self._changed:
+            while self._deadlines:
+                now = self._clock()
+                due = [stop for stop, deadline in self._deadlines.items() if deadline <= now]
+                if due:
+                    for stop in due:
+                        del self._deadlines[stop]
+                    return due
+                self._next = min(self._deadlines.values())
+                self._changed.wait(self._next - now)
+            self._thread = None
+            return []
