@@ -201,9 +201,10 @@ def _gateway(
 
     def started(gateway: Gateway) -> None:
         shown = f"robot [{name}] is in the fleet" if name else "the fleet's robots are shown here"
-        gateway.node.log.info("%s (gateway %s)", shown, gateway.id)
+        machine = f", machine {gateway.claim.host}" if name else ""
+        gateway.node.log.info("%s (gateway %s%s)", shown, gateway.id, machine)
 
-    return run("fleet_gateway" if name else "fleet_control", (), start, started)
+    return run("fleet_gateway" if name else "fleet_control", (), start, started, connect=Gateway.connect)
 
 
 def _control(

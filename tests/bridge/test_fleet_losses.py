@@ -594,3 +594,35 @@ def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:
     fleet.call(token.undeclare)
     fleet.until_shown(control, "/robot1/chat")
     fleet.run(stranger.close())
+
+
+def until_line(process: subprocess.Popen[str], text: str) -> str:
+    """Return the first line of a process that has a text."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        if text in line:
+            return line
+    raise AssertionError(f"the process ended without [{text}]")
+
+
+@pytest.mark.parametrize("words", [("control",), ("gateway", "--name", "robot1")])
+def test_a_second_start_that_cannot_listen_does_not_end_the_first(
+    master: str, start: Callable[..., subprocess.Popen[str]], words: tuple[str, ...]
+) -> None:
+    endpoint = f"127.0.0.1:{free_port()}"
+    running = start(*words, "--listen", endpoint)
+    until_line(running, "(gateway ")
+    for wrong in (endpoint, "192.0.2.1:7447", "no-such-host.invalid"):
+        code, text = ended(start(*words, "--listen", wrong))
+        assert code == 1
+        assert "the fleet's network cannot be opened" in text
+        assert "Traceback" not in text
+    # One that waits for a router that is not there has not taken the name either.
+    waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
+    until_line(waiting, "nothing of the fleet answers")
+    assert running.poll() is None
+
+    # One that works does, and the first one says why it ends.
+    start(*words, "--listen", f"127.0.0.1:{free_port()}")
+    assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
+    assert ended(running)[0] == 0
