@@ -192,6 +192,7 @@ class Gateway:
             found["ros1_keys"] = self.ros1.status()
         if self.importer:
             found["refused"] = self.importer.contents.refused
+            found["refused_gateways"] = len(self.importer.contents.waiting)
             found["robots"] = [
                 {
                     "name": name,
