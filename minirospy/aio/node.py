@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import re
 import sys
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
@@ -48,6 +49,8 @@ _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
 _BILLION = 1_000_000_000
+_REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
+"""What the Slave API says when `shutdown` is called."""
 
 
 class _Unspecified:
@@ -100,6 +103,9 @@ class Node:
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
         """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+
+        self.shutdown_request = ""
+        """Why another process has requested that this node ends, such as the master for a new node of its name."""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
         self._rosout = rosout
@@ -194,6 +200,9 @@ class Node:
 
         The node leaves the graph when its ``async with`` block ends. `rosnode kill` ends here too.
         """
+        request = _REQUEST.match(str(reason))
+        if request:
+            self.shutdown_request = request[1]
         if self._loop:
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._stop)

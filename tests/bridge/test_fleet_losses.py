@@ -22,7 +22,7 @@ from std_msgs.msg import Int64, String
 from minirospy.bridge.fleet.gateway import Gateway
 from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inquiry import fleet_status
-from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, in_key
+from minirospy.bridge.fleet.keys import ROOT, in_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
 from minirospy.bridge.fleet.rules import GatewayRules, parse_rates
 from minirospy.errors import BridgeError, ServiceException
@@ -272,25 +272,6 @@ def test_a_call_ends_when_the_robot_is_lost(fleet: Fleet, quick: str) -> None:
         return ""
 
     assert "robot1" in fleet.run(call())
-
-
-def test_a_name_belongs_to_the_machine_that_came_first(fleet: Fleet) -> None:
-    first, second, control = fleet.place(), fleet.place(), fleet.place()
-    publisher(fleet, first, "/first", String)
-    publisher(fleet, second, "/second", String)
-    importer = control.gateway(listens=True).importer
-    assert importer is not None
-    one = first.gateway("robot1", host="a" * 16)
-    fleet.until_shown(control, "/robot1/first")
-    other = second.gateway("robot1", host="b" * 16)
-    fleet.until(lambda: importer.robots["robot1"].robot.duplicates == (other.claim,))
-    assert other.exporter is not None
-    fleet.until(lambda: other.exporter.duplicates == (one.claim,))
-    assert "/robot1/second" not in control.names()
-
-    fleet.stop(one)
-    fleet.until_shown(control, "/robot1/second")
-    fleet.until_gone(control, "/robot1/first")
 
 
 def test_a_clock_that_differs_is_measured(fleet: Fleet) -> None:
@@ -578,19 +559,33 @@ def test_the_missing_library_is_named(
     assert install_command("minirospy[fleet]", upgrade=True) in capsys.readouterr().err
 
 
-def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:
-    robot, control = fleet.place(), fleet.place()
-    publisher(fleet, robot, "/chat", String)
-    importer = control.gateway(listens=True).importer
-    assert importer is not None
-    gateway = robot.gateway("robot1")
-    fleet.until_shown(control, "/robot1/chat")
-    stranger = fleet.run(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
-    claim = Claim("robot1", "0" * 16, 1, "0" * 16)
-    token = fleet.call(lambda: stranger.declare_token(claim_key(claim)))
-    fleet.until(lambda: "robot1" in importer.robots and importer.robots["robot1"].robot.claim == claim)
-    assert gateway.exporter is not None
-    fleet.until(lambda: gateway.exporter.duplicates)
-    fleet.call(token.undeclare)
-    fleet.until_shown(control, "/robot1/chat")
-    fleet.run(stranger.close())
+def until_line(process: subprocess.Popen[str], text: str) -> str:
+    """Return the first line of a process that has a text."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        if text in line:
+            return line
+    raise AssertionError(f"the process ended without [{text}]")
+
+
+@pytest.mark.parametrize("words", [("control",), ("gateway", "--name", "robot1")])
+def test_a_second_start_that_cannot_listen_does_not_end_the_first(
+    master: str, start: Callable[..., subprocess.Popen[str]], words: tuple[str, ...]
+) -> None:
+    endpoint = f"127.0.0.1:{free_port()}"
+    running = start(*words, "--listen", endpoint)
+    until_line(running, "(gateway ")
+    for wrong in (endpoint, "192.0.2.1:7447", "no-such-host.invalid"):
+        code, text = ended(start(*words, "--listen", wrong))
+        assert code == 1
+        assert "the fleet's network cannot be opened" in text
+        assert "Traceback" not in text
+    # One that waits for a router that is not there has not taken the name either.
+    waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
+    until_line(waiting, "nothing of the fleet answers")
+    assert running.poll() is None
+
+    # One that works does, and the first one says why it ends.
+    start(*words, "--listen", f"127.0.0.1:{free_port()}")
+    assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
+    assert ended(running)[0] == 0

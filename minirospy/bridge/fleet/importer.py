@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
-from minirospy.bridge.fleet.contents import FleetContents, Robot
+from minirospy.bridge.fleet.contents import FleetContents, Refused, Robot
 from minirospy.bridge.fleet.definitions import Definitions
+from minirospy.bridge.fleet.holders import HOLD_SECONDS, parse_machines
 from minirospy.bridge.fleet.imported_topic import ImportedTopic, Shared
-from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key, parse_claim
+from minirospy.bridge.fleet.keys import ROOT, Claim, ServiceToken, call_key, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.presence import Presence
 from minirospy.bridge.fleet.rules import GatewayRules
@@ -28,7 +29,10 @@ from minirospy.wire.tcpros import InterfaceType
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
 
-__all__ = ["ImportedRobot", "Importer"]
+__all__ = ["MACHINES", "ImportedRobot", "Importer"]
+
+MACHINES = "/fleet/machines"
+"""The parameter of the machines that the operator has chosen, by names of robots; `minirospy fleet takeover` sets it."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
@@ -39,6 +43,9 @@ _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
 _CALL_SECONDS = 3600.0
+_CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
+MAX_LISTED = 5  # robots that one log line names
+LINES = 5  # log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
 _AT_ONCE = 20
 """Robots that are removed at a time."""
@@ -88,6 +95,13 @@ class Importer:
         self._is_reconciling = False
         self._is_full = False
         self._left_out = RateLimitedLogger(_log)
+        self._comings = RateLimitedLogger(_log, LINES)
+        self._rivals = RateLimitedLogger(_log, LINES)
+        self._waiting: tuple[Refused, ...] = ()
+        """The gateways that were refused at the last look, so that each is named once."""
+        self._machines: dict[str, str] = {}
+        """The machine of each robot that was shown last."""
+        self._challenging: set[str] = set()
         self._is_closed = False
         self._faults = Faults(_log, "showing the fleet's robots")
         self._presence = Presence(
@@ -102,7 +116,10 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`."""
+        """Show robots until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        self._node.parameters.listeners.append(self._parameter_changed)
+        await self._node.parameters.add(MACHINES)
+        await self._read_machines()
         self._declared = [
             self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
             for kind in ("robot", "topic", "service")
@@ -115,6 +132,8 @@ class Importer:
     async def close(self) -> None:
         """Remove all robots. Idempotent."""
         self._is_closed = True
+        if self._parameter_changed in self._node.parameters.listeners:
+            self._node.parameters.listeners.remove(self._parameter_changed)
         if self._reconciling:
             self._reconciling.cancel()
         watching, self._watching = self._watching, []
@@ -138,9 +157,30 @@ class Importer:
                 self._presence.check_soon()
 
     def _soon(self, seconds: float) -> None:
-        if self._reconciling is None and not self._is_closed:
-            loop = asyncio.get_running_loop()
-            self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+        if self._is_closed:
+            return
+        loop = asyncio.get_running_loop()
+        pending = self._reconciling
+        if pending is not None:
+            if pending.when() <= loop.time() + seconds:
+                return
+            pending.cancel()
+        self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+
+    # --- the operator's choices
+
+    def _parameter_changed(self, name: str, _: object) -> None:
+        if f"{name}/".startswith(f"{MACHINES}/") or f"{MACHINES}/".startswith(f"{name}/"):
+            self._spawn(self._follow_machines())
+
+    async def _follow_machines(self) -> None:
+        await self._read_machines()
+        self._soon(0.0)
+
+    async def _read_machines(self) -> None:
+        self.contents.holders.machines = parse_machines(await self._node.get_param(MACHINES, {}))
+
+    # --- what is shown
 
     async def _reconcile(self) -> None:
         """Show what the fleet has now."""
@@ -155,6 +195,9 @@ class Importer:
             await self._show(self.contents.robots(self._presence.lost))
         finally:
             self._is_reconciling = False
+        pause = self.contents.holders.pause({refused.claim.name for refused in self.contents.waiting})
+        if pause is not None:
+            self._soon(max(pause, _SETTLE_SECONDS))
         if time.monotonic() - started > _SETTLE_SECONDS and self._reconciling is not None:
             # While a thousand robots come, the loop has other work, too.
             self._reconciling.cancel()
@@ -162,12 +205,13 @@ class Importer:
             self._soon(2 * (time.monotonic() - started))
 
     async def _show(self, robots: dict[str, Robot]) -> None:
-        gone = []
+        gone, left, joined = [], [], []
         for name, shown in list(self.robots.items()):
             robot = robots.get(name)
             if robot is None or robot.claim != shown.robot.claim:
                 gone.append(self.robots.pop(name))
-                _log.info("robot [%s] has left", name)
+                left.append(name)
+        self._report_names(left, "left")
         for first in range(0, len(gone), _AT_ONCE):
             # One of them that fails does not keep the others.
             for error in await asyncio.gather(
@@ -176,22 +220,110 @@ class Importer:
                 if isinstance(error, Exception):
                     self._faults.report(error)
         for name, robot in robots.items():
+            if name not in self.robots:
+                self.robots[name] = ImportedRobot(robot)
+                joined.append(name)
+                self._report_machine(robot.claim)
+        self._report_names(joined, "joined")
+        self._report_refused()
+
+        for name, robot in robots.items():
             known = self.robots.get(name)
             if known is None:
-                known = self.robots[name] = ImportedRobot(robot)
-                _log.info("robot [%s] has joined", name)
-            if robot.duplicates and robot.duplicates != known.robot.duplicates:
-                _log.warning(
-                    "%d gateways call themselves [%s]: only the one that started first is shown",
-                    len(robot.duplicates) + 1,
-                    name,
-                )
+                continue  # closed meanwhile
             known.robot = robot
             try:
                 await self._update(known)
             except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
                 self._faults.report(error)
                 self._soon(_AGAIN_SECONDS)
+
+    def _report_names(self, names: list[str], what: str) -> None:
+        """Log the robots that have joined or left, in one line."""
+        if len(names) == 1:
+            self._comings.info("robot [%s] has %s", names[0], what)
+        elif names:
+            rest = len(names) - MAX_LISTED
+            shown = ", ".join(f"[{name}]" for name in names[:MAX_LISTED])
+            more = f" and {rest} more" if rest > 0 else ""
+            self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
+
+    def _report_machine(self, claim: Claim) -> None:
+        """Log that a robot's name has passed to another machine."""
+        before = self._machines.get(claim.name, claim.host)
+        if before != claim.host:
+            is_chosen = claim.name in self.contents.holders.machines
+            self._rivals.warning(
+                "robot [%s] is another machine now: %s (gateway %s) in place of %s, %s",
+                claim.name,
+                claim.host,
+                claim.gateway,
+                before,
+                "as the operator has chosen" if is_chosen else f"which has been gone for {HOLD_SECONDS:g} s",
+            )
+        if len(self._machines) >= _MOST_IMPORTED:
+            self._machines.clear()
+        self._machines[claim.name] = claim.host
+
+    def _report_refused(self) -> None:
+        """Log each gateway that another one keeps from a name, once; check whether the other one of a machine still answers."""
+        known, self._waiting = set(self._waiting), self.contents.waiting
+        for refused in self._waiting:
+            if refused in known or refused.holder is None:
+                continue
+            claim, holder = refused
+            if claim.host == holder.host:
+                self._challenge(refused)
+            elif claim.name in self.contents.holders.machines:
+                self._rivals.warning(
+                    "robot [%s] is shown only from machine %s, which the operator has chosen: machine %s (gateway %s) "
+                    "is refused",
+                    claim.name,
+                    self.contents.holders.machines[claim.name],
+                    claim.host,
+                    claim.gateway,
+                )
+            else:
+                self._rivals.warning(
+                    "two machines call themselves [%s]: %s (gateway %s) came first and is shown, %s (gateway %s) is refused "
+                    "until the first has been gone for %g s. To change it: minirospy fleet takeover %s %s",
+                    claim.name,
+                    holder.host,
+                    holder.gateway,
+                    claim.host,
+                    claim.gateway,
+                    HOLD_SECONDS,
+                    claim.name,
+                    claim.host,
+                )
+
+    def _challenge(self, refused: Refused) -> None:
+        """Ask the holder of a name whether it is there: its machine may have started its gateway again."""
+        name = refused.claim.name
+        if name not in self._challenging:
+            self._challenging.add(name)
+            self._spawn(self._ask_holder(refused))
+
+    async def _ask_holder(self, refused: Refused) -> None:
+        claim, holder = refused
+        assert holder
+        try:
+            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=_CHALLENGE_SECONDS)
+        except QueryFailed:
+            self.contents.holders.give_up(holder)
+            self._soon(0.0)
+        else:
+            if refused in self.contents.waiting:
+                self._rivals.warning(
+                    "two gateways of machine %s call themselves [%s]: %s came first and is shown, %s is refused. End one of "
+                    "them, or give it another name (--name)",
+                    claim.host,
+                    claim.name,
+                    holder.gateway,
+                    claim.gateway,
+                )
+        finally:
+            self._challenging.discard(claim.name)
 
     async def _update(self, shown: ImportedRobot) -> None:
         robot = shown.robot

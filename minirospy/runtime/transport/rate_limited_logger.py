@@ -13,7 +13,7 @@ _SECONDS = 10.0
 
 
 class RateLimitedLogger:
-    """Logs ``lines`` warnings and errors every ten seconds, and counts the others."""
+    """Logs ``lines`` lines every ten seconds, and counts the others."""
 
     def __init__(self, log: logging.Logger, lines: int = 1) -> None:
         self._log = log
@@ -28,6 +28,10 @@ class RateLimitedLogger:
         if self._omitted:
             self._log.warning("%d more like the last ones", self._omitted)
             self._omitted = 0
+
+    def info(self, text: str, *args: object) -> None:
+        """Log what is no fault, or count it."""
+        self._write(logging.INFO, text, args)
 
     def error(self, text: str, *args: object) -> None:
         """Log an error, or count it."""
