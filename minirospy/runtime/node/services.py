@@ -154,10 +154,10 @@ class ServiceServer:
     def _respond(self, request: memoryview, fields: Header) -> bytes:
         try:
             return serialize_response(self._handler(request, fields))
-        except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+        except BaseException as error:  # noqa: BLE001 - the edge to user code, which may call sys.exit(): the client waits
             return self._failure(error)
 
-    def _failure(self, error: Exception) -> bytes:
+    def _failure(self, error: BaseException) -> bytes:
         """Return the answer to a call whose handler raised; log what the handler did not mean to send."""
         if isinstance(error, ServiceException):
             return serialize_failure(error)
@@ -167,6 +167,9 @@ class ServiceServer:
             text = str(error)
         except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
             text = type(error).__name__
+        if not isinstance(error, Exception):
+            # Its text may be a number alone, or nothing.
+            text = f"{type(error).__name__}: {text}".removesuffix(": ")
         return serialize_failure(ServiceException(f"error processing request: {text}"))
 
 

@@ -39,6 +39,14 @@ FAULTS: dict[bytes, tuple[Exception, bytes]] = {
 }
 """Requests, what the handler raises, and what the client gets."""
 
+EXITS: dict[bytes, tuple[BaseException, bytes]] = {
+    b"exit": (SystemExit(3), b"error processing request: SystemExit: 3"),
+    b"exit without a status": (SystemExit(), b"error processing request: SystemExit"),
+    b"generator": (GeneratorExit(), b"error processing request: GeneratorExit"),
+    b"interrupt": (KeyboardInterrupt(), b"error processing request: KeyboardInterrupt"),
+}
+"""The same, of what is no Exception: in a coroutine it is asyncio's to decide."""
+
 
 class Scene(NamedTuple):
     """A node, its loop, and its services /worker and /loop, which do the same."""
@@ -69,6 +77,8 @@ def scene(master: str) -> Iterator[Scene]:
             raise ServiceException("zażółć")
         if bytes(request) in FAULTS:
             raise FAULTS[bytes(request)][0]
+        if bytes(request) in EXITS:
+            raise EXITS[bytes(request)][0]
         if bytes(request) == b"none":
             return None  # type: ignore[return-value]
         return bytes(request)[::-1]
@@ -136,6 +146,16 @@ def test_calls_on_the_loop(scene: Scene, service: str) -> None:
             await AsyncServiceClient.connect(scene.node.service_uri, service, "1" * 32, "/test")
 
     scene.run(main())
+
+
+@pytest.mark.parametrize("request_", EXITS)
+def test_handler_that_exits_is_answered_and_served_on(scene: Scene, request_: bytes) -> None:
+    client = scene.client("/worker", persistent=True)
+    with pytest.raises(CallFailed) as caught:
+        client.call(request_)
+    assert caught.value.text == EXITS[request_][1]
+    assert client.call(b"abc") == b"cba"
+    client.close()
 
 
 @both
