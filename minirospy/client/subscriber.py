@@ -326,7 +326,7 @@ class SubscribedTopic(SharedTopic):
                     self.resolved_name,
                     header.get("callerid"),
                     data_class._type,
-                    error,
+                    f"no memory for its {len(frame)} bytes" if isinstance(error, MemoryError) else error,
                 )
                 continue
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import struct
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, NamedTuple
@@ -146,6 +147,20 @@ def test_calls_on_the_loop(scene: Scene, service: str) -> None:
             await AsyncServiceClient.connect(scene.node.service_uri, service, "1" * 32, "/test")
 
     scene.run(main())
+
+
+@both
+def test_request_over_the_limit_is_refused_with_its_reason(
+    scene: Scene, service: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    client = scene.client(service)
+    client._sock.sendall(struct.pack("<I", 0xFFFFFFFE))
+    assert client._sock.recv(1) == b""
+    client.close()
+    # The connection is closed after the line is logged.
+    assert (
+        f"service {service}: client /test is disconnected: a body of 4294967294 bytes is over" in caplog.text
+    )
 
 
 @pytest.mark.parametrize("request_", EXITS)
