@@ -141,7 +141,7 @@ class Subscription(Handle, Generic[_M_co]):
                 self.topic,
                 header.get("callerid"),
                 message._type,
-                error,
+                f"no memory for its {len(frame)} bytes" if isinstance(error, MemoryError) else error,
             )
             return None
         message._connection_header = header

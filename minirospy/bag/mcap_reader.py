@@ -105,7 +105,8 @@ class McapReader(BagReader):
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
         """See :meth:`BagReader.messages`. Raise BagFormatError for damage, after the messages before it."""
-        wanted = {number: self.connections[number] for number in connections or self.connections}
+        chosen = self.connections if connections is None else connections
+        wanted = {number: self.connections[number] for number in chosen}
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
         # A chunk is read when its first message may be the next one; its data is in memory once, and so are those of others

@@ -329,7 +329,7 @@ class SubscribedTopic(SharedTopic):
                     self.resolved_name,
                     header.get("callerid"),
                     data_class._type,
-                    error,
+                    f"no memory for its {len(frame)} bytes" if isinstance(error, MemoryError) else error,
                 )
                 continue
 
@@ -338,16 +338,19 @@ class SubscribedTopic(SharedTopic):
                 statistics.count(message, header, len(frame))
                 statistics = None
             for callback in callbacks:
-                _call(callback, message)
+                _call(callback, message, receivers is not None)
 
 
-def _call(callback: _Callback, message: Message) -> None:
+def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> None:
     try:
         if callback.args is None:
             callback.function(message)
         else:
             callback.function(message, callback.args)
-    except Exception:  # noqa: BLE001 - the user's function: its fault must not end the connection
+    except BaseException as error:
+        # As in rospy, sys.exit() in the thread of a link ends nothing; where Subscriber() was called it ends the program.
+        if is_callers_thread and not isinstance(error, Exception):
+            raise
         # While a shutdown hook releases what the callback uses, an error of it says nothing.
         if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

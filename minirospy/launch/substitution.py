@@ -190,7 +190,8 @@ def convert(text: str, type_: str) -> object:
         try:
             loaded: object = load(text, fast_loader())
         except yaml.YAMLError as error:
-            raise ValueError(f"not YAML: {getattr(error, 'problem', None) or error}") from None
+            why = " ".join(str(getattr(error, "problem", None) or error).split())
+            raise ValueError(f"not YAML: {why}") from None
         return loaded
     raise ValueError(f"Unknown type '{type_}': there are str, int, double, bool, yaml and auto")
 

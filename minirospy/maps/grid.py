@@ -73,7 +73,7 @@ def read_settings(text: str) -> MapSettings:
         mark = getattr(error, "problem_mark", None)
         place = f" in line {mark.line + 1}" if mark else ""
         raise MapError(
-            f"The map's file is not YAML{place}: {getattr(error, 'problem', None) or error}"
+            f"The map's file is not YAML{place}: {' '.join(str(getattr(error, 'problem', None) or error).split())}"
         ) from error
     fields: dict[str, Any] = found if isinstance(found, dict) else {}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import struct
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -363,3 +364,13 @@ def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
     # A reader of a bag that is being written gets its chunks from elsewhere.
     twice = ChunkedReader(io.BytesIO(data), reader.connections, [chunk] * 3)
     assert sorted(each.body for each in twice.messages()) == sorted([b"\1\0\0\0a", b"\1\0\0\0b"] * 3)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_time_that_no_index_holds_costs_its_chunk_alone(closed: bool) -> None:
+    # Seconds and nanoseconds of 32 bits are more than seconds of 32 bits, once the nanoseconds are below a billion.
+    last = (2**32 - 1) * 10**9 + 999_999_999
+    data = make_bag([[Given(0, last, b"\1\0\0\0a")], [Given(0, 5, b"\1\0\0\0b")]], closed=closed)
+    stamp = struct.pack("<II", 2**32 - 1, 999_999_999)
+    data = data.replace(stamp, b"\xff" * 8)
+    assert [body for _, _, body in repaired(data)] == [b"\1\0\0\0b"]

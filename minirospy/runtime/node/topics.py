@@ -424,7 +424,8 @@ class Subscription:
                     lambda: left_out(link.header),
                 )
             elif self._on_loop:
-                watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended)
+                fail = partial(setattr, link, "fault")
+                watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended, fail)
             else:
                 try:
                     self._workers.start(self._read, link, deliver, loop)
@@ -502,6 +503,9 @@ class Subscription:
             )
         except (OSError, WireError) as error:
             link.fault = error
+        except MemoryError:
+            # To keep a message, or to give it to a callback that has no memory either.
+            link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(self._link_ended, link)

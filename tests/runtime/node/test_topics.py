@@ -137,9 +137,11 @@ async def subscribe_to(
     monkeypatch: pytest.MonkeyPatch,
     node: Node,
     deliver: Callable[[memoryview, Header], None],
+    *,
+    on_loop: bool = False,
 ) -> Subscription:
     """Return a subscription that was notified of one publisher, which ``foreign`` plays."""
-    subscription = node.make_subscription("/t", STRING, deliver)
+    subscription = node.make_subscription("/t", STRING, deliver, on_loop=on_loop)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
     return subscription
@@ -199,8 +201,9 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
     assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
 
 
+@pytest.mark.parametrize("on_loop", [False, True])
 def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, on_loop: bool
 ) -> None:
     delays: list[float] = []
 
@@ -213,7 +216,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
         monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign, box = Foreign(garbage), Box()
-            subscription = await subscribe_to(foreign, monkeypatch, b, box)
+            subscription = await subscribe_to(foreign, monkeypatch, b, box, on_loop=on_loop)
             start = subscription._start_connecting
             monkeypatch.setattr(
                 subscription, "_start_connecting", lambda action: (delays.append(action.delay), start(action))
