@@ -43,6 +43,7 @@ LAYERS = [
         "log_levels",
         "names",
         "private_files",
+        "ros1_imports",
         "scanner",
         "signal_dispatch",
         "steps",

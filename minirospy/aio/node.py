@@ -31,6 +31,7 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.idl.protocols import Message
+from minirospy.ros1_imports import prefer_ros1
 from minirospy.runtime.node.node import Node as RuntimeNode
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.topics import Publication
@@ -170,6 +171,8 @@ class Node:
             self._start_logging()
             await self._wait_for_master()
             await self._set_private_parameters()
+            if self._simulated_time or self._rosout:
+                prefer_ros1()
             if self._simulated_time and await self.get_param("/use_sim_time", False):
                 self._simulated = SimulatedTime(self._stopping)
                 self._spawn(self._follow_clock(self._simulated))
