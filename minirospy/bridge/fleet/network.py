@@ -24,6 +24,7 @@ from minirospy.bridge.zenoh_library import (
     DEFAULT_ENDPOINT,
     DEFAULT_PORT,
     Declared,
+    EndpointError,
     NetworkOptions,
     Outlet,
     Query,
@@ -35,6 +36,7 @@ from minirospy.bridge.zenoh_library import (
     one_line,
     require_zenoh,
     to_endpoint,
+    unresolved,
 )
 from minirospy.errors import BridgeError, MinirospyError
 from minirospy.escape import escaped
@@ -44,6 +46,7 @@ __all__ = [
     "DEFAULT_PORT",
     "Beacon",
     "Declared",
+    "EndpointError",
     "FleetNetwork",
     "NetworkOptions",
     "Outlet",
@@ -123,12 +126,16 @@ class FleetNetwork:
                 text = one_line(error)
                 if "Unable to connect" not in text:
                     raise BridgeError(f"the fleet's network cannot be opened: {text}") from error
+                unknown = await loop.run_in_executor(
+                    None, unresolved, json.loads(config.get_json("connect/endpoints") or "[]")
+                )
+                why = f" ({', '.join(map(escaped, unknown))} does not resolve)" if unknown else ""
                 if not waits:
                     raise BridgeError(
-                        f"nothing of the fleet answers at {endpoints}: give --connect, or start `minirospy fleet router`"
+                        f"nothing of the fleet answers at {endpoints}{why}: give --connect, or start `minirospy fleet router`"
                     ) from error
             if not is_reported:
-                _log.warning("nothing of the fleet answers at %s yet. Will keep trying.", endpoints)
+                _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
                 is_reported = True
             await asyncio.sleep(_RETRY_SECONDS)
 
