@@ -463,7 +463,7 @@ def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[
     """Return the end of a command that has reached the fleet: on a busy machine connecting takes longer than it waits."""
     while True:
         code, text = ended(start(*words))
-        if "nothing of the fleet answers" not in text and "no answer within" not in text:
+        if "nothing of the fleet answers" not in text and "no answer" not in text:
             return code, text
 
 
