@@ -312,6 +312,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
     """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
     from minirospy.bridge.fleet.network import (
+        EndpointError,
         NetworkOptions,
         is_loopback_endpoint,
         require_zenoh,
@@ -320,9 +321,15 @@ def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts:
     from minirospy.environment import Environment
 
     require_zenoh(has_many_links=bool(listen or config))
-    options = NetworkOptions(
-        tuple(map(to_endpoint, connect)), tuple(map(to_endpoint, listen)), config, scouts
-    )
+    try:
+        options = NetworkOptions(
+            tuple(map(to_endpoint, connect)),
+            tuple(to_endpoint(each, listens=True) for each in listen),
+            config,
+            scouts,
+        )
+    except EndpointError as error:
+        raise Misuse(str(error)) from error
     if Environment.read().local:
         beyond = [each for each in (*options.connect, *options.listen) if not is_loopback_endpoint(each)]
         if beyond or scouts or config:

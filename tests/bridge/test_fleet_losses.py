@@ -463,7 +463,7 @@ def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[
     """Return the end of a command that has reached the fleet: on a busy machine connecting takes longer than it waits."""
     while True:
         code, text = ended(start(*words))
-        if "nothing of the fleet answers" not in text and "no answer within" not in text:
+        if "nothing of the fleet answers" not in text and "no answer" not in text:
             return code, text
 
 
@@ -521,7 +521,14 @@ def test_a_gateway_that_waits_for_its_router_can_be_ended(
         (("control", "--priority", "/scan=high"), 1, "[high] is not one of teleop, data, bulk"),
         (("status", "--connect", "127.0.0.1:1"), 1, "nothing of the fleet answers at tcp/127.0.0.1:1"),
         (("status", "--seconds", "0"), 2, "--seconds 0 is not between 0.1 and 60"),
-        (("router", "--listen", "nonsense/x"), 1, "minirospy fleet: ERROR: "),
+        (("router", "--listen", "nonsense/x"), 2, "minirospy fleet: ERROR: [nonsense/x] is not an endpoint"),
+        (
+            ("gateway", "--name", "robot1", "--connect", "host:99999"),
+            2,
+            "[tcp/host:99999] has the port 99999",
+        ),
+        (("control", "--connect", "http://host"), 2, "[http://host] is not an endpoint: give HOST"),
+        (("status", "--connect", "no-such-host.invalid"), 1, "(no-such-host.invalid does not resolve)"),
         (("control", "--config", "nothing.json5"), 1, "--config nothing.json5: there is no such file"),
     ],
 )
@@ -532,6 +539,32 @@ def test_usage_errors_are_one_line(
     assert found == code
     assert error in text
     assert "Traceback" not in text
+
+
+def test_a_name_that_does_not_resolve_yet_is_named_once(
+    fleet: Fleet, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.bridge.fleet.network._RETRY_SECONDS", 0.05)
+    monkeypatch.setattr("minirospy.bridge.zenoh_library._CONNECT_MS", 50)
+    looks: list[object] = []
+
+    def unresolved(_: object) -> list[str]:
+        looks.append(1)
+        return ["robot.local"]
+
+    monkeypatch.setattr("minirospy.bridge.fleet.network.unresolved", unresolved)
+
+    async def opening() -> None:
+        task = asyncio.ensure_future(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
+        while len(looks) < 3:
+            await asyncio.sleep(0.02)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    fleet.run(opening())
+    assert [record.getMessage() for record in caplog.records] == [
+        f"nothing of the fleet answers at {fleet.endpoint} yet (robot.local does not resolve). Will keep trying."
+    ]
 
 
 def test_a_local_process_connects_to_nobody_else(

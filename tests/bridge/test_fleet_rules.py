@@ -23,7 +23,7 @@ from minirospy.bridge.fleet.frames import FrameRewriter, prefixed, stripped
 from minirospy.bridge.fleet.holders import HOLD_SECONDS
 from minirospy.bridge.fleet.keys import ROOT, Claim, Offer, ServiceToken, Stamp, TopicToken, Want
 from minirospy.bridge.fleet.lanes import Flow, FlowQueue
-from minirospy.bridge.fleet.network import is_loopback_endpoint, to_endpoint
+from minirospy.bridge.fleet.network import EndpointError, is_loopback_endpoint, to_endpoint
 from minirospy.bridge.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.bridge.fleet.rules import (
     GatewayRules,
@@ -378,6 +378,42 @@ def test_the_report_survives_any_answer() -> None:
     assert found[4] == "robot2: is there, but does not answer"
     assert json.loads(as_json(answers, rooms))["robots"][1]["shown"] is False
     assert json.loads(as_json(answers, []))["robots"][1]["shown"] is True
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("host:99999", "has the port 99999"),
+        ("tcp/host:0", "has the port 0"),
+        ("http://host", "is not an endpoint"),
+        ("http://host:7447", "is not an endpoint"),
+        ("tcp://host:7447", "is not an endpoint"),
+        ("/dev/ttyUSB0", "is not an endpoint"),
+        ("tcp/host", "has no port"),
+        ("tcp/host:7447x", "has no port"),
+        ("tcp/:7447", "no name and no address"),
+        ("tcp/ho$t:7447", "no name and no address"),
+        ("::1", "an IPv6 address is in brackets"),
+    ],
+)
+def test_endpoints_that_can_never_work_are_refused(text: str, reason: str) -> None:
+    with pytest.raises(EndpointError, match=reason):
+        to_endpoint(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "tcp/[fe80::1%eth0]:7447#iface=eth0",
+        "quic/host:7447?rel=1",
+        "unixsock-stream//tmp/x",
+        "serial//dev/ttyUSB0#baudrate=9600",
+        "tcp/host-1.local:1,host-2.local:2",
+    ],
+)
+def test_endpoints_of_zenoh_pass_as_they_are(text: str) -> None:
+    assert to_endpoint(text) == text
+    assert to_endpoint("tcp/0.0.0.0:0", listens=True) == "tcp/0.0.0.0:0"
 
 
 def test_endpoints_may_be_hosts() -> None:

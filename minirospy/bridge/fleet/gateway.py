@@ -24,6 +24,7 @@ from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.tasks import Faults
 from minirospy.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -75,6 +76,7 @@ class Gateway:
         self._declared: list[Later] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._faults = Faults(_log, "a task of the gateway")
+        self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
         """Open the session, which waits for a router where one is to be there. Needs no started node. Raises BridgeError."""
@@ -87,6 +89,8 @@ class Gateway:
         Raises BridgeError, MasterUnreachableError, RpcError, ROSInterruptException where the node is shut down before.
         """
         options = self.options
+        # A thousand robots have thousands of topics: a master that does not register them is one line.
+        self.node.registration_faults = RateLimitedLogger(self.node.log)
         await self._wait_for_network()
         network = self.network
         assert network
@@ -265,7 +269,7 @@ class Gateway:
             try:
                 await work
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
-                _log.warning("%s", error)
+                self._failures.warning("%s", error)
             except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
                 self._faults.report(error)
 

@@ -22,6 +22,7 @@ from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.master.heap import return_free_memory
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -42,8 +43,12 @@ _AGAIN_SECONDS = 5.0
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
+_MOST_PING = 64  # bytes of an answer to a ping, which has 8
 _CALL_SECONDS = 3600.0
 _CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
+TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # some 4 MB; links linger until then
+MAX_ROBOT_NAMES = 2_000  # of _MOST_IMPORTED that one robot may take
+NAMES_AT_ONCE = 100  # of a robot that are closed together: each is a task, and a call of the master
 MAX_LISTED = 5  # robots that one log line names
 LINES = 5  # log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
@@ -87,7 +92,9 @@ class Importer:
         self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
         self._node = node
         self._network = network
-        self._shared = Shared(node, network, definitions, sender, intake, gateway, rules, spawn, clock)
+        self._shared = Shared(
+            node, network, definitions, sender, intake, gateway, rules, spawn, clock, RateLimitedLogger(_log)
+        )
         self._rules = rules
         self._spawn = spawn
         self._clock = clock
@@ -95,10 +102,14 @@ class Importer:
         self._is_reconciling = False
         self._is_full = False
         self._left_out = RateLimitedLogger(_log)
+        self._clocks = RateLimitedLogger(_log, LINES)
         self._comings = RateLimitedLogger(_log, LINES)
         self._rivals = RateLimitedLogger(_log, LINES)
         self._waiting: tuple[Refused, ...] = ()
         """The gateways that were refused at the last look, so that each is named once."""
+        self._removed = 0
+        """Names that have been removed since memory was given back last."""
+        self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
         """The machine of each robot that was shown last."""
         self._challenging: set[str] = set()
@@ -134,8 +145,9 @@ class Importer:
         self._is_closed = True
         if self._parameter_changed in self._node.parameters.listeners:
             self._node.parameters.listeners.remove(self._parameter_changed)
-        if self._reconciling:
-            self._reconciling.cancel()
+        for timer in (self._reconciling, self._trimming):
+            if timer:
+                timer.cancel()
         watching, self._watching = self._watching, []
         for task in watching:
             task.cancel()
@@ -219,6 +231,7 @@ class Importer:
             ):
                 if isinstance(error, Exception):
                     self._faults.report(error)
+        self._trim_soon(sum(len(robot.topics) + len(robot.services) for robot in gone))
         for name, robot in robots.items():
             if name not in self.robots:
                 self.robots[name] = ImportedRobot(robot)
@@ -269,9 +282,9 @@ class Importer:
         """Log each gateway that another one keeps from a name, once; check whether the other one of a machine still answers."""
         known, self._waiting = set(self._waiting), self.contents.waiting
         for refused in self._waiting:
-            if refused in known or refused.holder is None:
-                continue
             claim, holder = refused
+            if refused in known or holder is None:
+                continue
             if claim.host == holder.host:
                 self._challenge(refused)
             elif claim.name in self.contents.holders.machines:
@@ -340,16 +353,23 @@ class Importer:
             if (
                 topic not in shown.topics
                 and self._rules.topics(f"/{token.robot}{topic}")
-                and self._has_room()
+                and self._has_room(shown)
             ):
                 imported = shown.topics[topic] = ImportedTopic(self._shared, token, lambda: shown.clock)
                 imported.start()
         for service, service_token in robot.services.items():
             name = f"/{robot.claim.name}{service}"
-            if service not in shown.services and self._rules.services(name) and self._has_room():
+            if service not in shown.services and self._rules.services(name) and self._has_room(shown):
                 shown.services[service] = service_token, self._serve(name, service_token, shown.left)
 
-    def _has_room(self) -> bool:
+    def _has_room(self, shown: ImportedRobot) -> bool:
+        if len(shown.topics) + len(shown.services) >= MAX_ROBOT_NAMES:
+            self._left_out.warning(
+                "robot [%s] has more than %d topics and services: the others are not shown. Give it --topics or --services",
+                shown.robot.claim.name,
+                MAX_ROBOT_NAMES,
+            )
+            return False
         count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
         if count < _MOST_IMPORTED:
             return True
@@ -361,12 +381,25 @@ class Importer:
             )
         return False
 
+    def _trim_soon(self, removed: int) -> None:
+        """Give the memory of names that have been removed back to the system, a while later: links linger until then."""
+        self._removed += removed
+        if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
+            loop = asyncio.get_running_loop()
+            self._trimming = loop.call_later(TRIM_SECONDS, self._trim)
+
+    def _trim(self) -> None:
+        self._removed, self._trimming = 0, None
+        asyncio.get_running_loop().run_in_executor(None, return_free_memory)
+
     async def _remove(self, shown: ImportedRobot) -> None:
         shown.left.set()
-        await asyncio.gather(
-            *(topic.close() for topic in shown.topics.values()),
-            *(offered.close() for _, offered in shown.services.values()),
-        )
+        parts: list[ImportedTopic | RawService] = [
+            *shown.topics.values(),
+            *(offered for _, offered in shown.services.values()),
+        ]
+        for first in range(0, len(parts), NAMES_AT_ONCE):
+            await asyncio.gather(*(part.close() for part in parts[first : first + NAMES_AT_ONCE]))
 
     def _serve(self, name: str, token: ServiceToken, left: asyncio.Event) -> RawService:
         key = call_key(token.robot, token.gateway, token.service, token.md5sum)
@@ -419,7 +452,7 @@ class Importer:
         """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
         start = f"{ROOT}/ping/"
         try:
-            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS)
+            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MOST_PING)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
             return None
@@ -441,7 +474,7 @@ class Importer:
         before, found = shown.clock, offset_of(pings)
         shown.clock = found or before
         if found and abs(found.offset) > _WARN_OFFSET + found.round_trip and before is None:
-            _log.warning(
+            self._clocks.warning(
                 "the clock of robot [%s] is %.3f s %s this one: times in its messages are its own",
                 shown.robot.claim.name,
                 abs(found.offset) / 1e9,

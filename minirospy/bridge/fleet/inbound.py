@@ -18,6 +18,7 @@ from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, ServiceToken, TopicT
 from minirospy.bridge.fleet.network import QueryFailed
 from minirospy.errors import DeserializationError, ROSException, ServiceException
 from minirospy.idl.protocols import Message
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -78,6 +79,7 @@ class InboundTopic:
         self._rewriter: FrameRewriter | None = None
         self._is_ready = False
         self._is_closed = False
+        self._misfits = RateLimitedLogger(_log)
         self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
 
     @property
@@ -153,7 +155,7 @@ class InboundTopic:
                 on_change=self._on_change,
             )
         except ValueError as error:
-            _log.warning("%s", error)
+            self._misfits.warning("%s", error)
             return
         self._publisher = publisher
         await publisher._wait_for_expected()

@@ -18,7 +18,7 @@ from minirospy.errors import WireError
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi
-from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription
+from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription, Unreachable
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, tcp
@@ -79,6 +79,7 @@ class Node:
 
         self._readers = ReaderSet()
         self._header_memory = tcp.HeaderMemory()
+        self._unreachable = Unreachable()
         self._rpc = AsyncRpcClient(same_host=environment.same_host)
         tables: Mapping[str, Mapping[str, Publication | Subscription | ServiceServer]] = {
             "Publisher": self.publications,
@@ -225,6 +226,7 @@ class Node:
             on_loop=on_loop,
             header_memory=self._header_memory,
             this_host=self.this_host,
+            unreachable=self._unreachable,
         )
 
     async def subscribe(self, subscription: Subscription) -> None:

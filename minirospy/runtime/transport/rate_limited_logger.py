@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import TYPE_CHECKING
 
 from minirospy.escape import escaped
+
+if TYPE_CHECKING:
+    import asyncio
 
 __all__ = ["RateLimitedLogger"]
 
@@ -32,6 +36,15 @@ class RateLimitedLogger:
     def info(self, text: str, *args: object) -> None:
         """Log what is no fault, or count it."""
         self._write(logging.INFO, text, args)
+
+    def close_later(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Have :meth:`close` called when the current ten seconds are over, if the line before was the first to be omitted."""
+        if self._omitted == 1:
+            loop.call_later(max(0.0, self._end - time.monotonic()), self.close)
+
+    def critical(self, text: str, *args: object) -> None:
+        """Log a fatal error, or count it."""
+        self._write(logging.CRITICAL, text, args)
 
     def error(self, text: str, *args: object) -> None:
         """Log an error, or count it."""

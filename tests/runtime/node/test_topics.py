@@ -281,6 +281,35 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     assert advice in lines[0]
 
 
+@pytest.mark.parametrize(
+    ("count", "topics"),
+    [
+        (1, "/t0"),
+        (5, "/t0, /t1, /t2, /t3, /t4"),
+        (6, "/t0, /t1, /t2, /t3, /t4 and 1 more topic"),
+        (40, "/t0, /t1, /t2, /t3, /t4 and 35 more topics"),
+    ],
+)
+def test_a_publisher_of_many_topics_that_cannot_be_reached_is_one_line(
+    count: int, topics: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uri = "http://127.0.0.1:1/"
+
+    async def scene() -> None:
+        # Until the node closes.
+        monkeypatch.setattr("minirospy.runtime.node.topics.TOGETHER_SECONDS", 1e6)
+        async with graph("/b") as (_, (b,)):
+            for number in range(count):
+                subscription = b.make_subscription(f"/t{number}", STRING, Box())
+                b.subscriptions[subscription.topic] = subscription
+                subscription._plan.publishers_changed([uri])
+                subscription._retry(uri, TimeoutError("no answer"))
+
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert [line.partition(" at ")[0] for line in lines] == [f"cannot connect to the publisher of {topics}"]
+
+
 def test_many_publishers_that_cannot_be_reached_are_some_lines_and_a_number(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
