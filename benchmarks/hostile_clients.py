@@ -79,6 +79,11 @@ def attacks() -> dict[str, Attack]:
     small_cbor = b"\x9a" + struct.pack("!I", 250_000) + bytes(250_000)
     cbor = b"\x9a" + struct.pack("!I", 990_000) + bytes(990_000)
     small_json = b"[" + b"[]," * 80_000 + b"0]"
+    many = (
+        b'{"op":"subscribe","subscriptions":['
+        + b'{"id":1,"channelId":999},' * 2500
+        + b'{"id":1,"channelId":9}]}'
+    )
     big_json = b"[" + b"[]," * 330_000 + b"0" + b",1" * 5_700_000 + b"]"
     return {
         "empty continuations": Attack(
@@ -88,6 +93,11 @@ def attacks() -> dict[str, Attack]:
         "pings, unread": Attack("page", b"", _filled(frame(9, bytes(125))), reads=False),
         "small texts": Attack("page", b"", _filled(frame(1, b"{}"))),
         "small texts, unread": Attack("page", b"", _filled(frame(1, b"{}")), reads=False),
+        "JSON of 60 kB": Attack("rosbridge", b"", _filled(frame(1, b"[" + b"[]," * 20_000 + b"0]"))),
+        "CBOR of 60 kB": Attack(
+            "rosbridge", b"", _filled(frame(2, b"\x99" + struct.pack("!H", 60_000) + bytes(60_000)))
+        ),
+        "many subscriptions": Attack("page", b"", _filled(frame(1, many))),
         "JSON of 240 kB": Attack("rosbridge", b"", frame(1, small_json)),
         "JSON of 12.6 MB": Attack("rosbridge", b"", frame(1, big_json)),
         "CBOR of 250 kB": Attack("rosbridge", b"", frame(2, small_cbor)),
@@ -192,15 +202,15 @@ async def serve() -> None:
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.dashboard.dashboard import Dashboard
 
-    with contextlib.suppress(ImportError):  # older trees
-        from minirospy.bridge.serve import prefer_the_loop
-
-        prefer_the_loop()
     access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN, requires_token=True)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
     async with Node("bench_dashboard", rosout=False) as node:
         dashboard = Dashboard(node, options)
         await dashboard.start()
+        with contextlib.suppress(ImportError):  # older trees
+            from minirospy.bridge.serve import prefer_the_loop
+
+            prefer_the_loop()
         listeners = dashboard.bridge.listeners
         ports = {"page": listeners["foxglove"].port, "rosbridge": listeners["rosbridge"].port}
         print(json.dumps({"ports": ports, "uri": node._node.uri}), flush=True)

@@ -119,6 +119,14 @@ PAGES = [
 ]
 
 
+def tcp_pair() -> tuple[socket.socket, socket.socket]:
+    """Return two ends of a TCP connection: Unix sockets have no ports, which a request names."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        ours, _ = server.accept()
+    return ours, theirs
+
+
 class Kind(NamedTuple):
     """The inputs of one protocol: the first bytes of a connection, text messages and binary ones."""
 
@@ -149,18 +157,6 @@ def frame(payload: bytes, opcode: int) -> bytes:
     size = len(payload)
     head = bytes([opcode, 0x80 | size]) if size < 126 else bytes([opcode, 0xFE]) + struct.pack("!H", size)
     return head + bytes(4) + payload
-
-
-class Loopback(socket.socket):
-    """One end of a pair that has addresses, as a connection of a browser on this machine."""
-
-    def getpeername(self) -> tuple[str, int]:
-        """Return where the client is."""
-        return "127.0.0.1", 2
-
-    def getsockname(self) -> tuple[str, int]:
-        """Return where the bridge is."""
-        return "127.0.0.1", 1
 
 
 class Target:
@@ -196,8 +192,7 @@ class Target:
         assert self._parts
         bridge = self._parts[2]
         listener = bridge.listeners[kind]
-        pair, theirs = socket.socketpair()
-        ours = Loopback(fileno=pair.detach())
+        ours, theirs = tcp_pair()
         ours.setblocking(False)
 
         with theirs:

@@ -86,6 +86,14 @@ def _pass_options(parser: Parser) -> None:
         completer="nothing",
     )
     parser.add_argument(
+        "--stop-after",
+        type=float,
+        default=0.5,
+        metavar="SECONDS",
+        help="publish a zero after velocities from the fleet that stop coming (0.5; 0: never)",
+        completer="nothing",
+    )
+    parser.add_argument(
         "--ros1-keys",
         nargs="?",
         const="*",
@@ -191,9 +199,12 @@ def _gateway(
     rate: Sequence[str],
     priority: Sequence[str],
     ros1_keys: str | None,
+    stop_after: float,
     params: Sequence[str] = (),
     frames: bool = False,
 ) -> int:
+    if not 0.0 <= stop_after <= 60.0:
+        raise Misuse(f"--stop-after {stop_after:g} is not between 0 and 60")
     network = _network(connect, listen, config, scout)
 
     from minirospy.bridge.access import NameFilter
@@ -210,6 +221,7 @@ def _gateway(
         rates=parse_rates(rate),
         lanes=parse_lanes(priority),
         has_frames=frames,
+        stop_seconds=stop_after,
     )
     namespace = "" if ros1_keys is None else parse_namespace(ros1_keys)
     options = GatewayOptions(name, imports or not name, namespace, network, rules)
@@ -238,9 +250,22 @@ def _control(
     rate: Sequence[str],
     priority: Sequence[str],
     ros1_keys: str | None,
+    stop_after: float,
 ) -> int:
     return _gateway(
-        "", True, connect, listen, config, scout, topics, services, robots, rate, priority, ros1_keys
+        "",
+        True,
+        connect,
+        listen,
+        config,
+        scout,
+        topics,
+        services,
+        robots,
+        rate,
+        priority,
+        ros1_keys,
+        stop_after,
     )
 
 

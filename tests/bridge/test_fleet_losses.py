@@ -7,15 +7,20 @@ import importlib
 import json
 import os
 import signal
+import socket
+import struct
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
+from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64, String
 
@@ -622,3 +627,90 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
     start(*words, "--listen", f"127.0.0.1:{free_port()}")
     assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
     assert ended(running)[0] == 0
+
+
+def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> None:
+    """The link is cut, and the loop of the robot's gateway is blocked: the zero needs neither."""
+    robot, control = fleet.place(), fleet.place()
+    control.gateway(listens=True)
+    proxy = Proxy(fleet, fleet.endpoint)
+    gateway = robot.gateway("robot1", endpoint=proxy.endpoint)
+    assert gateway.exporter
+    inbound = gateway.exporter.inbound
+    base = RawSubscriber()
+    try:
+        collect(fleet, robot, "/cmd_vel", Twist)
+        fleet.until_shown(control, "/robot1/cmd_vel")
+        commands = publisher(fleet, control, "/robot1/cmd_vel", Twist)
+        fleet.run(commands.wait_for_subscribers(1, SECONDS))
+        message = Twist()
+        message.linear.x = 0.5
+        driving = threading.Event()
+
+        async def drive() -> None:
+            while not driving.is_set():
+                await commands.publish(message)
+                await asyncio.sleep(0.02)
+
+        task = fleet.call(lambda: asyncio.ensure_future(drive()))
+        fleet.until(lambda: "/cmd_vel" in inbound and inbound["/cmd_vel"].passed > 2)
+        base.connect(gateway.node._node.uri)
+        base.until(lambda twist: twist.linear.x == 0.5)
+        base.until(lambda twist: twist.linear.x == 0.5)
+        released, blocked = threading.Event(), threading.Event()
+
+        def block() -> None:
+            blocked.set()
+            released.wait()
+
+        # All loops of the test are this one; the intake and the guard have their threads.
+        proxy.cut()
+        fleet.loop.loop.call_soon_threadsafe(block)
+        try:
+            assert blocked.wait(SECONDS)
+            base.until(lambda twist: twist.linear.x == 0.0)
+        finally:
+            driving.set()
+            released.set()
+        fleet.run(asyncio.wait_for(task, SECONDS))
+    finally:
+        base.close()
+        proxy.mend()
+        fleet.run(proxy.close())
+
+
+class RawSubscriber:
+    """A robot's base with no event loop: a subscriber of /cmd_vel by XML-RPC and TCPROS."""
+
+    def __init__(self) -> None:
+        self._socket: socket.socket | None = None
+
+    def connect(self, uri: str) -> None:
+        with ServerProxy(uri) as node:
+            answer: Any = node.requestTopic("/base", "/cmd_vel", [["TCPROS"]])
+        self._socket = socket.create_connection((answer[2][1], answer[2][2]), SECONDS)
+        fields = {"callerid": "/base", "topic": "/cmd_vel", "type": Twist._type, "md5sum": Twist._md5sum}
+        parts = [f"{name}={value}".encode() for name, value in fields.items()]
+        header = b"".join(struct.pack("<I", len(part)) + part for part in parts)
+        self._socket.sendall(struct.pack("<I", len(header)) + header)
+        self._frame()
+
+    def until(self, is_right: Callable[[Twist], bool]) -> None:
+        while not is_right(Twist().deserialize(self._frame())):
+            pass
+
+    def close(self) -> None:
+        if self._socket:
+            self._socket.close()
+
+    def _frame(self) -> bytes:
+        return self._exactly(struct.unpack("<I", self._exactly(4))[0])
+
+    def _exactly(self, size: int) -> bytes:
+        assert self._socket
+        data = b""
+        while len(data) < size:
+            more = self._socket.recv(size - len(data))
+            assert more
+            data += more
+        return data

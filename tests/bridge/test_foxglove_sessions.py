@@ -510,3 +510,18 @@ def test_topic_subscribed_again_in_the_same_turn_goes_on(bridge: Running) -> Non
         graph.unsubscribe("/again", second)
 
     bridge.run(asyncio.wait_for(wait(), 30))
+
+
+def test_faults_of_one_message_are_reported_up_to_a_limit(bridge: Running) -> None:
+    client = bridge.client()
+    client.send(op="subscribe", subscriptions=[{"id": 1, "channelId": 999_999}] * 2000)
+    client.send(op="getParameters", parameterNames=["/none"], id="behind")
+    texts = []
+    while (fields := client._next(lambda each: isinstance(each, dict)))["op"] != "parameterValues":  # type: ignore[call-overload]
+        if fields["op"] == "status":  # type: ignore[call-overload]
+            texts.append(fields["message"])  # type: ignore[call-overload]
+    assert texts[:99] == ["Channel 999999 is not available; ignoring subscription 1"] * 99
+    assert texts[99] == "further faults of this message are not reported"
+    assert len(texts) < 102
+    client.send(op="subscribe", subscriptions=[{"id": 1, "channelId": 999_999}])
+    assert "is not available" in client.next("status")["message"]

@@ -203,6 +203,9 @@ def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Run
             continue
         with pytest.raises(ConnectionClosed, match=r"1009.*exceeds limit of 65536"):
             client.next("status", id="large")
+        client = bridge.rosbridge(path=f"/?token={opening}")
+        client.socket.send(cbor2.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 9000}))
+        assert "bytes of CBOR is too large: this token is read-only" in client.next("status")["msg"]
         # Nor in parts.
         client = bridge.rosbridge(path=f"/?token={opening}")
         text = json.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 25_000})

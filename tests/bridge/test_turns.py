@@ -102,6 +102,26 @@ def test_client_that_sends_little_waits_for_a_slice_of_each_other_at_most(weight
     assert max(waits) <= most
 
 
+def test_client_that_sends_little_does_not_wait_for_the_first_long_message_of_each_other() -> None:
+    machine = Machine()
+    machine.join("good", 0.0002)
+    for _ in range(20):
+        machine.send("good", 1)
+        machine.now += 0.05
+    names = [f"bad{number}" for number in range(250)]
+    for name in names:
+        machine.join(name, 0.014)
+        machine.send(name, 100_000)
+    for _ in range(50):
+        machine.send("good", 1)
+        before = len(machine.done)
+        while "good" not in machine.done[before:]:
+            machine.iterate()
+        assert machine.done[before:].index("good") <= 12
+        for _ in range(3):
+            machine.iterate()
+
+
 def test_new_client_is_not_preferred_to_one_that_has_been_idle() -> None:
     machine = Machine()
     machine.join("good", 0.0001)

@@ -494,6 +494,26 @@ def test_frames_of_any_kind_count_toward_the_rate(kind: str) -> None:
     pipe.resume.assert_called()
 
 
+def test_client_that_reads_at_once_is_sent_to_in_turns() -> None:
+    loop, connection, pipe = connected(Limits(), 0.0)
+    sent = 0
+
+    def write(pieces: list[bytes]) -> None:
+        nonlocal sent
+        sent += sum(map(len, pieces))
+
+    pipe.write.side_effect = write
+    for _ in range(1000):
+        connection.answer((bytes(10_000),))
+    loop.iterate()
+    assert 1_000_000 <= sent <= 1_400_000
+    iterations = 1
+    while sent < 10_000_000:
+        loop.iterate()
+        iterations += 1
+    assert 7 <= iterations <= 10
+
+
 def test_client_that_reads_no_pongs_leaves_the_newest_waiting() -> None:
     _, connection, pipe = connected(Limits(), 0.0)
     pipe.is_full = True

@@ -220,7 +220,12 @@ class Exporter:
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:
             inbound = self.inbound[topic] = InboundTopic(
-                self._node, self._definitions, token, self._spawn, self._rules.has_frames
+                self._node,
+                self._definitions,
+                token,
+                self._spawn,
+                self._rules.has_frames,
+                stop_seconds=self._rules.stop_seconds,
             )
         return inbound
 

@@ -16,7 +16,9 @@ from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.frames import FrameRewriter, stripped
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, ServiceToken, TopicToken
 from minirospy.bridge.fleet.network import QueryFailed
-from minirospy.errors import DeserializationError, ROSException, ServiceException
+from minirospy.bridge.fleet.rules import STOP_SECONDS
+from minirospy.bridge.fleet.stopping import CommandStream
+from minirospy.errors import BridgeError, DeserializationError, ROSException, ServiceException
 from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
@@ -61,8 +63,12 @@ class InboundTopic:
         *,
         headers: Mapping[str, str] | None = None,
         on_change: Callable[[], object] | None = None,
+        stop_seconds: float = STOP_SECONDS,
     ) -> None:
-        """``headers``: fields for the connection header; ``on_change``: of :meth:`Node.advertise`."""
+        """``headers``: fields for the connection header; ``on_change``: of :meth:`Node.advertise`.
+
+        After ``stop_seconds`` without a command a stream of velocities is followed by a zero; 0: it is not.
+        """
         self.token = token
         self.passed = 0
         self._node = node
@@ -81,6 +87,8 @@ class InboundTopic:
         self._is_closed = False
         self._misfits = RateLimitedLogger(_log)
         self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
+        self._stream: CommandStream | None = None
+        self._stop_seconds = stop_seconds
 
     @property
     def is_idle(self) -> bool:
@@ -125,6 +133,9 @@ class InboundTopic:
         publisher, self._publisher = self._publisher, None
         self._is_ready = False
         self._is_closed = True
+        if self._stream:
+            with contextlib.suppress(ROSException):  # the node has ended
+                self._stream.close()
         if publisher:
             if self._on_change is not None and self._on_change in publisher.on_change:
                 publisher.on_change.remove(self._on_change)
@@ -157,6 +168,10 @@ class InboundTopic:
         except ValueError as error:
             self._misfits.warning("%s", error)
             return
+        if self._stop_seconds and CommandStream.guards(self.token.type):
+            self._stream = CommandStream(
+                self.token.topic, self.token.type, publisher.publish_raw, self._stop_seconds
+            )
         self._publisher = publisher
         await publisher._wait_for_expected()
         # What was held goes first: until then the intake's thread hands over to `hold`, which is on this loop.
@@ -170,8 +185,11 @@ class InboundTopic:
         try:
             if self._rewriter:
                 body = self._rewriter.rewritten(body, self._change)
-            publisher.publish_raw(body)
-        except (ROSException, DeserializationError) as error:
+            if self._stream:
+                self._stream.publish(body)
+            else:
+                publisher.publish_raw(body)
+        except (ROSException, DeserializationError, BridgeError) as error:
             _log.debug("a message to %s: %s", self.token.topic, error)
         else:
             self.passed += 1

@@ -155,6 +155,7 @@ class Ros1Topic:
                 strips_frames=False,
                 headers={MARK: "1"},
                 on_change=self._adjust,
+                stop_seconds=shared.rules.stop_seconds,
             )
         return self.inbound
 

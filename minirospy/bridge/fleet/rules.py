@@ -57,6 +57,9 @@ _BULK_TYPES = {
 }
 
 
+STOP_SECONDS = 0.5  # without a command before a zero is published; two commands closer than this are a stream
+
+
 @dataclass(frozen=True)
 class GatewayRules:
     """What a gateway may pass on, and how. ``rates`` (Hz) and ``lanes`` by patterns of names: the first that matches counts."""
@@ -68,6 +71,8 @@ class GatewayRules:
     rates: Sequence[tuple[str, float]] = ()
     lanes: Sequence[tuple[str, Lane]] = ()
     has_frames: bool = False
+    stop_seconds: float = STOP_SECONDS
+    """A stream of velocities that comes here and ends is followed by a zero after this; 0: it is not."""
 
     def rate(self, topic: str) -> float:
         """Return the most messages a second of a topic; 0 where it is not limited."""

@@ -37,6 +37,8 @@ _MOST_CHANNELS = 1000
 _MOST_PARAMETERS = 10_000
 """Names of parameters whose changes one client may subscribe to."""
 
+_MAX_STATUSES = 100  # about one message of a client: it may name thousands of channels that do not exist
+
 _TIME = "time"
 """The key under which the time waits for a slow client."""
 
@@ -54,6 +56,8 @@ class FoxgloveSession:
         self._calls: set[asyncio.Task[None]] = set()
         self._dropped = 0
         self._are_drops_shown = False
+        self._statuses = 0
+        # About the message that is handled now.
 
         self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
             protocol.Subscribe: self._subscribe,
@@ -138,6 +142,7 @@ class FoxgloveSession:
     # --- within
 
     def _handle(self, parse: Callable[[Any], Event], data: str | bytes) -> None:
+        self._statuses = 0
         try:
             event = parse(data)
             self._handlers[type(event)](event)
@@ -145,6 +150,12 @@ class FoxgloveSession:
             self._status(StatusLevel.ERROR, str(error))
 
     def _status(self, level: StatusLevel, text: str, id_: str | None = None) -> None:
+        if id_ is None:
+            self._statuses += 1
+            if self._statuses > _MAX_STATUSES:
+                return
+            if self._statuses == _MAX_STATUSES:
+                text = "further faults of this message are not reported"
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:

@@ -46,6 +46,8 @@ _MOST_SERVICES = 200
 _MOST_WAITING = 64_000_000
 """Calls under way, topics published or subscribed, services offered, bytes that wait for an earlier message: of a client."""
 
+_MAX_READ_ONLY_CBOR = 8 * 1024  # bytes: a client that subscribes needs less, and each may be a value
+
 _POLICY = 1008
 _FAILED = 1011
 
@@ -123,6 +125,9 @@ class RosbridgeSession:
 
     def received_binary(self, data: bytes) -> None:
         """Take over a CBOR message."""
+        if len(data) > _MAX_READ_ONLY_CBOR and not self.client.may_write:
+            self._refuse_large(data)
+            return
         self._received(data)
 
     def ended(self) -> None:
@@ -211,10 +216,7 @@ class RosbridgeSession:
         """Parse a large message in a thread, so that no other client waits for it; nothing more is read meanwhile."""
         if not self.client.may_write:
             # What joined fragments or a PNG make: a message of this size is refused by the connection.
-            self.status(
-                StatusLevel.ERROR,
-                f"a message of {len(data)} characters is too large: this token is read-only",
-            )
+            self._refuse_large(data)
             return None
         self.client.pause()
         return _Pending(None, self._carry_out_large(data))
@@ -233,6 +235,12 @@ class RosbridgeSession:
         finally:
             self._is_large = False
             self.client.resume()
+
+    def _refuse_large(self, data: str | bytes) -> None:
+        what = "characters" if isinstance(data, str) else "bytes of CBOR"
+        self.status(
+            StatusLevel.ERROR, f"a message of {len(data)} {what} is too large: this token is read-only"
+        )
 
     def _unreadable(self, error: BridgeError) -> None:
         self.status(StatusLevel.ERROR, str(error), error.id if isinstance(error, OperationError) else None)

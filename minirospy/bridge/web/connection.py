@@ -37,6 +37,7 @@ from minirospy.bridge.web.client import (
     frame_head,
     response_head,
 )
+from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.bridge.web.turns import WRITER_WEIGHT
 from minirospy.escape import escaped
@@ -62,6 +63,7 @@ _log = logging.getLogger(__name__)
 
 _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
+_PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
 _PONG = 0x8A
 
 
@@ -139,6 +141,9 @@ class Connection:
         if self.exchange:
             return  # one request a connection
         self._protocol.feed(data)
+        # A large message is read in large pieces, unless other clients wait for their turns.
+        is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
+        self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
         if self._is_held_back or self._is_paused or self._site.turns.start(self._share):
             self._pipe.pause()
         self._count_unfinished()
@@ -229,15 +234,20 @@ class Connection:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
+        protocol, time_of = self._protocol, self._loop.time
+        now, most = time_of(), self._limits.messages_a_second
+        if now - self._second >= 1.0:
+            self._second, self._in_second = now, 0
         while self.client and not self._is_closing and not self._is_paused:
-            if self._is_over_rate():
+            if self._in_second >= most:
+                self._hold_back(self._second + 1.0 - now)
                 break
-            frame = self._protocol.next_frame()
+            frame = protocol.next_frame()
             if frame is None:
                 break
             self._in_second += 1
             self._framed(frame)
-            if self._loop.time() >= end and self._protocol.reader.buffer and not self._is_closing:
+            if time_of() >= end and protocol.reader.buffer and not self._is_closing:
                 return True
         if self.client and not self._is_over:
             self._answer_protocol()
@@ -407,18 +417,12 @@ class Connection:
         self._worked_on = 0
         self._count_unfinished()
 
-    def _is_over_rate(self) -> bool:
-        """Return whether a client has sent what it may in this second; then it is read again in the next one."""
-        now = self._loop.time()
-        if now - self._second >= 1.0:
-            self._second, self._in_second = now, 0
-        if self._in_second < self._limits.messages_a_second:
-            return False
+    def _hold_back(self, seconds: float) -> None:
+        """Read a client that has sent what it may in this second again in the next one."""
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
-        self._loop.call_later(self._second + 1.0 - now, self._go_on)
-        return True
+        self._loop.call_later(seconds, self._go_on)
 
     def _go_on(self) -> None:
         self._is_held_back = False
@@ -435,7 +439,11 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
+        written = 0
         while not self._pipe.is_full:
+            if written >= _PUMP_BYTES:
+                self._schedule()
+                return
             batch: list[Piece] = []
             size = 0
             while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES:
@@ -449,6 +457,7 @@ class Connection:
                     self._pipe.close()
                 return
             self._progressed = self._loop.time()
+            written += size
             self._pipe.write(batch)
             if self._is_over:
                 return
@@ -504,8 +513,8 @@ class _FrameByFrame(ServerProtocol):
         """Return the next frame that has come whole, None if there is none."""
         self.reader.is_open = True
         next(self.parser)
-        events = self.events_received()
-        return events[0] if events and isinstance(events[0], Frame) else None
+        event = self.events.pop() if self.events else None
+        return event if isinstance(event, Frame) else None
 
     def limit(self, size: int) -> None:
         """Refuse larger messages from now on."""
@@ -534,10 +543,10 @@ class _GatedReader(StreamReader):
     is_open = False
 
     def at_eof(self) -> Generator[None, None, bool]:
-        """See the library's: called by the parser before each frame."""
-        while not self.is_open:
+        """See the library's: called by the parser before each frame. The end of the stream is the pipe's."""
+        while not (self.is_open and self.buffer):
             yield
-        return (yield from super().at_eof())
+        return False
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:

@@ -15,9 +15,10 @@ from typing import NamedTuple, Protocol
 
 from minirospy.bridge.web.queue import Piece
 
-__all__ = ["Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
+__all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
-_RECEIVE = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
+SMALL_READ = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
+LARGE_READ = 256 * 1024  # of a client that is alone with a large message
 _MOST_PIECES = 128
 """Pieces of one call of sendmsg; a system takes 1024 at most."""
 
@@ -44,7 +45,12 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet."""
+    """One connection. ``is_full``: what was written is not with the kernel yet.
+
+    ``read_bytes``: how many to take from the kernel at a time, where that can be chosen.
+    """
+
+    read_bytes: int
 
     @property
     def is_full(self) -> bool: ...
@@ -68,6 +74,7 @@ class PlainPipe:
     """A TCP connection."""
 
     def __init__(self, sock: socket.socket, loop: asyncio.AbstractEventLoop, events: PipeEvents) -> None:
+        self.read_bytes = SMALL_READ
         self._sock = sock
         self._loop = loop
         self._events = events
@@ -122,7 +129,7 @@ class PlainPipe:
 
     def _readable(self) -> None:
         try:
-            data = self._sock.recv(_RECEIVE)
+            data = self._sock.recv(self.read_bytes)
         except (BlockingIOError, InterruptedError):
             return
         except OSError:
@@ -191,6 +198,7 @@ class TlsPipe(asyncio.Protocol):
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
         self._connected = connected
+        self.read_bytes = LARGE_READ  # asyncio's own size
         self._events: PipeEvents | None = None
         self._transport: asyncio.Transport | None = None
         self._is_paused = False

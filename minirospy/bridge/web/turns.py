@@ -2,10 +2,10 @@
 
 Every client has a :class:`Share`, whose ``work`` handles what the client has sent. Work starts immediately while the clients
 together use less than half of the time; beyond that it is queued, and each iteration of the loop handles a few
-milliseconds of it. The order is start-time fair queueing: a client's tag is the time that it has used, and a client that was
-idle starts at the tag that is served now. So a client that uses less than its part of the time waits at most for one slice of
-each other client. A client that may write has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time
-Fair Queueing, SIGCOMM 1996.
+milliseconds of it. The order is fair queueing: a client's tag is the time that it has used, a client that was idle starts at
+the tag that is served now, and the one goes first that will end first, if its work takes as long as before. So a client that uses
+less than its part of the time waits at most for one slice of each other client, and not for long messages of others. A client
+that may write has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time Fair Queueing, SIGCOMM 1996.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import itertools
 import logging
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 __all__ = ["WRITER_WEIGHT", "FairTurns", "Share", "cpu_meter"]
 
@@ -23,6 +24,8 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # of each iteration of the loop, for the queued work of all clients together
 SLICE_SECONDS = 0.0001  # of one client before the next client's work: 250 of them are a wait of 25 ms
 WRITER_WEIGHT = 16.0  # of a client that may drive a robot: it goes before clients that may only look
+NEW_PIECES = 8  # of work, by which a client is known; before it is expected to do as the last new clients did
+EXPECTED_DECAY = 0.9  # of what is expected, with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
 
 Work = Callable[[float], bool]
@@ -32,15 +35,29 @@ Work = Callable[[float], bool]
 class Share:
     """The part of the loop that one client has used."""
 
-    __slots__ = ("is_closed", "is_queued", "tag", "weight", "work")
+    __slots__ = ("expected", "is_closed", "is_queued", "pieces", "tag", "weight", "work")
 
     def __init__(self, work: Work, tag: float) -> None:
         self.work = work
         self.tag = tag
         """Seconds that the client has used, by its weight; at least the tag that was served when it last started."""
         self.weight = 1.0
+        self.expected = 0.0
+        """Seconds that its next piece of work may take, from those before."""
+        self.pieces = 0
+        """Pieces of work that were done, while the client is new."""
         self.is_queued = False
         self.is_closed = False
+
+
+class _Entry(NamedTuple):
+    """Work that is queued, in its order: the tag at which it may end; what breaks a tie; the tag at which it starts."""
+
+    end: float
+    used: float
+    number: int
+    start: float
+    share: Share
 
 
 class FairTurns:
@@ -69,13 +86,20 @@ class FairTurns:
         self._credit = turn
         # Seconds of work that may start without being queued.
         self._credited = clock()
-        self._queue: list[tuple[float, float, int, Share]] = []
+        self._new_expected = slice_
+        # Seconds that a piece of work of a new client may take.
+        self._queue: list[_Entry] = []
         self._numbers = itertools.count()
         self._is_running = self._is_scheduled = False
 
     def __len__(self) -> int:
         """Return the number of clients whose work is queued."""
-        return sum(not share.is_closed for *_, share in self._queue)
+        return sum(not entry.share.is_closed for entry in self._queue)
+
+    @property
+    def is_busy(self) -> bool:
+        """Return whether a client waits for its turn."""
+        return bool(self._queue)
 
     def join(self, work: Work) -> Share:
         """Return the share of a new client: it has no advantage over clients that have been idle."""
@@ -93,10 +117,10 @@ class FairTurns:
             self._put(share)
             return True
 
-        start = self._clock()
-        if self._run(share, self._slice):
+        before = self._clock()
+        if self._run(share, max(share.tag, self._served)):
             self._put(share)
-        self._credit -= self._clock() - start
+        self._credit -= self._clock() - before
         return share.is_queued
 
     def _may_start_now(self) -> bool:
@@ -107,31 +131,41 @@ class FairTurns:
 
     def _put(self, share: Share) -> None:
         share.is_queued = True
-        # Of clients that start at the same tag the one that used less before goes first.
-        tag = max(share.tag, self._served)
-        heapq.heappush(self._queue, (tag, share.tag, next(self._numbers), share))
+        self._push(share, max(share.tag, self._served))
         if not self._is_scheduled:
             self._is_scheduled = True
             self._call_soon(self._turn)
+
+    def _push(self, share: Share, start: float) -> None:
+        # Of clients that would end at the same tag the one that used less before goes first.
+        end = self._end_of(share, start)
+        heapq.heappush(self._queue, _Entry(end, share.tag, next(self._numbers), start, share))
+
+    def _end_of(self, share: Share, start: float) -> float:
+        is_new = share.pieces < NEW_PIECES
+        return start + (max(share.expected, self._new_expected) if is_new else share.expected) / share.weight
 
     def _turn(self) -> None:
         self._is_scheduled = False
         end = self._clock() + self._turn_seconds
         while self._queue and self._clock() < end:
-            share = heapq.heappop(self._queue)[-1]
+            end_tag, *_, start, share = heapq.heappop(self._queue)
+            if self._end_of(share, start) > end_tag + self._slice:
+                self._push(share, start)  # more is expected of new clients than when it was queued
+                continue
             share.is_queued = False
-            if self._run(share, self._slice):
+            if self._run(share, start):
                 self._put(share)
         if self._queue and not self._is_scheduled:
             self._is_scheduled = True
             self._call_soon(self._turn)
 
-    def _run(self, share: Share, seconds: float) -> bool:
-        """Do some of a client's work; return whether more is left."""
+    def _run(self, share: Share, start: float) -> bool:
+        """Do some of a client's work, which starts at a tag; return whether more is left."""
         if share.is_closed:
             return False
-        end, start = self._clock() + seconds, self._meter()
-        self._served = max(self._served, share.tag)
+        end, before = self._clock() + self._slice, self._meter()
+        self._served = max(self._served, start)
         self._is_running = True
         is_left = False
         try:
@@ -139,7 +173,12 @@ class FairTurns:
         except Exception:  # noqa: BLE001 - a fault in one client's work must not end the turns of the others
             _log.exception("handling what a client has sent")
         self._is_running = False
-        share.tag = max(share.tag, self._served) + (self._meter() - start) / share.weight
+        used = self._meter() - before
+        share.tag = start + used / share.weight
+        share.expected = max(used, EXPECTED_DECAY * share.expected)
+        if share.pieces < NEW_PIECES:
+            share.pieces += 1
+            self._new_expected = max(used, EXPECTED_DECAY * self._new_expected, self._slice)
         return is_left and not share.is_closed
 
 
