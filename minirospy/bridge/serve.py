@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.installation import install_command
+from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.signal_dispatch import interrupt_signals
 
@@ -86,6 +87,7 @@ def run(
     ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
     it would import message classes.
     """
+    return_large_blocks()
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv

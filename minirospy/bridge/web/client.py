@@ -6,9 +6,12 @@ import http
 import struct
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from minirospy.bridge.access import Credentials, Grant, Refusal
+from minirospy.bridge.web.account import MAX_BYTES, Account
+from minirospy.bridge.web.files import FileAnswer
 from minirospy.bridge.web.queue import DEFAULT_LIMIT, Piece, SendQueue
 
 if TYPE_CHECKING:
@@ -51,8 +54,8 @@ class Limits:
     """
 
     message: int = 64_000_000
-    unfinished: int = 256_000_000
-    """Bytes of messages that have not arrived whole yet, of all clients."""
+    memory: int = MAX_BYTES
+    """Bytes that are held for all clients together: see account.py."""
     messages_a_second: int = 20_000
     queue: int = DEFAULT_LIMIT
     connections: int = 256
@@ -114,7 +117,8 @@ class Site(Protocol):
 
     def page(self, path: str) -> HttpHandler | None: ...
 
-    def unfinished_grew(self, count: int) -> None: ...
+    @property
+    def account(self) -> Account: ...
 
     def left(self, connection: Connection) -> None: ...
 
@@ -164,6 +168,16 @@ class WebClient:
     def send_binary(self, *pieces: Piece) -> None:
         """Send an answer as one binary message; it is never dropped."""
         self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
+
+    def send_file(self, answer: FileAnswer) -> None:
+        """Send a file as one binary message, read in pieces when its turn comes; ``answer`` is without frames."""
+        self._connection.answer_file(
+            FileAnswer(answer.open, partial(_file_head, answer), partial(_file_failure, answer))
+        )
+
+    def holds(self, count: int) -> None:
+        """Count the bytes that the session keeps of the client: of messages that wait for others, or are handled."""
+        self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
         """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
@@ -233,6 +247,16 @@ class Exchange:
     def end(self) -> None:
         """End the answer after what waits."""
         self._connection.close_when_sent()
+
+
+def _file_head(answer: FileAnswer, size: int) -> bytes:
+    head = answer.head(size)
+    return frame_head(_BINARY, len(head) + size) + head
+
+
+def _file_failure(answer: FileAnswer, why: str) -> bytes:
+    message = answer.failure(why)
+    return frame_head(_BINARY, len(message)) + message
 
 
 def frame_head(opcode: int, length: int) -> bytes:

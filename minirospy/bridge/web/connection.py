@@ -23,6 +23,7 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
+from minirospy.bridge.json_text import size_in_memory
 from minirospy.bridge.web.client import (
     PLAIN_HEADERS,
     Door,
@@ -35,6 +36,7 @@ from minirospy.bridge.web.client import (
     WebClient,
     response_head,
 )
+from minirospy.bridge.web.files import FileAnswer, FileSender
 from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.escape import escaped
 
@@ -79,7 +81,8 @@ class Connection:
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         self.peer = peer
-        self.queue = SendQueue(site.limits.queue)
+        self.share = site.account.open(peer, self._shed)
+        self.queue = SendQueue(site.limits.queue, share=self.share)
         self.traffic = Traffic()
         self.session: Session | None = None
         self.client: WebClient | None = None
@@ -104,6 +107,12 @@ class Connection:
         self._is_scheduled = False
         self._is_closing = False
         self._is_over = False
+        self._file: FileSender | None = None
+        """The file that is being sent."""
+        self._writing: list[Piece] = []
+        """Pieces that the pipe has not written yet, while their large ones are counted."""
+        self._held = 0
+        """Bytes that the session keeps of the client."""
         self._second = 0.0
         self._in_second = 0
         self._received = loop.time()
@@ -174,6 +183,10 @@ class Connection:
         # The connection is part of reference cycles: what waited is freed now, not when they are collected.
         self.queue.clear()
         self._frames.clear()
+        if self._file:
+            self._file.close()
+        self._wrote()
+        self._site.account.close(self.share)
         self._site.left(self)
 
     # --- to the pipe
@@ -188,12 +201,22 @@ class Connection:
             self._abort()
             return
         self.queue.put_answer(pieces)
+        self._count()
         self._schedule()
+
+    def answer_file(self, answer: FileAnswer) -> None:
+        """Send a file, which is never dropped."""
+        if not self._is_closing:
+            self.queue.put_file(answer)
+            self._count()
+            self._schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
         """Send what may be dropped."""
         if not self._is_closing:
             self.queue.put(key, pieces, newest_only=newest_only)
+            if self._pipe.is_full:
+                self._count()
             self._schedule()
 
     def close_when_sent(self) -> None:
@@ -216,6 +239,12 @@ class Connection:
         _log.warning("%s: unfinished messages take too much memory: disconnected", self.peer)
         self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
         self._discard_unfinished()
+
+    def session_holds(self, count: int) -> None:
+        """Count what the session keeps of the client."""
+        self._held = count
+        if not self._is_over:
+            self._count()
 
     def abort(self) -> None:
         """End the connection now."""
@@ -283,6 +312,7 @@ class Connection:
         self._protocol.send_response(response)
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
+        self.share.is_owner = self.client.is_owner
         self._watch(self._ping)
         self.session = self._door.open(self.client)
 
@@ -378,6 +408,8 @@ class Connection:
         try:
             if self._opcode is Opcode.BINARY:
                 self.session.received_binary(data)
+            elif size_in_memory(data) > self._limits.message:
+                self.close_websocket(CloseCode.MESSAGE_TOO_BIG, "its wide characters take too much memory")
             else:
                 self.session.received_text(data.decode())
         except UnicodeDecodeError:
@@ -387,9 +419,38 @@ class Connection:
             self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on this message")
 
     def _count_unfinished(self) -> None:
-        grown = len(self._protocol.reader.buffer) + len(self._fragments) - self.unfinished
-        self.unfinished += grown
-        self._site.unfinished_grew(grown)
+        self.unfinished = len(self._protocol.reader.buffer) + len(self._fragments)
+        self._count()
+
+    def _count(self) -> None:
+        """Count in the account what the client holds alone; this may make clients give up memory, this one too."""
+        queue = self.queue
+        size = self.unfinished + self._held + queue.size + queue.answers - queue.large
+        if self._pipe.is_full:
+            size += max(0, self._pipe.unsent - sum(map(len, self._writing)))
+        self.share.set(size)
+
+    def _shed(self) -> None:
+        """Give up memory: messages that may be dropped, else the connection."""
+        if self.unfinished > self.queue.size + self.queue.answers and not self._held:
+            self.refuse_unfinished()
+            return
+        if self.queue.size:
+            self.queue.drop_messages()
+            self._count()
+            return
+        _log.warning("%s: the server holds too much memory for it: disconnected", self.peer)
+        self._discard_unfinished()
+        self._abort()
+        self.queue.clear()
+        self._held = 0
+        self._count()
+
+    def _wrote(self) -> None:
+        """Count the pieces that were with the pipe no more."""
+        if self._writing:
+            self.share.release(self._writing)
+            self._writing = []
 
     def _discard_unfinished(self) -> None:
         self._protocol.reader.buffer.clear()
@@ -425,15 +486,35 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
+        if not self._pipe.is_full:
+            self._wrote()
+        self._write()
+        if self.share.size and not self._is_over:
+            self._count()
+
+    def _write(self) -> None:
+        """Write what waits, as much of it as the pipe takes."""
         while not self._pipe.is_full:
             batch: list[Piece] = []
             size = 0
-            while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES:
+            while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:
                 pieces = self.queue.pop()
                 if pieces is None:
                     break
+                if isinstance(pieces, FileAnswer):
+                    self._file = FileSender(pieces, self._loop, self._pump)
+                    break
                 batch += pieces
                 size += sum(map(len, pieces))
+            if not batch and self._file:
+                piece = self._file.take()
+                if piece is None:
+                    if self._file.has_failed:
+                        self._abort()  # its size has been sent: what follows would be taken for the file
+                    return
+                batch.append(piece)
+                if self._file.is_done:
+                    self._file = None
             if not batch:
                 if self._is_closing:
                     self._pipe.close()
@@ -442,6 +523,9 @@ class Connection:
             self._pipe.write(batch)
             if self._is_over:
                 return
+            if self._pipe.is_full and not self._pipe.copies:
+                self._writing = batch
+                self.share.hold(batch)
 
     def _ping(self) -> None:
         """See whether the client is there: it answers a ping, or takes what is sent."""

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from minirospy.bridge.access import Access, Credentials, Grant, Refusal
+from minirospy.bridge.web.account import Account
 from minirospy.bridge.web.client import PLAIN_HEADERS, response_head
 from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
 from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
@@ -55,6 +56,7 @@ class Listener:
         pages: Mapping[str, HttpHandler] | None = None,
         public_pages: Mapping[str, HttpHandler] | None = None,
         tls: ssl.SSLContext | None = None,
+        account: Account | None = None,
         on_change: Callable[[int], object] = lambda _: None,
     ) -> None:
         """``pages``: path -> what answers it; ``public_pages`` need no token. ``on_change`` gets the number of connections."""
@@ -66,8 +68,8 @@ class Listener:
         self.rate = ConnectionRate(
             self.limits.connections_a_second, self.limits.connection_burst, time.monotonic
         )
-        self._unfinished = 0
-
+        self.account = account or Account(self.limits.memory)
+        """The memory of all clients, also of other listeners of the server."""
         self.host = ""
         self.port = 0
         self._access = access
@@ -140,12 +142,6 @@ class Listener:
     def page(self, path: str) -> HttpHandler | None:
         """Return what answers a path."""
         return self._pages.get(path)
-
-    def unfinished_grew(self, count: int) -> None:
-        """Count bytes of messages that have not arrived whole; disconnect the client with the most, beyond the limit."""
-        self._unfinished += count
-        if count > 0 and self._unfinished > self.limits.unfinished:
-            max(self.connections, key=lambda connection: connection.unfinished).refuse_unfinished()
 
     def left(self, connection: Connection) -> None:
         """Forget a connection."""

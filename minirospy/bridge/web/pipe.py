@@ -44,13 +44,16 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet."""
+    """One connection. ``is_full``: what was written is not with the kernel yet; ``copies``: it waits as a copy."""
 
     @property
     def is_full(self) -> bool: ...
 
     @property
     def unsent(self) -> int: ...
+
+    @property
+    def copies(self) -> bool: ...
 
     @property
     def endpoints(self) -> Endpoints: ...
@@ -66,6 +69,8 @@ class Pipe(Protocol):
 
 class PlainPipe:
     """A TCP connection."""
+
+    copies = False
 
     def __init__(self, sock: socket.socket, loop: asyncio.AbstractEventLoop, events: PipeEvents) -> None:
         self._sock = sock
@@ -187,6 +192,8 @@ def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
 
 class TlsPipe(asyncio.Protocol):
     """An encrypted connection."""
+
+    copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
