@@ -61,6 +61,8 @@ class Limits:
     connections: int = 256
     connections_a_second: float = 50.0
     connection_burst: int = 500
+    reserve: int = 32
+    """Connections beyond that number which may be open until their request is known."""
     handshake_seconds: float = 30.0
     """A browser opens connections in advance, and uses them for ten seconds: those must not end here first."""
     ping_seconds: float = 20.0
@@ -116,6 +118,8 @@ class Site(Protocol):
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal: ...
 
     def page(self, path: str) -> HttpHandler | None: ...
+
+    def admit(self, connection: Connection, grant: Grant) -> Refusal | None: ...
 
     @property
     def account(self) -> Account: ...

@@ -24,6 +24,7 @@ from websockets.server import ServerProtocol
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
 from minirospy.bridge.json_text import size_in_memory
+from minirospy.bridge.web.admission import Rank
 from minirospy.bridge.web.client import (
     PLAIN_HEADERS,
     Door,
@@ -43,7 +44,7 @@ from minirospy.escape import escaped
 if TYPE_CHECKING:
     from websockets.typing import Subprotocol
 
-    from minirospy.bridge.web.pipe import Pipe
+    from minirospy.bridge.web.pipe import Endpoints, Pipe
 
 __all__ = [
     "Connection",
@@ -87,6 +88,10 @@ class Connection:
         self.session: Session | None = None
         self.client: WebClient | None = None
         self.exchange: Exchange | None = None
+        self.rank = Rank.SILENT
+        """The rights, once the request is known."""
+        self.active = loop.time()
+        """When the connection was opened, or a message was received or taken."""
         self.unfinished = 0
         """Bytes of a message that has not arrived whole."""
         self._site = site
@@ -217,6 +222,8 @@ class Connection:
             self.queue.put(key, pieces, newest_only=newest_only)
             if self._pipe.is_full:
                 self._count()
+            else:
+                self.active = self._loop.time()
             self._schedule()
 
     def close_when_sent(self) -> None:
@@ -245,6 +252,17 @@ class Connection:
         self._held = count
         if not self._is_over:
             self._count()
+
+    def give_way(self) -> None:
+        """End the connection, since another client needs its place."""
+        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
+        if not self._is_closing or self._pipe.is_full:
+            self._abort()
+
+    @property
+    def endpoints(self) -> Endpoints:
+        """The ports of both ends, and the address of this one."""
+        return self._pipe.endpoints
 
     def abort(self) -> None:
         """End the connection now."""
@@ -328,8 +346,10 @@ class Connection:
         )
         is_page = headers.get("upgrade", "").lower() != "websocket"
         grant = self._site.check(credentials, is_page=is_page)
-        if isinstance(grant, Refusal):
-            return grant
+        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
+        if refusal:
+            return refusal
+        assert isinstance(grant, Grant)
         parts = urlsplit(request.path)
         query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
         seen = HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.endpoints)
@@ -370,7 +390,7 @@ class Connection:
     def _refuse(self, refusal: Refusal) -> None:
         _log.info("refused %s: %d %s", self.peer, refusal.status, escaped(refusal.text))
         body = (refusal.text + "\n").encode()
-        extra = {"WWW-Authenticate": "Bearer"} if refusal.status == 401 else {}
+        extra = {401: {"WWW-Authenticate": "Bearer"}, 503: {"Retry-After": "5"}}.get(refusal.status, {})
         self.answer(
             (
                 response_head(
@@ -404,6 +424,7 @@ class Connection:
     def _delivered(self, data: bytes) -> None:
         assert self.session
         self.traffic.received += 1
+        self.active = self._loop.time()
         self._in_second += 1
         try:
             if self._opcode is Opcode.BINARY:
