@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["Part", "announce", "exit_status", "require_libraries", "run", "run_program"]
 
 
+_LARGE_BLOCK = 4 * 1024 * 1024
+"""Bytes of a block that goes back to the system when it is freed; a camera's images are smaller, and mapping each costs time."""
+
+
 class Part(Protocol):
     """What a node does: a bridge, or services."""
 
@@ -87,7 +91,7 @@ def run(
     ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
     it would import message classes.
     """
-    return_large_blocks()
+    return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv
