@@ -20,6 +20,7 @@ from minirospy.bridge.rosbridge.client_topics import ClientTopics
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.video.pages import VideoPages
+from minirospy.bridge.web.account import Account
 from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
@@ -120,6 +121,7 @@ class Bridge:
         if self.options.rosbridge_port is not None:
             self._beside.append(client_topics)
         self._addition = addition or Addition()
+        self._account = Account(self.options.limits.memory)
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -151,6 +153,7 @@ class Bridge:
             pages={**self._video.handlers, "/status": self._status_page},
             public_pages=public,
             tls=tls,
+            account=self._account,
         )
         while True:
             try:

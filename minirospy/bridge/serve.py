@@ -14,6 +14,7 @@ from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.escape import escaped
 from minirospy.installation import install_command
+from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.signal_dispatch import interrupt_signals
 
@@ -29,6 +30,10 @@ __all__ = [
     "run",
     "run_program",
 ]
+
+
+_LARGE_BLOCK = 4 * 1024 * 1024
+"""Bytes of a block that goes back to the system when it is freed; a camera's images are smaller, and mapping each costs time."""
 
 
 class Part(Protocol):
@@ -112,6 +117,7 @@ def run(
     it would import message classes. ``connect`` opens what may fail before the node takes its name: the master ends a running
     node of that name.
     """
+    return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv

@@ -7,25 +7,22 @@ of connections that an unprivileged program can read: there the code alone decid
 
 from __future__ import annotations
 
-import ipaddress
 import os
 import secrets
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.bridge.web.owners import owner_of
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import Exchange, HttpRequest
 
-__all__ = ["LIFETIME", "Codes", "owner_of"]
+__all__ = ["LIFETIME", "Codes"]
 
 LIFETIME = 60.0  # seconds; the browser is started immediately, and asks within a few
-_TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
 _ROOT = 0
-
-_Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 def _nothing() -> None:
@@ -107,45 +104,3 @@ def _is_trusted(request: HttpRequest) -> bool:
         _ROOT,
         os.getuid(),
     )
-
-
-def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
-    """Return the user of the TCP socket of this machine at ``end`` that is connected to ``other_end``, in any state.
-
-    Return None if there is no such socket, or if no process has it open any more: the kernel lists those as root's.
-    Source: proc_net_tcp of the kernel's documentation.
-    """
-    try:
-        wanted = _parsed(end), _parsed(other_end)
-    except ValueError:
-        return None
-    for table in _TABLES:
-        try:
-            lines = table.read_text(encoding="ascii").splitlines()[1:]
-        except (OSError, ValueError):
-            continue
-        port = f":{end[1]:04X} "
-        for line in lines:
-            if port not in line:
-                continue  # most of thousands, without parsing
-            _, local, remote, _, _, _, _, user, _, inode, *_ = line.split()
-            if (_listed(local), _listed(remote)) == wanted and inode != "0":
-                return int(user)
-    return None
-
-
-def _parsed(end: tuple[str, int]) -> tuple[_Address, int]:
-    """Return an address as the socket API has it, and its port. Raise ValueError."""
-    return _unmapped(ipaddress.ip_address(end[0].partition("%")[0])), end[1]
-
-
-def _listed(text: str) -> tuple[_Address, int]:
-    """Return an address and a port of the kernel's table: words of 32 bits in the byte order of the machine."""
-    host, _, port = text.partition(":")
-    words = [int(host[at : at + 8], 16).to_bytes(4, sys.byteorder) for at in range(0, len(host), 8)]
-    return _unmapped(ipaddress.ip_address(b"".join(words))), int(port, 16)
-
-
-def _unmapped(address: _Address) -> _Address:
-    """Return the IPv4 address in an IPv6 address that has one: a socket of IPv6 may be connected by IPv4."""
-    return (address.ipv4_mapped or address) if isinstance(address, ipaddress.IPv6Address) else address

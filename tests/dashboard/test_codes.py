@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from minirospy.dashboard import codes
-from minirospy.dashboard.codes import Codes, owner_of
+from minirospy.dashboard.codes import Codes
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -55,43 +55,6 @@ def test_end_of_a_code_is_reported_once() -> None:
     kept.close()
     kept.close()
     assert ended[4:] == ["last"]
-
-
-@needs_table
-@pytest.mark.parametrize(
-    ("family", "address", "client_family", "to"),
-    [
-        (socket.AF_INET, "127.0.0.1", socket.AF_INET, "127.0.0.1"),
-        (socket.AF_INET6, "::1", socket.AF_INET6, "::1"),
-        (socket.AF_INET, "127.0.0.1", socket.AF_INET6, "::ffff:127.0.0.1"),
-    ],
-)
-def test_owner_of_a_socket_is_known_in_each_state(
-    family: socket.AddressFamily, address: str, client_family: socket.AddressFamily, to: str
-) -> None:
-    with socket.socket(family) as server, socket.socket(client_family) as client:
-        try:
-            server.bind((address, 0))
-            server.listen()
-            client.connect((to, server.getsockname()[1]))
-        except OSError:
-            pytest.skip("no such addresses here")
-        accepted, peer = server.accept()
-        with accepted:
-            here = accepted.getsockname()
-            own, other = (peer[0], peer[1]), (here[0], here[1])
-            assert owner_of(own, other) == os.getuid()
-            # Its state is FIN_WAIT now, and it still reads.
-            client.shutdown(socket.SHUT_WR)
-            assert accepted.recv(1) == b""
-            assert owner_of(own, other) == os.getuid()
-            assert owner_of(own, (other[0], own[1])) is None
-            assert owner_of(("127.0.0.7", own[1]), other) is None
-            assert owner_of(own, ("127.0.0.7", other[1])) is None
-            assert owner_of(("?", own[1]), other) is None
-            # The kernel lists a socket that no process has open as root's.
-            client.close()
-            assert owner_of(own, other) is None
 
 
 def exchanged(port: int, code: str, *, half_closes: bool = False) -> tuple[int, str]:

@@ -45,7 +45,7 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet.
+    """One connection. ``is_full``: what was written is not with the kernel yet; ``copies``: it waits as a copy.
 
     ``read_bytes``: how many to take from the kernel at a time, where that can be chosen.
     """
@@ -57,6 +57,9 @@ class Pipe(Protocol):
 
     @property
     def unsent(self) -> int: ...
+
+    @property
+    def copies(self) -> bool: ...
 
     @property
     def endpoints(self) -> Endpoints: ...
@@ -72,6 +75,8 @@ class Pipe(Protocol):
 
 class PlainPipe:
     """A TCP connection."""
+
+    copies = False
 
     def __init__(self, sock: socket.socket, loop: asyncio.AbstractEventLoop, events: PipeEvents) -> None:
         self.read_bytes = SMALL_READ
@@ -194,6 +199,8 @@ def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
 
 class TlsPipe(asyncio.Protocol):
     """An encrypted connection."""
+
+    copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
