@@ -31,7 +31,7 @@ help:
 	@echo "make lint     check style (ruff) and types (mypy)"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
-	@echo "make fuzz     send random requests to a master and to the bridge, ten minutes each"
+	@echo "make fuzz     send random requests to a master and the bridge, random files to the readers, ten minutes each"
 	@echo "make mutants  put small faults into graph/, wire/ and the journal; list those that no test notices"
 	@echo "make site     write the documentation as a site to build/site"
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
@@ -86,6 +86,7 @@ bench: $(STAMP)
 fuzz: $(STAMP)
 	@$(BIN)/python tests/fuzz.py
 	@$(BIN)/python tests/fuzz_bridge.py
+	@$(BIN)/python tests/fuzz_readers.py
 
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .

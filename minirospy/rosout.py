@@ -19,6 +19,7 @@ from minirospy.errors import DeserializationError, ServiceException
 from minirospy.escape import escaped
 from minirospy.idl.protocols import Message, ServiceClass
 from minirospy.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
+from minirospy.ros1_imports import prefer_ros1
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
@@ -70,6 +71,7 @@ class RosoutNode:
 
     async def start(self) -> None:
         """Join the graph. Raises OSError, MasterUnreachableError."""
+        prefer_ros1()
         from rosgraph_msgs.msg import Log
 
         self._log_class = Log

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.fuzz import CUT, Faults, mutated
+from tests.fuzz_readers import peak_megabytes
 
 FINDING = Path("fuzz-bridge-finding.bin")
 INPUTS_PER_BRIDGE = 2000
@@ -98,7 +99,14 @@ OPERATIONS: list[dict[str, object]] = [
     {"op": "set_level", "level": "info"},
     {"op": "auth", "mac": "a", "client": "b", "dest": "c", "rand": "d", "t": 1.5, "level": "e", "end": 2},
     {"op": "status", "level": "info", "msg": "hi"},
+    {"op": "advertise", "topic": "/odd", "type": "__main__/x"},
+    {"op": "advertise_service", "service": "/odd", "type": "sys/x"},
 ]
+ODD_TEXTS = [
+    b'{"op":"publish","topic":"/known","msg":{"data":%s}}' % each
+    for each in (b"1" * 5_000, b"[" * 5_000, b'{"a":' * 5_000, b"1e999", b'"\\ud800"', b"NaN", b"-")
+]
+OPCODES = (0x00, 0x80, 0x89, 0x09, 0x8A, 0x88, 0x83, 0x8F, 0xC1, 0xF2)
 PAGES = [
     b"/",
     b"/status",
@@ -139,7 +147,7 @@ def kinds() -> Mapping[str, Kind]:
     requests = [b"GET " + page + b" HTTP/1.1\r\nHost: localhost\r\n\r\n" for page in PAGES]
     return {
         "foxglove": Kind([FOXGLOVE_HANDSHAKE], FOXGLOVE_TEXTS, FOXGLOVE_BINARIES),
-        "rosbridge": Kind([HANDSHAKE + b"\r\n"], [*texts, *pictures], binaries),
+        "rosbridge": Kind([HANDSHAKE + b"\r\n"], [*texts, *pictures, *ODD_TEXTS], binaries),
         "video": Kind(requests),
     }
 
@@ -303,7 +311,16 @@ def an_input(rng: random.Random, kind: Kind) -> bytes:
             # The accidents are those of requests, of which a payload is the body.
             requests = [b"\r\n\r\n" + each for each in sources]
             payload = mutated(rng, requests).replace(CUT, b"").partition(b"\r\n\r\n")[2]
-        parts.append(frame(payload, 0x81 if is_text else 0x82))
+        if rng.random() < 0.1:
+            # Continuations, pings, pongs, closes, and opcodes and bits that have no meaning.
+            parts.append(frame(payload[: rng.choice((0, 2, 100, 200))], rng.choice(OPCODES)))
+        opcode = 1 if is_text else 2
+        if rng.random() < 0.1:
+            # In two fragments.
+            cut = rng.randrange(len(payload) + 1)
+            parts.append(frame(payload[:cut], opcode))
+            payload, opcode = payload[cut:], 0
+        parts.append(frame(payload, 0x80 | opcode))
     if rng.random() < 0.2:
         parts[-1] = mutated(rng, [parts[-1]])
     return (CUT if rng.random() < 0.8 else b"").join(parts)
@@ -317,6 +334,7 @@ def main() -> int:
     )
     parser.add_argument("--minutes", type=float, default=10.0, help="how long")
     parser.add_argument("--only", choices=inputs, help="inputs of this listener alone")
+    parser.add_argument("--seed", type=int, default=time.time_ns(), help="for the same inputs again")
     parser.add_argument("finding", nargs="?", type=Path, help="an input to run again")
     options = parser.parse_args()
     os.environ["ROS_HOSTNAME"] = "localhost"
@@ -327,7 +345,8 @@ def main() -> int:
         target.close()
         return 0
 
-    rng = random.Random(time.time_ns())
+    print(f"seed {options.seed}", flush=True)
+    rng = random.Random(options.seed)
     start, count = time.monotonic(), 0
     memory: list[float] = []
     while (part := (time.monotonic() - start) / (60 * options.minutes)) < 1:
@@ -344,7 +363,8 @@ def main() -> int:
     memory.append(resident_megabytes())
     target.close()
     print(
-        f"{count:,} inputs to the bridge, nothing found; MB at each quarter: {', '.join(f'{each:.0f}' for each in memory)}"
+        f"{count:,} inputs to the bridge, nothing found; MB at each quarter: {', '.join(f'{each:.0f}' for each in memory)}; "
+        f"at its peak: {peak_megabytes()}"
     )
     return 0
 

@@ -21,7 +21,7 @@ from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls, without_
 from tools.release import faults_of_metadata, unpack
 
 ROOT = Path(__file__).parents[1]
-MOST_BYTES = 3_000_000
+MAX_WHEEL_BYTES = 6_000_000  # it is copied to small computers
 
 USE = """
 import site, sys
@@ -123,7 +123,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     ):
         assert name in names
 
-    assert wheel.stat().st_size < MOST_BYTES
+    assert wheel.stat().st_size < MAX_WHEEL_BYTES
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
 
 

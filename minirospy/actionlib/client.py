@@ -17,6 +17,7 @@ from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
 from minirospy.client.connection import Connection
+from minirospy.client.session import current_session
 from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message
 
 __all__ = ["ActionClient"]
@@ -104,7 +105,13 @@ class ActionClient:
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Return whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever)."""
+        """Return whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever).
+
+        Raise ROSException in a fork of the node that has not called init_node.
+        """
+        session = current_session()
+        if session.is_fork_without_node:
+            raise rospy.ROSException(session.why_fork_has_no_effect(f"the action client of {self.ns}"))
         for subscriber in (self.result_sub, self.feedback_sub):
             subscription = subscriber.impl and subscriber.impl.subscription
             if subscription and self._news.notify not in subscription.on_connected:

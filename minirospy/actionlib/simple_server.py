@@ -166,7 +166,7 @@ class SimpleActionServer:
                         self.preempt_callback()
                 if self.goal_callback:
                     self.goal_callback()
-            except Exception as error:  # noqa: BLE001 - the user's function: the goal has come all the same
+            except BaseException as error:  # noqa: BLE001 - the user's function: the goal has come all the same
                 rospy.logerr("SimpleActionServer.internal_goal_callback - exception %s", error)
 
             self.execute_condition.notify_all()
@@ -204,7 +204,7 @@ class SimpleActionServer:
         assert self.execute_callback
         try:
             self.execute_callback(goal)
-        except Exception as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
+        except BaseException as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
             # Ctrl-C ends its sleep with an exception, and a shutdown hook may have closed what it works with.
             if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Awaitable, Callable, Generator
 from types import TracebackType
 from typing import TypeVar
@@ -16,6 +15,7 @@ from minirospy.errors import (
     SerializationError,
 )
 from minirospy.idl.protocols import Message
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import Pieces
 
 __all__ = ["Handle", "pieces_of", "registered", "serialized"]
@@ -47,14 +47,15 @@ class Handle:
 
 
 async def registered(
-    register: Callable[[_T], Awaitable[None]], part: _T, what: str, log: logging.Logger
+    register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
     """Register; a master that says no is logged, as in rospy, and the program goes on."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:
         why = error.text if isinstance(error, RpcRefused) else error
-        log.critical("unable to register %s with master: %s", what, why)
+        faults.critical("unable to register %s with master: %s", what, why)
+        faults.close_later(asyncio.get_running_loop())
 
 
 def pieces_of(message: Message) -> Pieces:

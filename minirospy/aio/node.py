@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import re
 import sys
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
@@ -30,13 +31,16 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.idl.protocols import Message
+from minirospy.ros1_imports import prefer_ros1
 from minirospy.runtime.node.node import Node as RuntimeNode
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.times import Duration, Time
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.yaml_text import one_line, safe_load
 
 __all__ = ["Node"]
 
@@ -46,7 +50,10 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
+MAX_REGISTRATION_FAULTS = 5  # lines in ten seconds: a bridge may have thousands of topics
 _BILLION = 1_000_000_000
+_REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
+"""What the Slave API says when `shutdown` is called."""
 
 
 class _Unspecified:
@@ -99,6 +106,11 @@ class Node:
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
         """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+        self.registration_faults = RateLimitedLogger(self.log, MAX_REGISTRATION_FAULTS)
+        """Logs what the master has not registered."""
+
+        self.shutdown_request = ""
+        """Why another process has requested that this node ends, such as the master for a new node of its name."""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
         self._rosout = rosout
@@ -160,6 +172,8 @@ class Node:
             self._start_logging()
             await self._wait_for_master()
             await self._set_private_parameters()
+            if self._simulated_time or self._rosout:
+                prefer_ros1()
             if self._simulated_time and await self.get_param("/use_sim_time", False):
                 self._simulated = SimulatedTime(self._stopping)
                 self._spawn(self._follow_clock(self._simulated))
@@ -176,6 +190,7 @@ class Node:
             return
         self._is_closed = True
         self._stop()
+        self.registration_faults.close()
         for handler in self._handlers:
             self.log.removeHandler(handler)
         for task in self._tasks:
@@ -193,6 +208,9 @@ class Node:
 
         The node leaves the graph when its ``async with`` block ends. `rosnode kill` ends here too.
         """
+        request = _REQUEST.match(str(reason))
+        if request:
+            self.shutdown_request = request[1]
         if self._loop:
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._stop)
@@ -491,7 +509,12 @@ class Node:
         import yaml
 
         for key, text in self._arguments.parameters.items():
-            await self.set_param("~" + key, yaml.safe_load(text))
+            try:
+                value = safe_load(text)
+            except yaml.YAMLError as error:
+                why = one_line(error)
+                raise ROSInitException(f"invalid command-line parameters: [_{key}:={text}]: {why}") from error
+            await self.set_param("~" + key, value)
 
     async def _follow_clock(self, simulated: SimulatedTime) -> None:
         from rosgraph_msgs.msg import Clock

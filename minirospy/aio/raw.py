@@ -89,7 +89,7 @@ class RawService(Handle):
             workers=runtime.workers,
         )
         self._registration = node._spawn(
-            registered(runtime.serve, self._server, f"service [{self.name}]", node.log)
+            registered(runtime.serve, self._server, f"service [{self.name}]", node.registration_faults)
         )
 
     async def close(self) -> None:

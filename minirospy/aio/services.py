@@ -189,7 +189,7 @@ class Service(Handle):
 
         node._served.add(name)
         self._registration = node._spawn(
-            registered(runtime.serve, self._server, f"service [{name}]", node.log)
+            registered(runtime.serve, self._server, f"service [{name}]", node.registration_faults)
         )
 
     async def close(self) -> None:

@@ -141,7 +141,7 @@ class Subscription(Handle, Generic[_M_co]):
                 self.topic,
                 header.get("callerid"),
                 message._type,
-                error,
+                f"no memory for its {len(frame)} bytes" if isinstance(error, MemoryError) else error,
             )
             return None
         message._connection_header = header
@@ -249,7 +249,9 @@ class SubscribedTopic:
             topic, InterfaceType.of(message_class), self._deliver, on_loop=True
         )
         self._registration = node._spawn(
-            registered(runtime.subscribe, self.subscription, f"subscription [{topic}]", node.log)
+            registered(
+                runtime.subscribe, self.subscription, f"subscription [{topic}]", node.registration_faults
+            )
         )
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
@@ -299,7 +301,12 @@ class PublishedTopic:
         self.on_change: list[Callable[[], object]] = []
         """Called on the loop when a subscriber has connected or disconnected."""
         self._registration = node._spawn(
-            registered(node._node.advertise, publication, f"publication [{publication.topic}]", node.log)
+            registered(
+                node._node.advertise,
+                publication,
+                f"publication [{publication.topic}]",
+                node.registration_faults,
+            )
         )
 
     def join(self, handle: Publisher[Message]) -> asyncio.Task[None]:

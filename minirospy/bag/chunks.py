@@ -50,13 +50,32 @@ class Ranks(Protocol):
         """Return the rank."""
 
 
+class _Ahead:
+    """A chunk that another thread decompresses."""
+
+    def __init__(self, executor: Executor, chunk: Chunk, data: bytes) -> None:
+        self._is_cancelled = False
+        self._future: Future[bytes] = executor.submit(
+            compression.decompress, chunk.compression, data, chunk.size, lambda: self._is_cancelled
+        )
+
+    def result(self) -> bytes:
+        """Return the data. Raise BagFormatError."""
+        return self._future.result()
+
+    def cancel(self) -> None:
+        """Have the thread stop soon."""
+        self._is_cancelled = True
+        self._future.cancel()
+
+
 class ChunkStream:
     """The chunks of a seekable stream, which may grow while it is read."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self.stream = stream
         self._headers: dict[int, StoredChunk] = {}
-        self._ahead: OrderedDict[int, Future[bytes]] = OrderedDict()
+        self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._executor: Executor | None = None
         self._compared: set[int] = set()
 
@@ -77,8 +96,12 @@ class ChunkStream:
 
     def data(self, position: int) -> bytes:
         """Return the decompressed data of the chunk at a position. Raise BagFormatError, BagCompressionError."""
-        if future := self._ahead.pop(position, None):
-            return future.result()
+        if ahead := self._ahead.pop(position, None):
+            try:
+                return ahead.result()
+            finally:
+                # After Ctrl-C nobody waits for it.
+                ahead.cancel()
         chunk = self.header(position).chunk
         try:
             return compression.decompress(chunk.compression, self._read(position), chunk.size)
@@ -110,7 +133,8 @@ class ChunkStream:
         wanted = [
             position
             for position in positions
-            if self.header(position).chunk.compression in (compression.BZ2, compression.LZ4)
+            if (chunk := self.header(position).chunk).compression in (compression.BZ2, compression.LZ4)
+            and chunk.size <= _MAX_AHEAD
         ]
         for position in self._ahead.keys() - set(wanted):
             self._ahead.pop(position).cancel()
@@ -118,13 +142,12 @@ class ChunkStream:
         for position in wanted:
             if position not in self._ahead:
                 chunk, data = self.header(position).chunk, self._read(position)
-                self._ahead[position] = self._start().submit(
-                    compression.decompress, chunk.compression, data, chunk.size
-                )
+                self._ahead[position] = _Ahead(self._start(), chunk, data)
 
     def close(self) -> None:
         """End the threads; the stream stays open."""
-        self._ahead.clear()
+        while self._ahead:
+            self._ahead.popitem()[1].cancel()
         if self._executor is not None:
             self._executor.shutdown(wait=True, cancel_futures=True)
             self._executor = None
@@ -225,6 +248,8 @@ class ChunkStream:
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
 """Threads that decompress ahead, and chunks that they are ahead: the reader's own thread needs a core, too."""
 
+
+_MAX_AHEAD = 64 * 1024 * 1024  # bytes of a chunk that is decompressed ahead: several are in memory at a time
 
 PICK_SIZE = 32 * 1024
 """Bytes of a chunk for each message that is wanted of it, above which only those messages are read."""

@@ -1,4 +1,4 @@
-"""Compression of chunks: bytes in, bytes out, by the name that a chunk's header has (none, bz2, lz4).
+"""Compression of chunks: bytes in, bytes out, by the name that a chunk's header has (none, bz2, lz4; in MCAP files zstd).
 
 An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a checksum of the
 content, neither checksums of blocks nor the content's size. Every standard frame is read. lz4 is imported when a chunk
@@ -8,13 +8,24 @@ needs it. Sources: http://wiki.ros.org/Bags/Format/2.0, https://github.com/lz4/l
 from __future__ import annotations
 
 from collections.abc import Callable
+from io import BytesIO
 from types import ModuleType
 from typing import TypeVar
 
 from minirospy.errors import BagCompressionError, BagFormatError
 from minirospy.installation import install_command
 
-__all__ = ["BZ2", "COMPRESSIONS", "LZ4", "NONE", "check_compression", "compress", "decompress"]
+__all__ = [
+    "BZ2",
+    "COMPRESSIONS",
+    "LZ4",
+    "MAX_CHUNK_SIZE",
+    "NONE",
+    "check_compression",
+    "compress",
+    "decompress",
+    "decompress_mcap",
+]
 
 NONE = "none"
 BZ2 = "bz2"
@@ -22,8 +33,14 @@ LZ4 = "lz4"
 COMPRESSIONS = (NONE, BZ2, LZ4)
 """The names of the compressions, in the order in which rosbag lists them."""
 
+MAX_CHUNK_SIZE = 1088 * 1024 * 1024
+"""Bytes of a compressed chunk's data: a message of 1 GiB, the most that a connection can carry, and what is before it."""
+
 _MOST_LZ4 = 256
 """How many times as long as its LZ4 block data can be."""
+_MAX_STREAMS = 20_000  # bz2 streams of a chunk; parallel compressors write one for each 100 kB
+_PIECE = 16 * 1024 * 1024  # bytes that are decompressed at a time, while Ctrl-C waits
+_INPUT = 256 * 1024  # bytes of compressed data that are given to a library at a time
 
 Buffer = bytes | bytearray | memoryview
 _T = TypeVar("_T")
@@ -42,13 +59,33 @@ def compress(name: str, data: Buffer) -> bytes:
     return _choose(_COMPRESS, name)(data)
 
 
-def decompress(name: str, data: bytes, size: int) -> bytes:
+def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
     """Return a chunk's data, which must have ``size`` bytes once it is decompressed.
 
-    Never more than ``size`` bytes are allocated. Raise BagFormatError if the data is damaged or has another size,
+    Never more than ``size`` bytes and a piece are allocated. ``is_cancelled`` is asked between pieces, in another thread
+    than the caller's perhaps. Raise BagFormatError if the data is damaged, has another size or is cancelled,
     BagCompressionError if the compression is unknown or its library is missing.
     """
-    found = _choose(_DECOMPRESS, name)(data, size)
+    return _decompressed(_choose(_DECOMPRESS, name), name, data, size, is_cancelled)
+
+
+def decompress_mcap(name: str, data: bytes, size: int) -> bytes:
+    """Return the data of a chunk of an MCAP file; ``name`` is zstd, lz4, or "" for none. Raise as :func:`decompress`."""
+    if not name:
+        return data
+    return _decompressed(_choose(_DECOMPRESS_MCAP, name), name, data, size, lambda: False)
+
+
+def _decompressed(
+    function: Callable[[bytes, _Output], bytes],
+    name: str,
+    data: bytes,
+    size: int,
+    is_cancelled: Callable[[], bool],
+) -> bytes:
+    if size > MAX_CHUNK_SIZE and name != NONE:
+        raise BagFormatError(f"a compressed chunk of {size} bytes: more than {MAX_CHUNK_SIZE} are not read")
+    found = function(data, _Output(size, is_cancelled))
     if len(found) != size:
         raise BagFormatError(f"a chunk has {len(found)} bytes instead of {size}")
     return found
@@ -93,48 +130,118 @@ def _compress_lz4(data: Buffer) -> bytes:
     return compressed
 
 
-def _checked(data: bytes, size: int) -> bytes:
+class _Output:
+    """The data as far as it is decompressed; ``size`` bytes are expected. Raise BagFormatError if there are more.
+
+    Much data comes in pieces: a library would gather them itself, and have all of them twice when it joins them, while
+    Ctrl-C waits for it.
+    """
+
+    def __init__(self, size: int, is_cancelled: Callable[[], bool]) -> None:
+        self.size = size
+        self._is_cancelled = is_cancelled
+        self._first = b""
+        self._gathered: BytesIO | None = None
+        self._length = 0
+
+    @property
+    def room(self) -> int:
+        """The bytes to ask for: one more than is expected, so that a stream's end is seen and its checksum compared."""
+        return min(self.size - self._length + 1, _PIECE)
+
+    def add(self, piece: bytes) -> None:
+        """Add decompressed data. Raise BagFormatError."""
+        self._length += len(piece)
+        if self._length > self.size:
+            raise BagFormatError(f"a chunk has more than {self.size} bytes")
+        if self._is_cancelled():
+            raise BagFormatError("the chunk is not needed any more")
+        if not self._first:
+            self._first = piece
+        elif piece:
+            if self._gathered is None:
+                self._gathered = BytesIO()
+                self._gathered.write(self._first)
+            self._gathered.write(piece)
+
+    def value(self) -> bytes:
+        """Return all data, without a copy."""
+        return self._first if self._gathered is None else self._gathered.getvalue()
+
+
+def _checked(data: bytes, output: _Output) -> bytes:
     return data
 
 
-def _decompress_bz2(data: bytes, size: int) -> bytes:
+def _decompress_bz2(data: bytes, output: _Output) -> bytes:
     import bz2
 
-    found = b""
-    while data:
-        stream = bz2.BZ2Decompressor()
-        try:
-            # One byte more than is expected, so that the stream's end is seen and its checksum is compared.
-            found += stream.decompress(data, size - len(found) + 1)
-        except (OSError, ValueError, EOFError) as error:
-            raise BagFormatError(f"a chunk's bz2 stream is damaged: {error}") from error
-        if len(found) > size:
-            raise BagFormatError(f"a chunk has more than {size} bytes")
-        if not stream.eof:
-            raise BagFormatError("a chunk's bz2 stream is truncated")
-        data = stream.unused_data
-    return found
+    view, streams = memoryview(data), 0
+    stream: bz2.BZ2Decompressor | None = None
+    # In parts, as what follows a stream is copied: of a million short streams, a million times.
+    for start in range(0, len(data), _INPUT):
+        part: Buffer = view[start : start + _INPUT]
+        while part:
+            if stream is None:
+                stream = bz2.BZ2Decompressor()
+                streams += 1
+                if streams > _MAX_STREAMS:
+                    raise BagFormatError(f"a chunk has more than {_MAX_STREAMS} bz2 streams")
+            try:
+                output.add(stream.decompress(part, output.room))
+                while not stream.eof and not stream.needs_input:
+                    output.add(stream.decompress(b"", output.room))
+            except (OSError, ValueError, EOFError) as error:
+                raise BagFormatError(f"a chunk's bz2 stream is damaged: {error}") from error
+            part = b""
+            if stream.eof:
+                part, stream = stream.unused_data, None
+    if stream is not None:
+        raise BagFormatError("a chunk's bz2 stream is truncated")
+    return output.value()
 
 
-def _decompress_lz4(data: bytes, size: int) -> bytes:
-    if size > len(data) * _MOST_LZ4:
+def _decompress_lz4(data: bytes, output: _Output) -> bytes:
+    if output.size > len(data) * _MOST_LZ4:
         # The library allocates what is expected before it looks at the data.
-        raise BagFormatError(f"a chunk's {size} bytes cannot be in {len(data)} bytes of LZ4")
+        raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
+    # In parts, as the library copies what is left of them each time.
+    for start in range(0, len(data), _INPUT):
+        part = data[start : start + _INPUT]
+        while part or not (stream.eof or stream.needs_input):
+            try:
+                piece: bytes = stream.decompress(part, output.room)
+            except (RuntimeError, ValueError, MemoryError) as error:
+                raise BagFormatError(f"a chunk's LZ4 frame is damaged: {error}") from error
+            if not piece and not part:
+                break
+            output.add(piece)
+            part = b""
+        if stream.eof:
+            return output.value()
+    raise BagFormatError("a chunk's LZ4 frame is truncated")
+
+
+def _decompress_zstd(data: bytes, output: _Output) -> bytes:
+    import zstandard
+
     try:
-        found: bytes = stream.decompress(data, size + 1)
-    except (RuntimeError, ValueError, MemoryError) as error:
-        raise BagFormatError(f"a chunk's LZ4 frame is damaged: {error}") from error
-    if len(found) > size:
-        raise BagFormatError(f"a chunk has more than {size} bytes")
-    if not stream.eof:
-        raise BagFormatError("a chunk's LZ4 frame is truncated")
-    return found
+        with zstandard.ZstdDecompressor().stream_reader(data) as stream:
+            while piece := stream.read(output.room):
+                output.add(piece)
+    except zstandard.ZstdError as error:
+        raise BagFormatError(f"a chunk's Zstandard frame is damaged: {error}") from error
+    return output.value()
 
 
 _COMPRESS: dict[str, Callable[[Buffer], bytes]] = {NONE: _same, BZ2: _compress_bz2, LZ4: _compress_lz4}
-_DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
+_DECOMPRESS: dict[str, Callable[[bytes, _Output], bytes]] = {
     NONE: _checked,
     BZ2: _decompress_bz2,
     LZ4: _decompress_lz4,
+}
+_DECOMPRESS_MCAP: dict[str, Callable[[bytes, _Output], bytes]] = {
+    LZ4: _decompress_lz4,
+    "zstd": _decompress_zstd,
 }

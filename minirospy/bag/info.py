@@ -16,6 +16,7 @@ from typing import NamedTuple
 from minirospy.bag import compression
 from minirospy.bag.base import BagReader
 from minirospy.bag.records import Connection
+from minirospy.yaml_text import safe_load
 
 __all__ = [
     "Stored",
@@ -211,11 +212,9 @@ def value_of(text: str, key: str) -> str:
 
     Raise LookupError if it does not exist.
     """
-    import yaml
-
     if not re.fullmatch(r"[A-Za-z_]\w*(\[-?\d+\])*(\.[A-Za-z_]\w*(\[-?\d+\])*)*", key):
         raise LookupError(key)
-    value: object = yaml.safe_load(text)
+    value: object = safe_load(text)
     for part in re.findall(r"\w+|-\d+", key):
         if isinstance(value, dict):
             value = value[part]

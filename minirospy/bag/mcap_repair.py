@@ -14,7 +14,8 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
-from minirospy.errors import BagFormatError
+from minirospy.bag import compression
+from minirospy.errors import BagCompressionError, BagFormatError
 
 if TYPE_CHECKING:
     from mcap.records import (
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
         Statistics,
     )
 
-__all__ = ["MAGIC", "McapRepair", "mcap_faults"]
+__all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
 MAGIC = b"\x89MCAP0\r\n"
 """The first and the last bytes of a file."""
@@ -50,11 +51,19 @@ def mcap_faults() -> Iterator[None]:
 
     try:
         yield
-    except (McapError, ZstdError, struct.error, KeyError, StopIteration, UnicodeDecodeError) as error:
+    except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
-    except (EOFError, OSError, ValueError, RuntimeError) as error:
-        # Of the decompressors, and of seeking before the start of a short file.
+    except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
+        # Of the decompressors, of lengths that no memory holds, and of seeking before the start of a short file.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
+
+
+def chunk_data(name: str, data: bytes, size: int) -> bytes:
+    """Return a chunk's data, decompressed. Raise BagFormatError, BagCompressionError."""
+    try:
+        return compression.decompress_mcap(name, data, size)
+    except BagFormatError as error:
+        raise BagFormatError(f"not a whole MCAP file: {error.why}") from error
 
 
 class _Recovered(NamedTuple):
@@ -105,8 +114,8 @@ class McapRepair:
             try:
                 with mcap_faults():
                     self._add(opcode, data, position)
-            except BagFormatError as error:
-                self.problems.append(f"record at byte {position}: {error.why}")
+            except (BagFormatError, BagCompressionError) as error:
+                self.problems.append(f"record at byte {position}: {getattr(error, 'why', error)}")
             position = end
             self._end = end
         if not self._end:
@@ -197,10 +206,11 @@ class McapRepair:
     def _add_chunk(self, chunk: Chunk, position: int, length: int) -> None:
         from mcap import records
         from mcap.opcode import Opcode
-        from mcap.stream_reader import get_chunk_data_stream
 
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        data = stream.read(size)
+        data = chunk_data(chunk.compression, chunk.data, chunk.uncompressed_size)
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise BagFormatError("not a whole MCAP file: a chunk's checksum is wrong")
+        size = len(data)
         entries: _Entries = {}
         at = 0
         while at < size:

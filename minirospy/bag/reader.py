@@ -225,7 +225,8 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the messages that come next."""
-        heap: list[tuple[int, int, int, _Run]] = []
+        # The run's number decides between runs whose next messages have one time, connection and place.
+        heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
             # A chunk is opened when its first message may be the next one.
@@ -255,10 +256,10 @@ class _Merge:
             else:
                 self._drop(run)
 
-    def _push(self, heap: list[tuple[int, int, int, _Run]], run: _Run) -> None:
+    def _push(self, heap: list[tuple[int, int, int, int, _Run]], run: _Run) -> None:
         _, found = self._load(run)
         if run.done < len(found):
-            heappush(heap, (*found[run.done][:2], run.position, run))
+            heappush(heap, (*found[run.done][:2], run.position, run.number, run))
         else:
             self._drop(run)
 
@@ -303,7 +304,11 @@ def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
     """Raise BagFormatError where messages would be missing without a word: the index has more, or other, than its header."""
+    positions: set[int] = set()
     for chunk in chunks:
+        if chunk.position in positions:
+            raise BagFormatError("the index names a chunk twice", chunk.position)
+        positions.add(chunk.position)
         if not chunk.counts.keys() <= connections.keys():
             raise BagFormatError(
                 "a chunk has messages of a connection that is not in the index", chunk.position

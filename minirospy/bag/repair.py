@@ -20,6 +20,7 @@ from minirospy.errors import BagCompressionError, BagFormatError
 
 __all__ = ["Repair"]
 
+_END_OF_TIME = (records.MAX_UINT32 + 1) * 10**9
 _Entry = tuple[int, int, int]
 """A message in a chunk's index: time, connection, offset of its record."""
 
@@ -35,6 +36,11 @@ class _Content(NamedTuple):
     def entries(self) -> list[_Entry]:
         """The entries of the index, sorted."""
         return sorted(each[:3] for each in self.messages)
+
+    @property
+    def has_wrong_time(self) -> bool:
+        """Whether a message has a time that no index can hold: more nanoseconds than a second has, in the last of all seconds."""
+        return any(each[0] >= _END_OF_TIME for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
         """Return the chunk's summary."""
@@ -204,6 +210,10 @@ class Repair:
             if content.end < len(data):
                 raise BagFormatError("a record of the chunk is damaged")
             self._check_connections(content)
+            if content.has_wrong_time:
+                # Chunks after this one may need the connections that are in it.
+                self._add_connections(content)
+                raise BagFormatError("a message of the chunk has a time that no index can hold")
         except (BagFormatError, BagCompressionError) as error:
             if not is_record(self._stream, record.end, limit):
                 raise BagFormatError(getattr(error, "why", str(error))) from error
@@ -283,7 +293,7 @@ class Repair:
         self._stream.seek(record.data_position)
         data = self._stream.read(min(end - record.data_position, records.MAX_UINT32))
         content = _content(data[: _whole_records(data)])
-        if not content.messages:
+        if not content.messages or content.has_wrong_time:
             return False
 
         data_end = record.data_position + content.end

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
-from minirospy.bag.compression import NONE, check_compression, compress
+from minirospy.bag.compression import MAX_CHUNK_SIZE, NONE, check_compression, compress
 from minirospy.bag.encoding import (
     encode_bag_header,
     encode_chunk_header,
@@ -47,9 +47,6 @@ CHUNK_THRESHOLD = 768 * 1024
 
 _LARGE = 64 * 1024
 """A message of so many bytes is written from where it is, instead of being copied into the chunk."""
-
-_MAX_CHUNK = (MAX_UINT32, MAX_UINT32 - MAX_UINT32 // 64)
-"""Bytes of a chunk that is written as it is, and of one that is compressed: noise becomes longer by that."""
 
 _BILLION = 10**9
 _OVERHEAD = 46
@@ -341,8 +338,8 @@ class BagWriter:
     def _set_compression(self, name: str) -> None:
         check_compression(name)
         self._compression = name
-        # Noise becomes longer where it is compressed.
-        self._limit = MAX_UINT32 if name == NONE else MAX_UINT32 - MAX_UINT32 // 64
+        # Noise becomes longer where it is compressed, and no reader of ours takes more.
+        self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
 
     def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
         self._streams = {one.id: _Stream(one, is_stored=True) for one in connections}
@@ -367,7 +364,8 @@ class BagWriter:
         """Have the message start a new chunk: the format counts a chunk's bytes in 32 bits. Raise BagFormatError."""
         if len(stream.record) + _OVERHEAD + length > self._limit:
             raise BagFormatError(
-                f"a message of {length} bytes on {stream.connection.topic} is too large: a bag's chunk has 4 GiB at most"
+                f"a message of {length} bytes on {stream.connection.topic} is too large: "
+                f"a chunk has {self._limit} bytes at most{'' if self._compression == NONE else ' where it is compressed'}"
             )
         self.finish_chunk()
 

@@ -28,6 +28,7 @@ __all__ = [
     "NameFilter",
     "Refusal",
     "is_loopback",
+    "is_token",
     "new_token",
 ]
 
@@ -102,7 +103,7 @@ class Access:
 
     def __post_init__(self) -> None:
         for token in (self.read_token, self.write_token):
-            if token and not _TOKEN.fullmatch(token):
+            if token and not is_token(token):
                 raise BridgeError("a token has 8 to 200 characters out of A-Z a-z 0-9 _ -")
         if self.requires_token and not (self.read_token or self.write_token):
             raise BridgeError("a listener beyond loopback needs a token")
@@ -204,6 +205,11 @@ class NameFilter:
 def new_token() -> str:
     """Return a random token of 128 bits."""
     return secrets.token_urlsafe(16)
+
+
+def is_token(value: object) -> bool:
+    """Return whether a value can be a token: an empty or short one, or one that is no string, is none."""
+    return isinstance(value, str) and bool(_TOKEN.fullmatch(value))
 
 
 def is_loopback(host: str) -> bool:

@@ -20,9 +20,11 @@ from minirospy.bridge.rosbridge.client_topics import ClientTopics
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.video.pages import VideoPages
+from minirospy.bridge.web.account import Account
 from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
+from minirospy.closing import close_all
 from minirospy.environment import DISTRO
 from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import fetch
@@ -119,6 +121,7 @@ class Bridge:
         if self.options.rosbridge_port is not None:
             self._beside.append(client_topics)
         self._addition = addition or Addition()
+        self._account = Account(self.options.limits.memory)
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -150,6 +153,7 @@ class Bridge:
             pages={**self._video.handlers, "/status": self._status_page},
             public_pages=public,
             tls=tls,
+            account=self._account,
         )
         while True:
             try:
@@ -182,12 +186,8 @@ class Bridge:
         if self._reporting:
             self._reporting.cancel()
             await asyncio.gather(self._reporting, return_exceptions=True)
-        for listener in self.listeners.values():
-            await listener.close()
-        self.rosbridge.close()
-        for part in self._beside:
-            await part.close()
-        await self.graph.close()
+        parts = [*self.listeners.values(), self.rosbridge, *self._beside, self.graph]
+        await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
         """Return what the bridge serves and to whom, as JSON has it."""

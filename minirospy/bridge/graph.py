@@ -34,6 +34,9 @@ FASTEST_LOOK = 0.25
 """Seconds from one look at the graph to the next while it changes."""
 
 _QUEUE = 100
+_MOST_WAITING = 32_000_000
+"""Bytes of clients' messages that wait for the subscribers of new topics; beyond, each topic's newest alone."""
+
 _QUERY_SECONDS = 2.0
 """After this the graph is reported without the types of services that are still looked up."""
 
@@ -130,6 +133,7 @@ class Publication:
         self._graph = graph
         self._shared: _SharedPublisher | None = shared
         self._waiting: deque[bytes] | None = None
+        """Messages that wait for the subscribers."""
 
     @property
     def has_joined(self) -> bool:
@@ -149,17 +153,24 @@ class Publication:
 
     def publish_when_joined(self, body: bytes) -> None:
         """Publish once the subscribers of that moment are connected, in order. Does not wait; the newest messages are kept."""
-        if self._waiting is not None:
-            self._waiting.append(body)
-        elif self.has_joined or not (self._shared and self._shared.joining):
-            self.publish(body)
-        else:
-            self._waiting = deque([body], _QUEUE)
+        if self._waiting is None:
+            if self.has_joined or not (self._shared and self._shared.joining):
+                self.publish(body)
+                return
+            self._waiting = deque()
             self._shared.joining.add_done_callback(lambda _: self._publish_waiting())
+
+        self._waiting.append(body)
+        self._graph.waiting_bytes += len(body)
+        while len(self._waiting) > _QUEUE or (
+            self._graph.waiting_bytes > _MOST_WAITING and len(self._waiting) > 1
+        ):
+            self._graph.waiting_bytes -= len(self._waiting.popleft())
 
     def _publish_waiting(self) -> None:
         waiting, self._waiting = self._waiting, None
         for body in waiting or ():
+            self._graph.waiting_bytes -= len(body)
             self.publish(body)
 
     def close(self) -> None:
@@ -193,6 +204,8 @@ class SharedGraph:
         """``slowest_look``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
         self.node = node
         self._clock = clock
+        self.waiting_bytes = 0
+        """Bytes of the clients' messages that wait for subscribers of new topics."""
         self.filters = filters or Filters()
         self.snapshot = Snapshot()
         self.topics: dict[str, SharedTopic] = {}

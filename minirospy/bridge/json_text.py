@@ -1,4 +1,4 @@
-"""JSON of clients, with a limit: a text of `[]` fifty million times would take gigabytes, and hold up all clients. Pure.
+"""Texts of clients, and their JSON, with limits: `[]` fifty million times would take gigabytes, and hold up all clients. Pure.
 
 The library's parser keeps Python's global interpreter lock (GIL) until it has parsed the whole text, and so stops all threads of
 the process. A large text is parsed in pieces instead, by :func:`load_json_in_pieces` in a thread of its own.
@@ -8,10 +8,18 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Callable
 from json.scanner import py_make_scanner  # type: ignore[attr-defined]
 
-__all__ = ["MAX_QUICK_CHARACTERS", "is_quick_text", "load_json", "load_json_in_pieces"]
+__all__ = [
+    "MAX_QUICK_CHARACTERS",
+    "is_quick_text",
+    "load_json",
+    "load_json_in_pieces",
+    "size_in_memory",
+    "width_of",
+]
 
 _MAX_VALUES = 8_000_000
 _MAX_COLLECTIONS = 1_000_000
@@ -22,6 +30,37 @@ _PIECE = 32 * 1024  # characters of numbers that are parsed in one call
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
+
+
+_LONG_TEXT = 100
+"""Characters from which the size of a text shows the width of its characters."""
+
+_BEYOND_LATIN = re.compile(rb"[\xc4-\xff]")
+_BEYOND_BMP = re.compile(rb"[\xf0-\xff]")
+_CONTINUATIONS = bytes(range(0x80, 0xC0))
+
+
+def size_in_memory(data: bytes | bytearray) -> int:
+    """Return the bytes that a text in UTF-8 takes as a str: one wide character makes each take two or four."""
+    if data.isascii():
+        return len(data)
+    characters = len(data.translate(None, _CONTINUATIONS))
+    if _BEYOND_BMP.search(data):
+        return 4 * characters
+    return 2 * characters if _BEYOND_LATIN.search(data) else characters
+
+
+def width_of(text: str) -> int:
+    """Return the bytes that each character of a text takes in memory: 1, 2 or 4."""
+    if text.isascii():
+        return 1
+    if len(text) >= _LONG_TEXT:
+        # Without the head of a str; a cached copy in UTF-8 makes it too large at most.
+        found = round((sys.getsizeof(text) - 76) / len(text))
+    else:
+        highest = ord(max(text))
+        found = 4 if highest > 0xFFFF else 2 if highest > 0xFF else 1
+    return 1 if found <= 1 else 2 if found == 2 else 4
 
 
 def is_quick_text(text: str) -> bool:

@@ -20,6 +20,9 @@ _AGAIN_AT_ONCE = 32
 _QUERY_SECONDS = 5.0
 _AGAIN_SECONDS = 10.0
 """After this what did not answer is queried again."""
+_REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
+"""What refused at once is queried again sooner, since that costs little: a server that was killed may be started again. The pause
+grows with the number of those that failed: 500 dead nodes are queried every 10 s."""
 
 _Key = TypeVar("_Key")
 _Found = TypeVar("_Found")
@@ -89,10 +92,12 @@ class NodeQueries(Generic[_Key, _Found]):
 
     async def _query_once(self, key: _Key) -> bool:
         """Query once; return whether there is an answer to what is still present."""
+        started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
         except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-            self._failed(key)
+            is_quick = asyncio.get_running_loop().time() - started < _REFUSED_SECONDS
+            self._failed(key, is_quick=is_quick)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
             self._faults.report(error)
             self._failed(key)
@@ -106,6 +111,8 @@ class NodeQueries(Generic[_Key, _Found]):
     def _ended(self, key: _Key, _: object) -> None:
         self._tasks.pop(key, None)
 
-    def _failed(self, key: _Key) -> None:
+    def _failed(self, key: _Key, *, is_quick: bool = False) -> None:
         if key in self._present:
-            self._not_before[key] = asyncio.get_running_loop().time() + _AGAIN_SECONDS
+            refused = max(_REFUSED_SECONDS, _REFUSED_EACH * len(self._not_before))
+            pause = min(refused, _AGAIN_SECONDS) if is_quick else _AGAIN_SECONDS
+            self._not_before[key] = asyncio.get_running_loop().time() + pause

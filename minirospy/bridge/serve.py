@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
+from minirospy.escape import escaped
 from minirospy.installation import install_command
+from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.signal_dispatch import interrupt_signals
 
@@ -28,6 +30,10 @@ __all__ = [
     "run",
     "run_program",
 ]
+
+
+_LARGE_BLOCK = 4 * 1024 * 1024
+"""Bytes of a block that goes back to the system when it is freed; a camera's images are smaller, and mapping each costs time."""
 
 
 class Part(Protocol):
@@ -102,18 +108,21 @@ def run(
     on_started: Callable[[_P], None],
     *,
     imports_messages: bool = True,
+    connect: Callable[[_P], Awaitable[None]] | None = None,
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
     ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
     ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
-    it would import message classes.
+    it would import message classes. ``connect`` opens what may fail before the node takes its name: the master ends a running
+    node of that name.
     """
+    return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv
         node = Node(name, argv=words, rosout=imports_messages, simulated_time=imports_messages)
-        return loop.run_until_complete(_run(node, start, on_started))
+        return loop.run_until_complete(_run(node, start, on_started, connect))
     finally:
         loop.close()
 
@@ -122,6 +131,7 @@ async def _run(
     node: Node,
     start: Callable[[Node], Awaitable[_P]],
     on_started: Callable[[_P], None],
+    connect: Callable[[_P], Awaitable[None]] | None = None,
 ) -> int:
     loop = asyncio.get_running_loop()
     main = asyncio.current_task()
@@ -143,20 +153,30 @@ async def _run(
     }
     # On Windows a signal is noticed when the loop next wakes up.
     ticking = asyncio.ensure_future(_tick())
+    bridge: _P | None = None
     try:
-        async with node:
+        if connect is not None:
+            node._start_logging()
             bridge = await start(node)
+            await connect(bridge)
+        async with node:
+            if bridge is None:
+                bridge = await start(node)
             try:
                 await bridge.start()
                 on_started(bridge)
                 prefer_the_loop()
                 await node.spin()
+                if node.shutdown_request:
+                    node.log.warning("shutdown request: %s", escaped(node.shutdown_request))
             finally:
                 await bridge.close()
     except (asyncio.CancelledError, ROSInterruptException):
         if not interrupted:
             raise
     finally:
+        if bridge is not None:
+            await bridge.close()  # where the node has not been started
         ticking.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.bridge.access import new_token
+from minirospy.bridge.access import is_token, new_token
 from minirospy.errors import BridgeError
 from minirospy.private_files import open_file
 
@@ -33,7 +33,8 @@ def read_tokens(home: Path) -> Tokens | None:
             if sys.platform != "win32" and not _is_own(os.fstat(file.fileno())):
                 return None
             fields = json.load(file)
-        return Tokens(str(fields["write"]), str(fields["read"]))
+        found = Tokens(fields["write"], fields["read"])
+        return found if all(map(is_token, found)) else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

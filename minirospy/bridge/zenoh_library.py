@@ -8,6 +8,8 @@ import ipaddress
 import json
 import os
 import re
+import socket
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -17,12 +19,19 @@ from minirospy.escape import escaped, has_controls
 from minirospy.installation import install_command
 
 __all__ = [
-    "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "Matching", "NetworkOptions", "Outlet", "Query", "Reply",
+    "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "EndpointError",
+    "Matching", "NetworkOptions", "Outlet", "Query", "Reply",
     "Sample", "Session", "configured", "is_loopback_endpoint", "one_line", "require_zenoh", "to_endpoint",
+    "unresolved",
 ]  # fmt: skip
 
 DEFAULT_PORT = 7447
 DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+MAX_PORT = 65_535
+INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
+PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
+"""Links of Zenoh; which of them a build has, it says itself."""
+_HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
@@ -30,6 +39,13 @@ _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in
 """Zenoh sets SO_LINGER to 10 s: so long a thread, mostly of its pool rx, waits when it closes a dead link. Measured: 100 robots
 that are lost together are noticed after 30 s with 32 threads in each pool, after 11 s with 128 in rx; the lease is 10 s."""
 _CONNECT_MS = 3000
+
+
+class EndpointError(BridgeError):
+    """An endpoint of the command line that can never work."""
+
+    def __init__(self, endpoint: str, reason: str) -> None:
+        super().__init__(f"[{escaped(endpoint)}] {reason}")
 
 
 # --- what is used of zenoh, which has no types where it is not installed
@@ -160,14 +176,50 @@ class NetworkOptions:
     source: str = "--config"
 
 
-def to_endpoint(text: str) -> str:
-    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise BridgeError."""
+def to_endpoint(text: str, *, listens: bool = False) -> str:
+    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise EndpointError on one that can never work.
+
+    ``listens``: its port may be 0, for a free one.
+    """
     if not text or has_controls(text) or " " in text:
-        raise BridgeError(f"[{escaped(text)}] is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
-    if "/" in text:
+        raise EndpointError(text, f"is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
+    if "/" not in text:
+        has_port = re.search(r"(^[^:]*|\]):\d+$", text)
+        text = f"tcp/{text}" if has_port else f"tcp/{text}:{DEFAULT_PORT}"
+    protocol, _, rest = text.partition("/")
+    if "://" in text or protocol not in PROTOCOLS:
+        raise EndpointError(
+            text,
+            "is not an endpoint: give HOST, HOST:PORT or tcp/HOST:PORT (also tls, quic, udp, ws, unixsock-stream, ...)",
+        )
+    if protocol not in INTERNET_PROTOCOLS:
         return text
-    has_port = re.search(r"(^[^:]*|\]):\d+$", text)
-    return f"tcp/{text}" if has_port else f"tcp/{text}:{DEFAULT_PORT}"
+    for address in re.split(r"[?#]", rest)[0].split(","):
+        host, colon, port = address.rpartition(":")
+        if not colon or not port.isdecimal():
+            raise EndpointError(text, f"has no port, as {protocol}/{address or 'HOST'}:{DEFAULT_PORT}")
+        if not (0 if listens else 1) <= int(port) <= MAX_PORT:
+            raise EndpointError(text, f"has the port {port}: ports are 1 to {MAX_PORT}")
+        if not _HOST.fullmatch(host):
+            hint = ": an IPv6 address is in brackets, as [::1]" if ":" in host else ""
+            raise EndpointError(
+                text, f"has the host [{escaped(host)}], which is no name and no address{hint}"
+            )
+    return text
+
+
+def unresolved(endpoints: Iterable[str]) -> list[str]:
+    """Return the hosts of endpoints that do not resolve now. Blocks; a name may resolve later, as when mDNS comes up."""
+    found = []
+    for endpoint in endpoints:
+        protocol, _, rest = endpoint.partition("/")
+        host = re.split(r"[?#]", rest)[0].rpartition(":")[0].strip("[]")
+        if protocol in INTERNET_PROTOCOLS and host and host != "*":
+            try:
+                socket.getaddrinfo(host, None)
+            except (OSError, UnicodeError):
+                found.append(host)
+    return found
 
 
 def is_loopback_endpoint(endpoint: str) -> bool:

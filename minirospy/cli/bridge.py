@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -55,14 +56,12 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--token",
-        default="",
-        help="the read-write token (default: one that is kept in ROS_HOME)",
+        help="the read-write token (default: MINIROSPY_BRIDGE_TOKEN, else one that is kept in ROS_HOME)",
         completer="nothing",
     )
     parser.add_argument(
         "--read-token",
-        default="",
-        help="the read-only token (default: one that is kept in ROS_HOME)",
+        help="the read-only token (default: MINIROSPY_BRIDGE_READ_TOKEN, else one that is kept in ROS_HOME)",
         completer="nothing",
     )
     parser.add_argument("--show-tokens", action="store_true", help="print the tokens that are kept, and exit")
@@ -155,8 +154,8 @@ def _bridge(
     no_rosbridge: bool,
     listen: bool,
     address: str,
-    token: str,
-    read_token: str,
+    token: str | None,
+    read_token: str | None,
     show_tokens: bool,
     new_tokens: bool,
     read_only: bool,
@@ -179,6 +178,8 @@ def _bridge(
 ) -> int:
     from minirospy.bridge.serve import require_libraries
 
+    token = _given_token("token", token, "MINIROSPY_BRIDGE_TOKEN")
+    read_token = _given_token("read-token", read_token, "MINIROSPY_BRIDGE_READ_TOKEN")
     if status:
         return _show_status(port, rosbridge_port, token, as_json=json)
     port = 8765 if port is None else port
@@ -255,6 +256,16 @@ def _check_range(name: str, value: int, low: int, high: int) -> None:
         raise Misuse(f"--{name} {value} is not between {low} and {high}")
 
 
+def _given_token(option: str, given: str | None, variable: str) -> str:
+    """Return the token of an option, else that of a variable, "" if there is none."""
+    if given is None:
+        return os.environ.get(variable, "")
+    if not given:
+        # Perhaps a variable that is not set: it must not open the bridge to everybody.
+        raise Misuse(f"--{option} wants a token of 8 to 200 characters, and got an empty one")
+    return given
+
+
 def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
     from minirospy.bridge.tokens import Tokens, kept_tokens
     from minirospy.environment import Environment
@@ -273,6 +284,9 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     listener = bridge.listeners["foxglove"]
     is_any = options.address in ("0.0.0.0", "::")
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
+    if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
+        # localhost may be ::1, and another user's server there would get the token. A certificate shows who serves.
+        addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)
     rosbridge = bridge.listeners.get("rosbridge")

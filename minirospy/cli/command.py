@@ -35,6 +35,7 @@ from minirospy.errors import (
     UsageError,
 )
 from minirospy.escape import SafeTerminal, escaped
+from minirospy.ros1_imports import prefer_ros1
 from minirospy.suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -112,6 +113,10 @@ def ros_words(error: Exception, wording: Wording) -> RosText:
     return RosText(text.format(**fields), status)
 
 
+_WITH_ROS2 = ("minirospy", "minirospy ros2-bridge")
+"""Commands whose process may need ROS 2's packages; `minirospy VERB` runs the verb's own command."""
+
+
 def run(
     name: str,
     body: Callable[[], int | None],
@@ -129,6 +134,8 @@ def run(
     if not os.path.isdir(_PACKAGE):
         return complain(name, UsageError(_IN_ARCHIVE.format(os.path.dirname(_PACKAGE))), 2)
     _offer_overlay()
+    if name not in _WITH_ROS2:
+        prefer_ros1()
     _heed_break()
     if heeds_interrupts and not interrupted:
         _heed_interrupts()

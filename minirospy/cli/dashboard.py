@@ -408,18 +408,16 @@ def _announce(
     listen: bool,
     read_only: bool,
 ) -> None:
-    from minirospy.bridge.access import is_loopback
     from minirospy.bridge.addresses import own_addresses, qr_code
-    from minirospy.dashboard.browser import open_link
     from minirospy.dashboard.views import link
 
     is_any = address in ("0.0.0.0", "::")
-    host = "localhost" if is_any or is_loopback(address) else address
+    # Not localhost: a browser may try ::1 first, where another user's program may listen at this port.
+    host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
     # The person at this machine gets the rights of its programs.
     own = tokens.read if read_only else tokens.write
     here = link(host, port, view, fields, token=own)
-    # Other users of the machine may list command lines, that of the browser too.
-    is_opened = not no_browser and open_link(link(host, port, view, fields, code=codes.new(own)))
+    is_opened = not no_browser and _open_browser(partial(link, host, port, view, fields), own, codes)
     print(f"{'The browser opens' if is_opened else 'Open in a browser:'} {here}", flush=True)
     if not listen:
         return
@@ -430,6 +428,24 @@ def _announce(
     if reached and sys.stdout.isatty():
         print(qr_code(link(reached[0], port, view, fields, token=tokens.read)), end="")
     sys.stdout.flush()
+
+
+def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
+    """Open the browser with a code in place of the token; return whether there is one. On the loop."""
+    import asyncio
+
+    from minirospy.dashboard.browser import open_link
+    from minirospy.dashboard.codes import LIFETIME
+
+    code = codes.new(token)
+    remove = open_link(link(code=code))
+    if remove is None:
+        codes.redeem(code)
+        return False
+    codes.when_ended(code, remove)
+    # Later than the code's end by its own clock.
+    asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
+    return True
 
 
 DASHBOARD = Command("minirospy dashboard", _dashboard_parser, _dashboard)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -163,6 +164,25 @@ def _param_parser() -> Parser:
     return parser
 
 
+def _takeover_parser() -> Parser:
+    parser = Parser(
+        "minirospy fleet takeover",
+        "Chooses which machine's robot the control rooms of this master show if several machines have one name.",
+    )
+    parser.add_argument("robot", completer="nothing")
+    parser.add_argument(
+        "machine",
+        nargs="?",
+        default="",
+        help="as the control room names it: 16 hexadecimal digits",
+        completer="nothing",
+    )
+    parser.add_argument(
+        "--any", action="store_true", help="take the choice back: the machine that came first"
+    )
+    return parser
+
+
 # --- verbs
 
 
@@ -213,9 +233,10 @@ def _gateway(
 
     def started(gateway: Gateway) -> None:
         shown = f"robot [{name}] is in the fleet" if name else "the fleet's robots are shown here"
-        gateway.node.log.info("%s (gateway %s)", shown, gateway.id)
+        machine = f", machine {gateway.claim.host}" if name else ""
+        gateway.node.log.info("%s (gateway %s%s)", shown, gateway.id, machine)
 
-    return run("fleet_gateway" if name else "fleet_control", (), start, started)
+    return run("fleet_gateway" if name else "fleet_control", (), start, started, connect=Gateway.connect)
 
 
 def _control(
@@ -285,9 +306,38 @@ def _param(robot: str, parameter: str, connect: Sequence[str], config: str, scou
     return 0
 
 
+def _takeover(robot: str, machine: str, any: bool) -> int:
+    from minirospy.bridge.fleet.importer import MACHINES
+    from minirospy.bridge.fleet.keys import is_machine, is_robot_name
+    from minirospy.errors import NotFoundError
+    from minirospy.introspect import parameters
+    from minirospy.introspect.graph import Graph
+
+    if not is_robot_name(robot):
+        raise Misuse(f"[{robot}] cannot be a robot's name")
+    if any == bool(machine):
+        raise Misuse("give the machine that is to be shown, or --any")
+    if machine and not is_machine(machine):
+        raise Misuse(
+            f"[{machine}] is not a machine: 16 hexadecimal digits, as the control room's warning has them"
+        )
+    name = f"{MACHINES}/{robot}"
+    with Graph.open("fleet") as graph:
+        if machine:
+            parameters.set_parameter(graph, name, machine)
+            print(f"robot [{robot}]: only machine {machine} is shown (parameter {name})")
+            return 0
+        # Without a choice nothing has to be taken back.
+        with contextlib.suppress(NotFoundError):
+            parameters.delete_parameter(graph, name)
+    print(f"robot [{robot}]: the machine that came first is shown")
+    return 0
+
+
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
     """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
     from minirospy.bridge.fleet.network import (
+        EndpointError,
         NetworkOptions,
         is_loopback_endpoint,
         require_zenoh,
@@ -296,9 +346,15 @@ def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts:
     from minirospy.environment import Environment
 
     require_zenoh(has_many_links=bool(listen or config))
-    options = NetworkOptions(
-        tuple(map(to_endpoint, connect)), tuple(map(to_endpoint, listen)), config, scouts
-    )
+    try:
+        options = NetworkOptions(
+            tuple(map(to_endpoint, connect)),
+            tuple(to_endpoint(each, listens=True) for each in listen),
+            config,
+            scouts,
+        )
+    except EndpointError as error:
+        raise Misuse(str(error)) from error
     if Environment.read().local:
         beyond = [each for each in (*options.connect, *options.listen) if not is_loopback_endpoint(each)]
         if beyond or scouts or config:
@@ -315,6 +371,12 @@ FAMILY = Family(
         Verb("control", "show the fleet's robots in this graph", _control_parser, _control),
         Verb("router", "pass on between gateways that connect to it", _router_parser, _router),
         Verb("status", "print robots, links, delays, losses", _status_parser, _status),
+        Verb(
+            "takeover",
+            "choose the machine that is robot1: takeover robot1 MACHINE",
+            _takeover_parser,
+            _takeover,
+        ),
         Verb("param", "print a robot's parameter: param robot1 /speed", _param_parser, _param),
     ),
     summary="join robots with their own masters over Zenoh",

@@ -164,6 +164,7 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
     from minirospy.bridge.ros2.definitions import Definitions
     from minirospy.bridge.ros2.zenoh_side import ZenohSide
     from minirospy.bridge.zenoh_library import (
+        EndpointError,
         NetworkOptions,
         is_loopback_endpoint,
         require_zenoh,
@@ -174,7 +175,10 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
     require_zenoh("ros2-bridge --zenoh")
     variable = "ZENOH_SESSION_CONFIG_URI"
     config = os.environ.get(variable, "")
-    options = NetworkOptions(tuple(map(to_endpoint, connect)), config=config, source=variable)
+    try:
+        options = NetworkOptions(tuple(map(to_endpoint, connect)), config=config, source=variable)
+    except EndpointError as error:
+        raise Misuse(str(error)) from error
     if Environment.read().local and (config or not all(map(is_loopback_endpoint, options.connect))):
         raise Misuse("MINIROSPY_LOCAL=1 keeps all on this machine: this router may not be on it")
     definitions = Definitions(rules, catalogue)

@@ -73,6 +73,7 @@ from minirospy.errors import (
     TransportTerminated,
 )
 from minirospy.idl.message import Message
+from minirospy.ros1_imports import prefer_ros1
 
 __all__ = [
     "DEBUG",
@@ -152,6 +153,9 @@ __all__ = [
     "wait_for_message",
     "wait_for_service",
 ]
+
+# Before the first message is imported: where ROS 2 is sourced, its packages of the same names come first.
+prefer_ros1()
 
 
 def spin() -> None:

@@ -15,6 +15,7 @@ from minirospy import names
 from minirospy.environment import Environment
 from minirospy.errors import ROSInitException, RpcError, UsageError
 from minirospy.wire.xmlrpc import serialize_call
+from minirospy.yaml_text import safe_load
 
 __all__ = ["Identity", "private_parameters", "warn_of_illegal_name"]
 
@@ -118,7 +119,7 @@ def private_parameters(arguments: names.Arguments) -> dict[str, object]:
     values = {}
     for key, text in arguments.parameters.items():
         try:
-            values[key] = yaml.safe_load(text)
+            values[key] = safe_load(text)
             serialize_call("setParam", (key, values[key]))
         except (yaml.YAMLError, RpcError) as error:
             why = " ".join(str(error).split())

@@ -10,10 +10,11 @@ import logging
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from minirospy.client.log_handlers import DeferringHandler, RosOutHandler, RosStreamHandler
 from minirospy.log_levels import DEBUG, PYTHON_LEVELS, logger_levels, set_logger_level
+from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from roscpp.srv import SetLoggerLevelRequest
@@ -128,10 +129,8 @@ def _configured_by_file(session: Session) -> bool:
             if not path.is_file():
                 raise FileNotFoundError("the file does not exist")
             if path.suffix in (".yaml", ".yml"):
-                import yaml
-
-                with path.open(encoding="utf-8") as file:
-                    logging.config.dictConfig({"disable_existing_loggers": False, **yaml.safe_load(file)})
+                settings: Any = safe_load(path.read_text(encoding="utf-8"))
+                logging.config.dictConfig({"disable_existing_loggers": False, **settings})
             else:
                 logging.config.fileConfig(path, disable_existing_loggers=False)
         except Exception as error:  # noqa: BLE001 - a file that a person wrote; logging raises all sorts

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy.client.connection import Connection, connection_to_subscriber
-from minirospy.client.session import Session
+from minirospy.client.session import Session, current_session
 from minirospy.client.topic import (
     AnyMsg,
     SharedTopic,
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
+_OF_THE_LIBRARY = frozenset({"/rosout", "/statistics"})
+"""Topics on which the library itself publishes: a program needs no error about them."""
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
@@ -60,8 +62,8 @@ class Publisher(Topic[_M_co]):
     ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
     number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets
     the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
-    subscribers, in a thread of the library, one event after the other. Raises ValueError on a bad name, class
-    or queue_size.
+    subscribers, in a thread of the library, one event after the other; an object that is not a listener is ignored,
+    with a warning. Raises ValueError on a bad name, class or queue_size.
     """
 
     impl: PublishedTopic | None
@@ -86,6 +88,9 @@ class Publisher(Topic[_M_co]):
             )
 
         size = _checked_size(queue_size)
+        if subscriber_listener and not _is_listener(subscriber_listener):
+            warnings.warn(_not_a_listener(subscriber_listener), SyntaxWarning, stacklevel=2)
+            subscriber_listener = None
         fields = dict(headers or {})
         with self._session.lock:
             state = self._session.published.get(self.resolved_name)
@@ -96,7 +101,7 @@ class Publisher(Topic[_M_co]):
             state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
 
         self.impl = state
-        self._session.when_ready(state.register)
+        self._session.when_ready(state.register, state.title)
 
     def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
@@ -201,6 +206,11 @@ class PublishedTopic(SharedTopic):
         unregister_from_master(wait)
 
     @property
+    def title(self) -> str:
+        """The topic's publisher, as an error names it."""
+        return f"the publisher of {self.resolved_name}"
+
+    @property
     def queue_size(self) -> int | None:
         """Return the last queue_size that a Publisher was given; None where publish() waits for the sockets."""
         return self.publication.queue_size
@@ -224,12 +234,18 @@ class PublishedTopic(SharedTopic):
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Notify ``l`` of subscribers that connect and disconnect from now on."""
-        self.subscriber_listeners.append(l)
+        """Notify ``l`` of subscribers that connect and disconnect from now on; ignore, with a warning, what is not a listener."""
+        if _is_listener(l):
+            self.subscriber_listeners.append(l)
+        else:
+            warnings.warn(_not_a_listener(l), SyntaxWarning, stacklevel=2)
 
     def check_initialized(self) -> None:
-        """Raise ROSException before init_node."""
-        if not self._registered and not self._session.is_shutdown():
+        """Raise ROSException before init_node. In a fork of the node, log that the topic is the parent's."""
+        if self._session.is_abandoned:
+            if self.resolved_name not in _OF_THE_LIBRARY:
+                current_session().report_fork(self.title)
+        elif not self._registered and not self._session.is_shutdown():
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
 
     def publish(self, message: Message) -> None:
@@ -248,10 +264,12 @@ class PublishedTopic(SharedTopic):
     def forget_subscribers(self) -> None:
         """Publish to no subscriber from now on: this process is a fork, and the subscribers are its parent's."""
         self.publication.links = ()
-        self._had_subscriber = True
+        self._registered = False
 
     def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
         """See :meth:`Publisher.wait_for_subscribers`."""
+        if self._session.is_abandoned:
+            raise ROSException(current_session().why_fork_has_no_effect(self.title))
         self.check_initialized()
         enough = SignalSafeEvent()
 
@@ -349,11 +367,34 @@ class PublishedTopic(SharedTopic):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
+        # Looked up in the worker: a listener's attribute may be a property, which is the user's code.
         for listener in list(self.subscriber_listeners):
             if is_up:
-                self._events.start(listener.peer_subscribe, topic, publish_to_all, publish_to_peer)
+                self._events.start(
+                    _notify, listener, "peer_subscribe", topic, publish_to_all, publish_to_peer
+                )
             else:
-                self._events.start(listener.peer_unsubscribe, topic, len(self.publication.links))
+                self._events.start(_notify, listener, "peer_unsubscribe", topic, len(self.publication.links))
+
+
+def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
+    """Call a listener's method for an event; a listener that lacks the method ignores the event."""
+    method = getattr(listener, event, None)
+    if method is not None:
+        method(*args)
+
+
+def _is_listener(value: object) -> bool:
+    """Return whether an object has a method of SubscribeListener; programs need not inherit from it."""
+    return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
+
+
+def _not_a_listener(value: object) -> str:
+    """Return the warning about an argument for which rospy refuses every subscriber."""
+    text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
+    if isinstance(value, int):
+        return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"
+    return text
 
 
 def _checked_size(queue_size: int | None) -> int | None:

@@ -13,7 +13,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.session import current_session
+from minirospy.client.session import Session, current_session
 from minirospy.client.topic import unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import (
@@ -91,7 +91,7 @@ class Service(Generic[_S_co]):
         with self._session.lock:
             if self._session.offered.setdefault(self.resolved_name, self) is not self:
                 raise ServiceException(f"service [{self.resolved_name}] already registered")
-        self._session.when_ready(self._register)
+        self._session.when_ready(self._register, f"the service {self.resolved_name}")
 
     @property
     def uri(self) -> str | None:
@@ -203,6 +203,7 @@ class ServiceProxy(Generic[_S_co]):
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
+        self._client_session: Session | None = None
         # The calls that reached the service: the seq of requests that start with a header.
         self._calls = 0
         self._lock = threading.Lock()
@@ -224,10 +225,11 @@ class ServiceProxy(Generic[_S_co]):
         if not self.persistent:
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
-            if self._client and self._client.has_ended():
+            if self._client and (self._client.has_ended() or self._client_session is not current_session()):
+                # In a fork the connection is the parent's: two processes would read each other's responses.
                 self._disconnect()
             if self._client is None:
-                self._client = self._connect(body)
+                self._client, self._client_session = self._connect(body), current_session()
             return self._exchange(self._client, body, keep=True)
 
     def wait_for_service(self, timeout: float | None = None) -> None:

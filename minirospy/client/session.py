@@ -43,6 +43,11 @@ class Session:
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
         """``previous``: the session that this one replaces; name, clock and listeners go on until init_node."""
         self.is_fork = is_fork
+        self.is_abandoned = False
+        """Whether this process is a fork, and the session its parent's."""
+        self._forked_from = previous.name if previous and is_fork else ""
+        self._reported: set[str] = set()
+        """The handles that :meth:`report_fork` has named."""
         self.identity: Identity = Identity(previous.identity if previous else None)
         self.lifecycle = Lifecycle(self._leave)
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
@@ -131,13 +136,37 @@ class Session:
         for function in waiting:
             function()
 
-    def when_ready(self, function: Callable[[], object]) -> None:
-        """Call ``function`` now, or in init_node where that has not been called yet."""
+    def when_ready(self, function: Callable[[], object], handle: str = "") -> None:
+        """Call ``function`` now, or in init_node if that has not been called yet.
+
+        ``handle`` names what ``function`` registers, for :meth:`report_fork`.
+        """
         with self.lock:
-            if self.node is None:
+            is_ready = self.node is not None
+            if not is_ready:
                 self._waiting_for_node.append(function)
-                return
-        function()
+        if is_ready:
+            function()
+        elif self.is_fork and handle:
+            self.report_fork(handle)
+
+    @property
+    def is_fork_without_node(self) -> bool:
+        """Return whether a node forked this process, which has not called init_node since."""
+        return self.is_fork and self.node is None and not self.is_shutdown()
+
+    def why_fork_has_no_effect(self, handle: str) -> str:
+        """Return the text of the error about a handle that only a node can use."""
+        return (
+            f"{handle} has no effect in this process, which is a fork of node [{self._forked_from}]: call "
+            "rospy.init_node() in the child process, and create it after that"
+        )
+
+    def report_fork(self, handle: str) -> None:
+        """Log, once for each handle, that it has no effect in this fork of a node."""
+        if handle not in self._reported:
+            self._reported.add(handle)
+            logging.getLogger("rosout").error("%s", self.why_fork_has_no_effect(handle))
 
     def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
         """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
@@ -183,6 +212,8 @@ class Session:
         """Wait until the node shuts down. Raises ROSInitException before init_node."""
         if not self.initialized and not self.is_shutdown() and not self.is_fork:
             raise ROSInitException("client code must call rospy.init_node() first")
+        if self.is_fork_without_node:
+            self.report_fork("rospy.spin()")
         self.lifecycle.spin()
 
     def shut_down_at_exit(self) -> None:
@@ -194,6 +225,7 @@ class Session:
 
     def abandon_in_fork(self) -> None:
         """Detach what is left of this session in a fork: the node, its sockets and its locks are the parent's."""
+        self.is_abandoned = True
         for published in self.published.values():
             published.forget_subscribers()
         self.published, self.subscribed, self.offered = {}, {}, {}
@@ -212,7 +244,8 @@ class Session:
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
-            self._loop.close()
+            finally:
+                self._loop.close()
         if self._master:
             self._master.close()
 

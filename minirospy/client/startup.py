@@ -75,6 +75,7 @@ def init_node(
     if not disable_rostime:
         start_clock()
     session.has_time = True
+    _leave_with_child_process()
     session.publish_node()
     log_setup.start(session, rosout=not disable_rosout)
     if why := wrong_address(session.identity.environment):
@@ -147,6 +148,17 @@ def _install_process_hooks() -> None:
             restore_signals()
 
         os.register_at_fork(before=block_signals, after_in_parent=restore_signals, after_in_child=start_child)
+
+
+def _leave_with_child_process() -> None:
+    """Shut the node down when the function of a multiprocessing.Process returns.
+
+    Such a process calls the finalizers of multiprocessing, but with some versions of Python no atexit functions.
+    """
+    process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
+    if process and util and process.parent_process() is not None:
+        # A high priority: the node leaves before the process joins its own children, as with atexit.
+        util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 
 def _is_interrupt(error: BaseException) -> bool:

@@ -85,7 +85,7 @@ class Subscriber(Topic[_M_co]):
         self.impl = state
 
         try:
-            self._session.when_ready(state.register)
+            self._session.when_ready(state.register, f"the subscriber of {self.resolved_name}")
         except ThreadLimitError:
             self.unregister()
             raise
@@ -104,6 +104,9 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
 
     Raises ROSException after ``timeout``, ROSInterruptException where the node shuts down.
     """
+    session = current_session()
+    if session.is_fork_without_node:
+        raise ROSException(session.why_fork_has_no_effect(f"wait_for_message({topic!r})"))
     if timeout is not None and hasattr(timeout, "to_sec"):
         timeout = timeout.to_sec()
     got: list[_M] = []
@@ -113,7 +116,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
         got.append(message)
         arrived.set()
 
-    with current_session().lifecycle.interrupting(arrived.set):
+    with session.lifecycle.interrupting(arrived.set):
         subscriber = Subscriber(topic, topic_type, on_message)
         try:
             wait_for_event(arrived, timeout)
@@ -121,8 +124,8 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
             subscriber.unregister()
     if got:
         return got[0]
-    if current_session().is_shutdown():
-        raise current_session().lifecycle.interrupted("rospy shutdown")
+    if session.is_shutdown():
+        raise session.lifecycle.interrupted("rospy shutdown")
     raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
 
 
@@ -326,7 +329,7 @@ class SubscribedTopic(SharedTopic):
                     self.resolved_name,
                     header.get("callerid"),
                     data_class._type,
-                    error,
+                    f"no memory for its {len(frame)} bytes" if isinstance(error, MemoryError) else error,
                 )
                 continue
 
@@ -335,16 +338,19 @@ class SubscribedTopic(SharedTopic):
                 statistics.count(message, header, len(frame))
                 statistics = None
             for callback in callbacks:
-                _call(callback, message)
+                _call(callback, message, receivers is not None)
 
 
-def _call(callback: _Callback, message: Message) -> None:
+def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> None:
     try:
         if callback.args is None:
             callback.function(message)
         else:
             callback.function(message, callback.args)
-    except Exception:  # noqa: BLE001 - the user's function: its fault must not end the connection
+    except BaseException as error:
+        # As in rospy, sys.exit() in the thread of a link ends nothing; where Subscriber() was called it ends the program.
+        if is_callers_thread and not isinstance(error, Exception):
+            raise
         # While a shutdown hook releases what the callback uses, an error of it says nothing.
         if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

@@ -242,6 +242,9 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
     if nanoseconds <= 0:
         return
     session = current_session()
+    if session.is_fork_without_node and isinstance(session.clock, SimulatedClock):
+        # Only the parent follows /clock: the sleep would never end.
+        raise ROSInitException(session.why_fork_has_no_effect("simulated time"))
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()
     end = stop or (threading.Event() if lifecycle.is_notified else lifecycle.shutting_down)

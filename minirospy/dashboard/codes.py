@@ -1,7 +1,8 @@
-"""Codes in place of the token in the link that a browser is started with: any user of the machine may list command lines.
+"""Codes that the browser of this machine exchanges for the token: the token itself is never in a file or a command line.
 
-A code is exchanged for the token once, within a minute, on Linux only by a process of the same user or of root. Elsewhere another
-user who is faster than the browser gets it: then the page lacks the rights of the token.
+A code is valid once, for a minute. It is in a file that only this user can read (browser.py). On Linux the connection that sends
+it must also belong to this user or to root; a connection without a known owner is refused. Other systems have no table
+of connections that an unprivileged program can read: there the code alone decides.
 """
 
 from __future__ import annotations
@@ -11,17 +12,27 @@ import secrets
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.bridge.web.owners import owner_of
 
 if TYPE_CHECKING:
-    from minirospy.bridge.web.client import Exchange
+    from minirospy.bridge.web.client import Exchange, HttpRequest
 
-__all__ = ["Codes", "users_of"]
+__all__ = ["LIFETIME", "Codes"]
 
-_SECONDS = 60.0
-_TABLES = ("/proc/net/tcp", "/proc/net/tcp6")
-_ESTABLISHED = "01"
+LIFETIME = 60.0  # seconds; the browser is started immediately, and asks within a few
+_ROOT = 0
+
+
+def _nothing() -> None:
+    """Do nothing."""
+
+
+class _Code(NamedTuple):
+    token: str
+    end: float
+    on_end: Callable[[], object] = _nothing
 
 
 class Codes:
@@ -29,47 +40,67 @@ class Codes:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._waiting: dict[str, tuple[str, float]] = {}
+        self._waiting: dict[str, _Code] = {}
 
     def new(self, token: str) -> str:
         """Return a code for a token."""
+        self.forget_expired()
         code = secrets.token_urlsafe(16)
-        self._waiting[code] = token, self._clock() + _SECONDS
+        self._waiting[code] = _Code(token, self._clock() + LIFETIME)
         return code
 
+    def when_ended(self, code: str, action: Callable[[], object]) -> None:
+        """Call ``action`` once, when a code has been used, has expired or is forgotten."""
+        found = self._waiting.get(code)
+        if found:
+            self._waiting[code] = found._replace(on_end=action)
+        else:
+            action()
+
+    def token_of(self, code: str) -> str:
+        """Return the token of a code, which stays valid; "" if there is none."""
+        self.forget_expired()
+        found = self._waiting.get(code)
+        return found.token if found else ""
+
     def redeem(self, code: str) -> str:
-        """Return the token of a code, which is used with that; "" where there is none."""
-        token, end = self._waiting.pop(code, ("", 0.0))
-        return token if self._clock() < end else ""
+        """Return the token of a code, which is valid no longer; "" if there is none."""
+        token = self.token_of(code)
+        self._forget(code)
+        return token
+
+    def forget_expired(self) -> None:
+        """Forget the codes whose time is over."""
+        now = self._clock()
+        for code in [code for code, found in self._waiting.items() if now >= found.end]:
+            self._forget(code)
+
+    def close(self) -> None:
+        """Forget all codes. Idempotent."""
+        for code in list(self._waiting):
+            self._forget(code)
 
     def serve(self, exchange: Exchange) -> None:
-        """Answer the page that sends a code as a bearer token."""
+        """Answer the page that sends a code as a bearer token. A refused request leaves the code valid."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
-        token = self.redeem(code)
-        if token and users_of(exchange.request.peer_port, exchange.request.port) <= {0, _user()}:
-            exchange.respond(200, token.encode())
-        else:
+        if not self.token_of(code):
             exchange.respond(403, b"this link has been used\n")
+        elif not _is_trusted(exchange.request):
+            exchange.respond(403, b"this code is for the user who started the dashboard, on this machine\n")
+        else:
+            exchange.respond(200, self.redeem(code).encode())
+
+    def _forget(self, code: str) -> None:
+        found = self._waiting.pop(code, None)
+        if found:
+            found.on_end()
 
 
-def _user() -> int:
-    return os.getuid() if sys.platform != "win32" else 0
-
-
-def users_of(port: int, peer_port: int) -> set[int]:
-    """Return the users of the sockets on this machine that have a port and are connected to the other, as far as that is known.
-
-    Source: proc_net_tcp of the kernel's documentation.
-    """
-    found = set()
-    for table in _TABLES:
-        try:
-            lines = Path(table).read_text(encoding="ascii").splitlines()[1:]
-        except (OSError, ValueError):
-            continue
-        for line in lines:
-            _, local, remote, state, *rest = line.split()
-            ports = [int(each.rpartition(":")[2], 16) for each in (local, remote)]
-            if ports == [port, peer_port] and state == _ESTABLISHED:
-                found.add(int(rest[3]))
-    return found
+def _is_trusted(request: HttpRequest) -> bool:
+    """Return whether a request is from this user or root; on other systems than Linux the code is the only proof."""
+    if sys.platform != "linux":
+        return True
+    return owner_of((request.peer, request.peer_port), (request.address, request.port)) in (
+        _ROOT,
+        os.getuid(),
+    )

@@ -67,6 +67,7 @@ class Dashboard:
 
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""
+        self.codes.close()
         async with AsyncExitStack() as closing:
             # In reverse, and all, whichever fails. Players publish until their sessions end, and the graph is the bridge's.
             for part in (

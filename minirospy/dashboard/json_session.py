@@ -12,6 +12,7 @@ import contextlib
 import json
 import logging
 import math
+import sys
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
@@ -29,6 +30,9 @@ __all__ = ["Fields", "Handler", "JsonDoor", "JsonSession", "number", "text_of", 
 _log = logging.getLogger(__name__)
 
 _LONGEST_ERROR = 1000
+_VALUE_FACTOR = 4
+"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
+
 _INTERNAL_ERROR = 1011
 """Of a WebSocket that is closed, RFC 6455, section 7.4.1."""
 
@@ -62,7 +66,12 @@ class JsonSession:
         self.client = client
         self.is_ended = False
         self._handlers = handlers
-        self._operations: deque[tuple[str, Fields]] = deque()
+        self._operations: deque[tuple[str, Fields, int]] = deque()
+        """Name, fields and memory of those that wait."""
+        self._carried_out_size = 0
+        """Memory of those that are carried out."""
+        self._operation_size = 0
+        """Memory of the operation that was received last."""
         self._thread = ThreadPoolExecutor(1, type(self).__name__)
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
@@ -103,8 +112,13 @@ class JsonSession:
         if len(self._operations) >= self.most_waiting:
             self.send_error("too many operations wait: this one was dropped", fields)
             return
-        self._operations.append((name, fields))
+        self._operations.append((name, fields, self._operation_size))
+        self.count()
         self._wake.set()
+
+    def count(self) -> None:
+        """Count what is kept of the client in the account of the server."""
+        self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
         """Run what blocks in the session's thread, after what was started there before."""
@@ -133,6 +147,7 @@ class JsonSession:
             self.send_error(f"an operation on {self.subject} has {self.longest} characters at most")
             return
         try:
+            self._operation_size = _VALUE_FACTOR * sys.getsizeof(text)
             fields = json.loads(text)
             if not isinstance(fields, dict):
                 raise TypeError("not an object")
@@ -176,8 +191,10 @@ class JsonSession:
             while True:
                 self._wake.clear()
                 while self._operations:
-                    name, fields = self._operations.popleft()
+                    name, fields, self._carried_out_size = self._operations.popleft()
                     await self.carry_out(name, fields)
+                    self._carried_out_size = 0
+                    self.count()
                     self.changed()
                 await self._look()
                 if not self._operations:

@@ -165,8 +165,17 @@ class ToolsSession(JsonSession):
             self.send_error("too many requests wait for their answers", fields)
             return
         task = asyncio.ensure_future(self.carry_out(name, fields))
+        size = self._operation_size
         self._running.add(task)
-        task.add_done_callback(self._running.discard)
+        self._carried_out_size += size
+        self.count()
+
+        def ended(task: asyncio.Task[None]) -> None:
+            self._running.discard(task)
+            self._carried_out_size -= size
+            self.count()
+
+        task.add_done_callback(ended)
 
     def send_answer(self, answer: object, fields: Fields) -> None:
         """See :meth:`JsonSession.send_answer`."""

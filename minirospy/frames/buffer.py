@@ -116,6 +116,8 @@ class Buffer(BufferCore, BufferInterface):
         if nanoseconds(timeout) > 0:
             wait_until(self, lambda: bool(possible()[0]), timeout, self.CAN_TRANSFORM_POLLING_SCALE)
         result = possible()
+        if not result[0] and current_session().is_fork_without_node:
+            current_session().report_fork("a tf2_ros.Buffer of the parent process")
         return result if return_debug_tuple else result[0]
 
     def _get_frames(self, request: FrameGraphRequest) -> FrameGraphResponse:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from minirospy.images.sizes import size_of
 from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     from minirospy.images.encodings import Pixels
 
-__all__ = ["Options", "decode", "encode", "opencv"]
+__all__ = ["MAX_PIXELS", "Options", "decode", "encode", "opencv"]
 
 _FORMATS = {
     **dict.fromkeys(("jpg", "jpeg", "jpe"), "JPEG"),
@@ -23,6 +24,10 @@ _FORMATS = {
 }
 _QUALITY = 95
 """Of JPEG, as OpenCV has it."""
+
+
+MAX_PIXELS = 100_000_000
+"""Pixels of an image that is decoded: a file of some kilobytes may have ten times as many, and take gigabytes."""
 
 
 class Options(NamedTuple):
@@ -51,12 +56,21 @@ def require_library() -> None:
         _pillow()
 
 
-def decode(data: bytes) -> Pixels:
-    """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA. Raises ValueError."""
+def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Pixels:
+    """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA.
+
+    Raise ValueError if it is not one, or has more pixels than ``max_pixels``, before anything is decoded. With a lower limit than
+    usual, an image whose size cannot be known before is refused, too.
+    """
     import numpy as np
 
+    size = size_of(data)
+    if size:
+        _check_size(size, max_pixels)
     cv2 = opencv()
     if cv2:
+        if size is None and data and max_pixels < MAX_PIXELS:
+            raise ValueError(f"{len(data)} bytes are of an image format that is not known")
         image: Pixels | None = (
             cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
         )
@@ -67,6 +81,7 @@ def decode(data: bytes) -> Pixels:
     pillow = _pillow()
     try:
         with pillow.open(BytesIO(data)) as picture:
+            _check_size(picture.size, max_pixels)
             if picture.mode.startswith("I;16"):
                 return np.asarray(picture).astype(np.uint16)
             if picture.mode not in ("L", "RGB", "RGBA"):
@@ -76,6 +91,12 @@ def decode(data: bytes) -> Pixels:
             return _swapped(np.asarray(picture))
     except (OSError, ValueError, SyntaxError, pillow.DecompressionBombError) as error:
         raise ValueError(f"{len(data)} bytes are not an image that Pillow can read: {error}") from error
+
+
+def _check_size(size: tuple[int, int], max_pixels: int) -> None:
+    width, height = size
+    if width * height > max_pixels:
+        raise ValueError(f"an image of {width}x{height} pixels is too large: {max_pixels} are allowed")
 
 
 def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from minirospy.errors import MinirospyError
-from minirospy.introspect.values import check_yaml
+from minirospy.yaml_text import fast_loader, load_all
 
 __all__ = ["configuration_documents", "parameter_values"]
 
@@ -15,10 +15,7 @@ def configuration_documents(text: str) -> list[object]:
     """
     import yaml
 
-    # The compiled one, where it is: the other one takes seconds for a few hundred kilobytes.
-    fastest: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-    class Loader(fastest):  # type: ignore[valid-type,misc]
+    class Loader(fast_loader()):  # type: ignore[misc]
         pass
 
     def config(loader: yaml.SafeLoader, _class: str, node: yaml.MappingNode) -> object:
@@ -26,13 +23,9 @@ def configuration_documents(text: str) -> list[object]:
 
     Loader.add_multi_constructor("tag:yaml.org,2002:python/object/new:", config)
     try:
-        check_yaml(text)
-        return [each for each in yaml.load_all(text, Loader=Loader) if each is not None]
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        return [each for each in load_all(text, Loader) if each is not None]
+    except yaml.YAMLError as error:
         raise MinirospyError(f"not YAML: {' '.join(str(error).split())}") from error
-    except (LookupError, AttributeError, TypeError) as error:
-        # What the library raises for tags such as !!bool and !!timestamp on other text.
-        raise MinirospyError("not YAML: a tag (!!) does not fit its value") from error
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:

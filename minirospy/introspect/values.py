@@ -13,7 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
+from minirospy import yaml_text
 from minirospy.errors import ValueTextError
+from minirospy.yaml_text import one_line
 
 if TYPE_CHECKING:
     import yaml
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 __all__ = [
     "add_angles",
     "check_parameter",
-    "check_yaml",
     "format_pretty",
     "format_value",
     "message_values",
@@ -37,10 +38,8 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_MOST_YAML_LEVELS = 200
-_YAML_INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
-_MOST_YAML_VALUES = 1_000_000
 _LONGEST_ANGLE = 200
+_LONGEST_SHOWN = 40  # digits of an integer that an error shows
 
 
 def parse_value(text: str) -> object:
@@ -58,13 +57,12 @@ def parse_value(text: str) -> object:
     import yaml
 
     try:
-        check_yaml(text)
-        return yaml.load(text, Loader=_loader())
-    except UnicodeEncodeError:
-        # A byte of the command line that is not UTF-8 is a usage error, which the command reports.
-        raise
-    except (yaml.YAMLError, ValueError) as error:
-        raise ValueTextError(text, _complaint(error)) from error
+        return yaml_text.load(text, _loader())
+    except yaml.YAMLError as error:
+        if isinstance(error.__cause__, UnicodeEncodeError):
+            # A byte of the command line that is not UTF-8 is a usage error, which the command reports.
+            raise error.__cause__ from None
+        raise ValueTextError(text, one_line(error)) from error
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
@@ -72,56 +70,9 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
     import yaml
 
     try:
-        check_yaml(text)
-        yield from yaml.load_all(text, Loader=_loader())
-    except (yaml.YAMLError, ValueError) as error:
-        raise ValueTextError(where, _complaint(error)) from error
-
-
-def check_yaml(text: str) -> None:
-    """Raise ValueError where a YAML text is nested too deeply, or unfolds to too much by its aliases.
-
-    Libraries of YAML read both: the first one may crash Python, what the second one gives is small only as long as
-    nobody sends or prints it. Raise yaml.YAMLError where it is not YAML.
-    """
-    # How deep it can be at most: by its brackets, and by what its lines start with. Nearly every text ends here.
-    indent = max(map(len, _YAML_INDENT.findall(text)), default=0)
-    has_aliases = "*" in text and "&" in text
-    if text.count("[") + text.count("{") + 2 * indent < _MOST_YAML_LEVELS and not has_aliases:
-        return
-    import yaml
-
-    counts = [0]
-    """How many values each open collection has so far; the document's own first."""
-    anchors: list[str | None] = []
-    sizes: dict[str, int | None] = {}
-    """Anchor -> the values in what it names; None while that is open."""
-    loader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    for event in yaml.parse(text, Loader=loader):
-        match event:
-            case yaml.AliasEvent(anchor=name):
-                size = sizes.get(str(name), 1)
-                if size is None:
-                    raise ValueError(f"the alias *{name} is inside of what it names")
-                counts[-1] += size
-            case yaml.ScalarEvent(anchor=name):
-                counts[-1] += 1
-                if name:
-                    sizes[name] = 1
-            case yaml.CollectionStartEvent(anchor=name):
-                counts.append(1)
-                anchors.append(name)
-                if name:
-                    sizes[name] = None
-            case yaml.CollectionEndEvent():
-                size, name = counts.pop(), anchors.pop()
-                counts[-1] += size
-                if name:
-                    sizes[name] = size
-        if len(counts) > _MOST_YAML_LEVELS:
-            raise ValueError(f"it is nested deeper than {_MOST_YAML_LEVELS} levels")
-        if has_aliases and counts[-1] > _MOST_YAML_VALUES:
-            raise ValueError(f"its aliases unfold to more than {_MOST_YAML_VALUES} values")
+        yield from yaml_text.load_all(text, _loader())
+    except yaml.YAMLError as error:
+        raise ValueTextError(where, one_line(error)) from error
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
@@ -181,7 +132,12 @@ def check_parameter(value: object, name: str) -> None:
     elif value is None:
         raise ValueTextError(name, "null is not a value of a parameter: use '' or delete the parameter")
     elif isinstance(value, int) and not -_INT32 <= value < _INT32:
-        raise ValueTextError(name, f"{value} is more than a parameter's 32 bits hold: write {value}.0")
+        digits = format_value(value)
+        if len(digits) > _LONGEST_SHOWN:
+            raise ValueTextError(
+                name, f"{digits[:_LONGEST_SHOWN]}... is more than a parameter's 32 bits hold"
+            )
+        raise ValueTextError(name, f"{digits} is more than a parameter's 32 bits hold: write {digits}.0")
     elif not isinstance(value, bool | int | float | str | bytes):
         raise ValueTextError(
             name,
@@ -218,19 +174,11 @@ def _pretty_lines(table: dict[str, object], indent: str) -> Iterator[str]:
             yield f"{indent}{key}: {text}"
 
 
-def _complaint(error: Exception) -> str:
-    """Return a YAML library's complaint on one line."""
-    problem = " ".join(str(getattr(error, "problem", None) or error).split())
-    mark = getattr(error, "problem_mark", None)
-    return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
-
-
 @lru_cache(maxsize=1)
 def _loader() -> type[yaml.SafeLoader]:
     """Return a safe YAML loader that knows angles."""
-    import yaml
 
-    class AngleLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    class AngleLoader(yaml_text.fast_loader()):  # type: ignore[misc]
         pass
 
     add_angles(AngleLoader)

@@ -6,13 +6,13 @@ Source: http://wiki.ros.org/roslaunch/XML.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import TypeVar
-from xml.parsers import expat
 
 from minirospy.errors import LaunchError, NotFoundError
 from minirospy.launch.substitution import Substitution, SubstitutionError
 from minirospy.suggestions import nearest
+from minirospy.xml_text import XmlElement as Element
+from minirospy.xml_text import XmlError, XmlSyntaxError, parse_xml
 
 __all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
 
@@ -40,58 +40,22 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 }
 """Each tag, and the attributes that it may have."""
 
-_MOST_LEVELS = 100
 _TRUTH = {"true": True, "false": False}
 _CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
 
-@dataclass
-class Element:
-    """A tag as it is in the file, on ``line``; ``text`` is its text without that of its children."""
-
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[Element] = field(default_factory=list)
-    text: str = ""
-
-
 def parse_document(text: bytes, file: str) -> Element:
     """Return the ``<launch>`` of a launch file. Raises LaunchError."""
-    parser = expat.ParserCreate()
-    stack: list[Element] = []
-    roots: list[Element] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        if len(stack) >= _MOST_LEVELS:
-            raise LaunchError(
-                file, parser.CurrentLineNumber, f"tags are nested deeper than {_MOST_LEVELS} levels"
-            )
-        element = Element(tag, attributes, parser.CurrentLineNumber)
-        (stack[-1].children if stack else roots).append(element)
-        stack.append(element)
-
-    def end(_: str) -> None:
-        stack.pop()
-
-    def data(part: str) -> None:
-        if stack:
-            stack[-1].text += part
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = data
     try:
-        parser.Parse(text, True)
-    except expat.ExpatError as error:
-        why = expat.ErrorString(error.code)
-        why = f"Invalid roslaunch XML syntax: {why} (column {error.offset})"
-        raise LaunchError(file, error.lineno, why) from None
-    except (LookupError, ValueError) as error:
-        raise LaunchError(file, 0, f"Invalid roslaunch XML syntax: {error}") from None
-    if roots[0].tag != "launch":
-        why = f"Invalid roslaunch XML syntax: no root <launch> tag, but <{roots[0].tag}>"
-        raise LaunchError(file, roots[0].line, why)
-    return roots[0]
+        root = parse_xml(text)
+    except XmlSyntaxError as error:
+        raise LaunchError(file, error.line, f"Invalid roslaunch XML syntax: {error.why}") from None
+    except XmlError as error:
+        raise LaunchError(file, error.line, error.why) from None
+    if root.tag != "launch":
+        why = f"Invalid roslaunch XML syntax: no root <launch> tag, but <{root.tag}>"
+        raise LaunchError(file, root.line, why)
+    return root
 
 
 class Tag:

@@ -9,7 +9,16 @@ from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.suggestions import nearest
 from minirospy.workspace.packages import Packages, package_name
 
-__all__ = ["LaunchFileNotFoundError", "find_files", "hidden_hint", "near_files", "read_launch_file"]
+__all__ = [
+    "LaunchFileNotFoundError",
+    "find_files",
+    "hidden_hint",
+    "near_files",
+    "read_bytes",
+    "read_launch_file",
+]
+
+_MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file of a hundred robots has some 100 kB
 
 
 class LaunchFileNotFoundError(MinirospyError):
@@ -53,10 +62,19 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
 def read_launch_file(file: str) -> bytes:
     """Return a file's bytes. Raise LaunchError."""
     try:
-        return Path(file).read_bytes()
+        return read_bytes(file)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise LaunchError(file, 0, f"cannot be read: {why}") from error
+
+
+def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
+    """Return a file's bytes. Raise OSError, ValueError: for more than ``limit`` bytes, as a device such as /dev/zero has."""
+    with open(file, "rb") as stream:
+        data = stream.read(limit + 1)
+    if len(data) > limit:
+        raise ValueError(f"it has more than {limit} bytes")
+    return data
 
 
 def near_files(file: str) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from minirospy import names
 from minirospy.errors import LaunchError
 from minirospy.launch.document import Tag, parse_document
-from minirospy.launch.files import hidden_hint, near_files, read_launch_file
+from minirospy.launch.files import hidden_hint, near_files, read_bytes, read_launch_file
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
 from minirospy.launch.substitution import Substitution
@@ -32,8 +32,15 @@ __all__ = [
 
 STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
+_MAX_INCLUDES = (
+    10_000  # files that a launch loads; 26 files that include the next one twice would be 67,108,863
+)
 
 Problems = list[LaunchError]
+
+
+class _TooManyIncludesError(LaunchError):
+    """A launch that loads files without end."""
 
 
 class LaunchSource(NamedTuple):
@@ -193,6 +200,9 @@ class _File:
                 # Known, whether its `if` lets it be or not.
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
+        except _TooManyIncludesError:
+            # It ends the load: each file that is open would report it once for each of its includes.
+            raise
         except LaunchError as error:
             self.report(error)
             return scope
@@ -239,6 +249,13 @@ class _File:
                 f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
             )
 
+        if len(self._spec.includes) >= _MAX_INCLUDES:
+            raise _TooManyIncludesError(
+                self._file,
+                tag.line,
+                f"more than {_MAX_INCLUDES} files are included: do files include others twice?",
+            )
+
         inner = self._below(tag, scope)
         self._clear(tag, inner)
         hands_on_all = tag.flag("pass_all_args")
@@ -260,7 +277,7 @@ class _File:
                 given[name] = value
         self._spec.includes.append((self._file, file))
         try:
-            text = Path(file).read_bytes()
+            text = read_bytes(file)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             hint = near_files(file) + hidden_hint(file, self._substitution.packages)

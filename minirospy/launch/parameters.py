@@ -20,6 +20,7 @@ from minirospy.errors import ValueTextError
 from minirospy.introspect.parameters import flatten
 from minirospy.introspect.values import check_parameter, parse_value
 from minirospy.launch.document import Tag
+from minirospy.launch.files import read_bytes
 from minirospy.launch.substitution import convert
 from minirospy.workspace.packages import Packages, built_in_roots, is_python
 
@@ -32,6 +33,7 @@ _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
 _ERRORS_KEPT = 65_536
 """Bytes of a command's standard error in which the reason is looked for."""
 _ERRORS_SECONDS = 1.0
+_MAX_VALUE = 64 * 1024 * 1024  # bytes of a file or a command's output: the master accepts no larger request
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
@@ -89,7 +91,7 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
 
 def _read(tag: Tag, file: str) -> bytes:
     try:
-        return Path(file).read_bytes()
+        return read_bytes(file, _MAX_VALUE)
     except FileNotFoundError:
         raise tag.error(f"file does not exist [{file}]") from None
     except (OSError, ValueError) as error:
@@ -106,21 +108,23 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 def _output_of(tag: Tag, command: str) -> str:
     """Return the output of a command, which is run without a shell."""
     try:
-        done, reason = _run(_command_words(shlex.split(command)))
+        status, output, reason = _run(_command_words(shlex.split(command)))
     except ValueError as error:
         raise tag.error(f"command [{command}]: {error}") from None
     except (OSError, IndexError):
         raise tag.error(f"no such command [{command}]") from None
-    if done.returncode:
+    if len(output) > _MAX_VALUE:
+        raise tag.error(f"command [{command}] has written more than {_MAX_VALUE} bytes, and was stopped")
+    if status:
         why = f": {reason}" if reason else ""
-        raise tag.error(f"command [{command}] returned with code [{done.returncode}]{why}")
-    return _decoded(tag, command, done.stdout)
+        raise tag.error(f"command [{command}] returned with code [{status}]{why}")
+    return _decoded(tag, command, output)
 
 
-def _run(words: list[str]) -> tuple[subprocess.CompletedProcess[bytes], str]:
+def _run(words: list[str]) -> tuple[int, bytes, str]:
     """Run a command; return its status and output, and the line of its standard error that gives the reason.
 
-    Standard error is passed on as it comes.
+    Standard error is passed on as it comes. A command that writes more than _MAX_VALUE bytes is killed.
     """
     end = bytearray()
     reading, writing = os.pipe()
@@ -128,12 +132,26 @@ def _run(words: list[str]) -> tuple[subprocess.CompletedProcess[bytes], str]:
     reader.start()
 
     try:
-        done = subprocess.run(words, stdout=subprocess.PIPE, stderr=writing, check=False)
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=writing)
+        assert process.stdout
+        try:
+            output = process.stdout.read(_MAX_VALUE + 1)
+            if len(output) > _MAX_VALUE:
+                process.kill()
+            status = process.wait()
+        except BaseException:
+            # Ctrl-C, which the command may ignore.
+            process.kill()
+            process.wait()
+            raise
+        finally:
+            # What the command has left running gets a broken pipe.
+            process.stdout.close()
     finally:
         os.close(writing)
         # What the command has left running may keep its end open.
         reader.join(_ERRORS_SECONDS)
-    return done, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
+    return status, output, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
 
 
 def _reason(errors: str) -> str:

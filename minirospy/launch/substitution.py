@@ -18,7 +18,7 @@ from minirospy.workspace.packages import Packages
 __all__ = ["Substitution", "SubstitutionError", "convert"]
 
 _PATTERN = re.compile(r"\$\(([^$()]+)\)")
-_NESTED = re.compile(r"\$\([^()]*(\$\()?[^()]*\(")
+_NESTED = re.compile(r"\$\([^()]*\(")
 _EVAL = re.compile(r"\$\(eval (.*)\)\Z", re.DOTALL)
 _ONE = {
     "find": "$(find pkg) takes one package",
@@ -26,6 +26,8 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
+_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters that the substitutions of a load give; args of args double
+_MAX_SHOWN = 200  # characters of a text that an error shows
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
@@ -48,6 +50,8 @@ class Substitution:
     anonymous: dict[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     unset: dict[str, str] = field(default_factory=dict)
+    given: list[int] = field(default_factory=lambda: [0])
+    """The characters that substitutions have given so far, in all files of a load."""
 
     def apply(self, text: str) -> str:
         """``text`` with every substitution made. Raises SubstitutionError, NotFoundError."""
@@ -57,13 +61,22 @@ class Substitution:
         if whole:
             return self._eval(whole[1])
         if _NESTED.search(text):
-            raise SubstitutionError(f"[{text}]: a substitution cannot hold another, nor brackets")
-        return _PATTERN.sub(lambda match: self._one(match[1]), text)
+            raise SubstitutionError(f"[{_shown(text)}]: a substitution cannot hold another, nor brackets")
+        return _PATTERN.sub(lambda match: self._counted(self._one(match[1])), text)
+
+    def _counted(self, text: str) -> str:
+        self.given[0] += len(text)
+        if self.given[0] > _MAX_SUBSTITUTED:
+            raise SubstitutionError(
+                f"the substitutions of this launch give more than {_MAX_SUBSTITUTED} characters: "
+                "does an arg hold another one several times, and that one a third?"
+            )
+        return text
 
     def _one(self, text: str) -> str:
         verb, *words = text.split() or [""]
         if verb in _ONE and len(words) != 1:
-            raise SubstitutionError(f"[$({text})]: {_ONE[verb]}")
+            raise SubstitutionError(f"[$({_shown(text)})]: {_ONE[verb]}")
         rules: dict[str, Callable[[], str]] = {
             "find": lambda: str(self.packages.find(words[0])),
             "arg": lambda: self._arg(words[0]),
@@ -73,9 +86,13 @@ class Substitution:
             "dirname": self._dirname,
         }
         if verb == "eval":
-            raise SubstitutionError(f"[$({text})]: $(eval ...) must stand alone, and holds an expression")
+            raise SubstitutionError(
+                f"[$({_shown(text)})]: $(eval ...) must stand alone, and holds an expression"
+            )
         if verb not in rules:
-            raise SubstitutionError(f"Unknown substitution command [{text}]: there are {', '.join(_VERBS)}")
+            raise SubstitutionError(
+                f"Unknown substitution command [{_shown(text)}]: there are {', '.join(_VERBS)}"
+            )
         return rules[verb]()
 
     def _arg(self, name: str) -> str:
@@ -125,12 +142,16 @@ class Substitution:
 
         scope = _Names(self, {**vars(builtins), **vars(math), **functions})
         try:
-            return str(eval(expression.strip(), {"__builtins__": {}}, scope))
+            return self._counted(str(eval(expression.strip(), {"__builtins__": {}}, scope)))
         except SubstitutionError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever the expression does wrong
             why = " ".join(str(error).split())
-            raise SubstitutionError(f"[{expression}] cannot be evaluated: {why}") from None
+            raise SubstitutionError(f"[{_shown(expression)}] cannot be evaluated: {why}") from None
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
 class _Names(dict[str, object]):
@@ -164,13 +185,14 @@ def convert(text: str, type_: str) -> object:
     if kind == "yaml":
         import yaml
 
-        from minirospy.introspect.values import check_yaml
+        from minirospy.yaml_text import fast_loader, load
 
         try:
-            check_yaml(text)
-            return yaml.safe_load(text)
+            loaded: object = load(text, fast_loader())
         except yaml.YAMLError as error:
-            raise ValueError(f"not YAML: {getattr(error, 'problem', None) or error}") from None
+            why = " ".join(str(getattr(error, "problem", None) or error).split())
+            raise ValueError(f"not YAML: {why}") from None
+        return loaded
     raise ValueError(f"Unknown type '{type_}': there are str, int, double, bool, yaml and auto")
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from minirospy.errors import MinirospyError
 from minirospy.maps.grid import UNKNOWN_GREY, MapError, read_settings
 from minirospy.maps.images import read_image
+from minirospy.yaml_text import load, one_line
 
 __all__ = ["crop", "main"]
 
@@ -59,5 +60,8 @@ def _crop_file(path: str, name: str) -> None:
     image, origin = crop(pixels[..., 0], settings.resolution, settings.origin)
     height, width = image.shape
     Path(f"{name}.pgm").write_bytes(b"P5\n%d %d\n255\n" % (width, height) + image.tobytes())
-    fields = {**yaml.safe_load(text), "image": f"{name}.pgm", "origin": list(origin)}
+    try:
+        fields = {**load(text, yaml.SafeLoader), "image": f"{name}.pgm", "origin": list(origin)}
+    except yaml.YAMLError as error:
+        raise MapError(f"The map's file is not YAML: {one_line(error)}") from error
     Path(f"{name}.yaml").write_text(yaml.dump(fields), encoding="utf-8")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from minirospy.errors import MinirospyError
 from minirospy.maps.images import Pixels
+from minirospy.yaml_text import load
 
 __all__ = [
     "FREE_GREY",
@@ -67,12 +68,12 @@ def read_settings(text: str) -> MapSettings:
     """Return the settings in a map's YAML file. Raises MapError in the real program's words."""
     try:
         # As texts: yaml-cpp takes `1e-3` as a number, which YAML 1.1 does not, and refuses `false` as one.
-        found = yaml.load(text, yaml.BaseLoader)
+        found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f" in line {mark.line + 1}" if mark else ""
         raise MapError(
-            f"The map's file is not YAML{place}: {getattr(error, 'problem', None) or error}"
+            f"The map's file is not YAML{place}: {' '.join(str(getattr(error, 'problem', None) or error).split())}"
         ) from error
     fields: dict[str, Any] = found if isinstance(found, dict) else {}
 

@@ -4,3 +4,8 @@
 `player` are the nodes, `disk` writes files in a thread, `keys` reads single keys of a terminal.
 Source: http://wiki.ros.org/rosbag/Commandline.
 """
+
+from minirospy.ros1_imports import prefer_ros1
+
+# Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
+prefer_ros1()

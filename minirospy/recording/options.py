@@ -19,7 +19,7 @@ _SECOND = 10**9
 _FOREVER = 1e12
 _UNITS = {"s": 1, "m": 60, "h": 3600}
 _MULTIPLIERS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30}
-_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_NUMBER = re.compile(r"\s*[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 
 
 class RecordOptions(NamedTuple):

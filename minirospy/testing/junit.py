@@ -13,6 +13,7 @@ from typing import ClassVar
 from xml.etree import ElementTree
 
 from minirospy import private_files
+from minirospy.xml_text import XmlError, check_xml
 
 __all__ = [
     "Result",
@@ -202,14 +203,15 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
         print(f"WARN: cannot read test result file [{test_file}]: test file does not exist")
         return Result(test_name)
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        check_xml(text := path.read_bytes())
+        root = ElementTree.fromstring(text)
         suites = list(root.iter("testsuite"))
         if not suites:
             raise ValueError("it has no <testsuite>")
         result = Result(test_name)
         for suite in suites:
             result.accumulate(_read_suite(suite, f"{path.parent.name}.{path.stem}", test_name))
-    except (ElementTree.ParseError, ValueError) as error:
+    except (ElementTree.ParseError, XmlError, ValueError) as error:
         print(f"WARN: cannot read test result file [{test_file}]: {error}")
         return Result(test_name)
     return result

@@ -7,7 +7,7 @@ import re
 
 __all__ = ["NotANumberError", "as_float", "parse_numbers", "parse_vector"]
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class NotANumberError(ValueError):

@@ -186,9 +186,14 @@ class FrameReader:
         self._large: bytearray | None = None
         # Of the large frame: the bytes that have come, and all that belong to it.
         self._filled: int
-        self._wanted: int
+        self._wanted = 0
         # Bytes of a frame that is left out, which are still to come.
         self._left_out = 0
+
+    @property
+    def wanted(self) -> int:
+        """The bytes of the large frame that is coming, or of the last one."""
+        return self._wanted
 
     def put_back(self, data: bytes) -> None:
         """Begin with these few bytes, where nothing is held."""
@@ -255,8 +260,8 @@ class FrameReader:
             return
         if length > self._limit:
             raise WireError(f"a message of {length} bytes is over the limit of {self._limit}")
+        self._wanted = length
         self._large = bytearray(min(length, _FIRST_CLAIM))
         self._filled = self._end - at
-        self._wanted = length
         self._large[: self._filled] = self._small[at : self._end]
         self._start = self._end = 0

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from minirospy.errors import ManifestError
+from minirospy.xml_text import MAX_LEVELS, XmlError, new_parser
 
 __all__ = [
     "PACKAGE_NAME",
@@ -190,10 +191,11 @@ class _Element:
 def _parse(text: bytes | str, path: Path) -> _Element:
     top = _Element("", {}, 0)
     stack = [top]
-    parser = expat.ParserCreate()
-    parser.buffer_text = True
+    parser = new_parser()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(stack) > MAX_LEVELS:
+            raise XmlError(parser.CurrentLineNumber, f"tags are nested deeper than {MAX_LEVELS} levels")
         element = _Element(tag, attributes, parser.CurrentLineNumber)
         stack[-1].children.append(element)
         stack.append(element)
@@ -210,6 +212,8 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     parser.CharacterDataHandler = data
     try:
         parser.Parse(text, True)
+    except XmlError as error:
+        raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
         # A name of an encoding that Python does not know is a LookupError.
         code = getattr(error, "code", None)
@@ -383,6 +387,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
+_MAX_BRACKETS = 50  # in a condition; each level recurses three times
 _COMPARE = {
     "==": str.__eq__,
     "!=": str.__ne__,
@@ -400,6 +405,7 @@ class _Condition:
         self._variables = variables
         self._tokens = list(_TOKEN.finditer(text.rstrip()))
         self._next = 0
+        self._open = 0
 
     def value(self) -> bool:
         result = self._any()
@@ -421,7 +427,11 @@ class _Condition:
 
     def _one(self) -> bool:
         if self._took("("):
+            self._open += 1
+            if self._open > _MAX_BRACKETS:
+                raise ValueError(f"brackets are nested deeper than {_MAX_BRACKETS} levels")
             result = self._any()
+            self._open -= 1
             if not self._took(")"):
                 raise ValueError("')' is missing")
             return result

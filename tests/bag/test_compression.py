@@ -5,6 +5,9 @@ from __future__ import annotations
 import bz2
 import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import lz4.frame
 import pytest
@@ -97,3 +100,70 @@ def test_missing_lz4_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
     with pytest.raises(BagCompressionError, match=re.escape(install_command("lz4"))):
         check_compression(LZ4)
+
+
+def bomb(name: str, size: int) -> bytes:
+    """Return compressed zeros, made in pieces."""
+    if name == BZ2:
+        stream = bz2.BZ2Compressor()
+        return b"".join(stream.compress(bytes(1 << 20)) for _ in range(size >> 20)) + stream.flush()
+    with lz4.frame.LZ4FrameCompressor() as frame:
+        parts = [frame.begin(), *(frame.compress(bytes(1 << 20)) for _ in range(size >> 20))]
+        return b"".join((*parts, frame.flush()))
+
+
+@pytest.mark.parametrize("name", [BZ2, LZ4])
+def test_more_than_the_limit_is_refused_before_anything_is_decompressed(name: str) -> None:
+    with pytest.raises(BagFormatError, match="a compressed chunk of 4294967295 bytes: more than 1140850688"):
+        decompress(name, b"no " * 10_000_000, 2**32 - 1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system tells the peak in other units, or not")
+@pytest.mark.parametrize("name", [BZ2, LZ4])
+@pytest.mark.parametrize("announced", [96, 100, 40])
+def test_much_data_is_in_memory_once(name: str, announced: int, tmp_path: Path) -> None:
+    file = tmp_path / "data"
+    file.write_bytes(bomb(name, 96 << 20))
+    program = f"""
+import resource, sys
+from minirospy.bag.compression import decompress
+from minirospy.errors import BagFormatError
+data = open(sys.argv[1], "rb").read()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    print(len(decompress({name!r}, data, {announced} << 20)) >> 20)
+except BagFormatError as error:
+    print(error)
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
+"""
+    done = subprocess.run([sys.executable, "-c", program, file], capture_output=True, text=True, check=True)
+    result, peak = done.stdout.splitlines()
+    assert (
+        result
+        == {
+            96: "96",
+            100: f"a chunk has {96 << 20} bytes instead of {100 << 20}",
+            40: f"a chunk has more than {40 << 20} bytes",
+        }[announced]
+    )
+    assert int(peak) < min(announced, 96) + 60  # MiB
+
+
+def test_many_bz2_streams_are_refused() -> None:
+    # What follows a stream was copied for each of them: 10 MB of empty ones took hours.
+    with pytest.raises(BagFormatError, match="more than 20000 bz2 streams"):
+        decompress(BZ2, bz2.compress(b"") * 700_000, 10)
+    assert decompress(BZ2, bz2.compress(b"ab") * 10_000 + bz2.compress(b""), 20_000) == b"ab" * 10_000
+
+
+@pytest.mark.parametrize("name", [BZ2, LZ4])
+def test_what_nobody_needs_any_more_is_not_decompressed(name: str) -> None:
+    asked: list[int] = []
+
+    def is_cancelled() -> bool:
+        asked.append(1)
+        return len(asked) > 2
+
+    with pytest.raises(BagFormatError, match="not needed any more"):
+        decompress(name, bomb(name, 128 << 20), 128 << 20, is_cancelled)
+    assert len(asked) == 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import struct
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -15,8 +16,9 @@ from minirospy.bag import info
 from minirospy.bag import reader as reading
 from minirospy.bag.chunks import StoredChunk
 from minirospy.bag.compression import COMPRESSIONS
+from minirospy.bag.encoding import encode_bag_header, encode_chunk_info, encode_connection
 from minirospy.bag.reader import ChunkedReader, open_bag
-from minirospy.bag.records import parse_records
+from minirospy.bag.records import MAGIC, BagHeader, parse_records
 from minirospy.bag.repair import Repair
 from minirospy.bag.writer import BagWriter, Continued
 from minirospy.errors import BagError, BagFormatError, BagUnindexedError
@@ -342,3 +344,33 @@ def test_definitions_of_hostile_bags_are_not_executed() -> None:
     lines: list[str] = []
     assert class_of(hostile.type, "0", hostile.definition, lines.append).__slots__ == []
     assert "has invalid message definition" in lines[0]
+
+
+def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
+    # Messages of one time, connection and place were compared by what cannot be compared.
+    data = make_bag([[Given(0, 5, b"\1\0\0\0a"), Given(1, 5, b"\1\0\0\0b")]])
+    reader = open_bag(io.BytesIO(data))
+    (chunk,) = reader.chunks
+    index = reader.index_position  # type: ignore[attr-defined]
+    connections = b"".join(map(encode_connection, reader.connections.values()))
+    header = encode_bag_header(BagHeader(index, 2, 3_000))
+    damaged = data[: len(MAGIC)] + header + data[len(MAGIC) + len(header) : index]
+    damaged += connections + encode_chunk_info(chunk) * 3_000
+
+    with pytest.raises(BagUnindexedError) as raised:
+        open_bag(io.BytesIO(damaged))
+    assert raised.value.why.startswith("the index names a chunk twice")
+    assert repaired(damaged) == read(data)
+    # A reader of a bag that is being written gets its chunks from elsewhere.
+    twice = ChunkedReader(io.BytesIO(data), reader.connections, [chunk] * 3)
+    assert sorted(each.body for each in twice.messages()) == sorted([b"\1\0\0\0a", b"\1\0\0\0b"] * 3)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_time_that_no_index_holds_costs_its_chunk_alone(closed: bool) -> None:
+    # Seconds and nanoseconds of 32 bits are more than seconds of 32 bits, once the nanoseconds are below a billion.
+    last = (2**32 - 1) * 10**9 + 999_999_999
+    data = make_bag([[Given(0, last, b"\1\0\0\0a")], [Given(0, 5, b"\1\0\0\0b")]], closed=closed)
+    stamp = struct.pack("<II", 2**32 - 1, 999_999_999)
+    data = data.replace(stamp, b"\xff" * 8)
+    assert [body for _, _, body in repaired(data)] == [b"\1\0\0\0b"]

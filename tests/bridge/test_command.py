@@ -189,6 +189,8 @@ def test_status_names_what_is_wrong_in_one_line(
         (["--json"], "--json is for --status"),
         (["--connections", "0"], "--connections 0 is not between"),
         (["--token", "short"], "a token has 8 to 200 characters"),
+        (["--token", ""], "--token wants a token of 8 to 200 characters, and got an empty one"),
+        (["--read-token", ""], "--read-token wants a token"),
         (["--cert", "/none.pem", "--port", "0"], "none.pem: No such file"),
         (["--status", "--port", "1"], "no bridge answers at port 1"),
     ],
@@ -280,8 +282,23 @@ def test_tokens_are_kept_private_and_renewed(tmp_path: Path) -> None:
         first = kept_tokens(tmp_path)
         assert file.stat().st_mode & 0o077 == 0
     assert kept_tokens(tmp_path, renews=True) != first
-    file.write_text("nonsense")
+    for text in ("nonsense", "[]", "{}", '{"write": "", "read": ""}', '{"write": null, "read": "abcdefgh"}'):
+        file.write_text(text)
+        file.chmod(0o600)
+        assert read_tokens(tmp_path) is None
     assert kept_tokens(tmp_path) == read_tokens(tmp_path)
+
+
+@pytest.mark.parametrize("words", [("--token", "right-token-000"), ()])
+def test_links_with_a_token_do_not_name_localhost(
+    words: tuple[str, ...], start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user's server may answer at ::1, which a client may try first."""
+    if not words:
+        monkeypatch.setenv("MINIROSPY_BRIDGE_TOKEN", "right-token-000")
+    process = start("bridge", "--port", "0", *words)
+    assert process.line("/?token=") == f"  ws://127.0.0.1:{process.port}/?token=right-token-000"
+    assert not [line for line in process.lines if "localhost" in line]
 
 
 def test_links_carry_the_address_and_codes_the_token() -> None:

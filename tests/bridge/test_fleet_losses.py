@@ -27,7 +27,7 @@ from std_msgs.msg import Int64, String
 from minirospy.bridge.fleet.gateway import Gateway
 from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inquiry import fleet_status
-from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, in_key
+from minirospy.bridge.fleet.keys import ROOT, in_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
 from minirospy.bridge.fleet.rules import GatewayRules, parse_rates
 from minirospy.errors import BridgeError, ServiceException
@@ -279,25 +279,6 @@ def test_a_call_ends_when_the_robot_is_lost(fleet: Fleet, quick: str) -> None:
     assert "robot1" in fleet.run(call())
 
 
-def test_a_name_belongs_to_the_machine_that_came_first(fleet: Fleet) -> None:
-    first, second, control = fleet.place(), fleet.place(), fleet.place()
-    publisher(fleet, first, "/first", String)
-    publisher(fleet, second, "/second", String)
-    importer = control.gateway(listens=True).importer
-    assert importer is not None
-    one = first.gateway("robot1", host="a" * 16)
-    fleet.until_shown(control, "/robot1/first")
-    other = second.gateway("robot1", host="b" * 16)
-    fleet.until(lambda: importer.robots["robot1"].robot.duplicates == (other.claim,))
-    assert other.exporter is not None
-    fleet.until(lambda: other.exporter.duplicates == (one.claim,))
-    assert "/robot1/second" not in control.names()
-
-    fleet.stop(one)
-    fleet.until_shown(control, "/robot1/second")
-    fleet.until_gone(control, "/robot1/first")
-
-
 def test_a_clock_that_differs_is_measured(fleet: Fleet) -> None:
     robot, control = fleet.place(), fleet.place()
     numbers = publisher(fleet, robot, "/count", Int64)
@@ -487,7 +468,7 @@ def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[
     """Return the end of a command that has reached the fleet: on a busy machine connecting takes longer than it waits."""
     while True:
         code, text = ended(start(*words))
-        if "nothing of the fleet answers" not in text and "no answer within" not in text:
+        if "nothing of the fleet answers" not in text and "no answer" not in text:
             return code, text
 
 
@@ -545,7 +526,14 @@ def test_a_gateway_that_waits_for_its_router_can_be_ended(
         (("control", "--priority", "/scan=high"), 1, "[high] is not one of teleop, data, bulk"),
         (("status", "--connect", "127.0.0.1:1"), 1, "nothing of the fleet answers at tcp/127.0.0.1:1"),
         (("status", "--seconds", "0"), 2, "--seconds 0 is not between 0.1 and 60"),
-        (("router", "--listen", "nonsense/x"), 1, "minirospy fleet: ERROR: "),
+        (("router", "--listen", "nonsense/x"), 2, "minirospy fleet: ERROR: [nonsense/x] is not an endpoint"),
+        (
+            ("gateway", "--name", "robot1", "--connect", "host:99999"),
+            2,
+            "[tcp/host:99999] has the port 99999",
+        ),
+        (("control", "--connect", "http://host"), 2, "[http://host] is not an endpoint: give HOST"),
+        (("status", "--connect", "no-such-host.invalid"), 1, "(no-such-host.invalid does not resolve)"),
         (("control", "--config", "nothing.json5"), 1, "--config nothing.json5: there is no such file"),
     ],
 )
@@ -556,6 +544,32 @@ def test_usage_errors_are_one_line(
     assert found == code
     assert error in text
     assert "Traceback" not in text
+
+
+def test_a_name_that_does_not_resolve_yet_is_named_once(
+    fleet: Fleet, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.bridge.fleet.network._RETRY_SECONDS", 0.05)
+    monkeypatch.setattr("minirospy.bridge.zenoh_library._CONNECT_MS", 50)
+    looks: list[object] = []
+
+    def unresolved(_: object) -> list[str]:
+        looks.append(1)
+        return ["robot.local"]
+
+    monkeypatch.setattr("minirospy.bridge.fleet.network.unresolved", unresolved)
+
+    async def opening() -> None:
+        task = asyncio.ensure_future(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
+        while len(looks) < 3:
+            await asyncio.sleep(0.02)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    fleet.run(opening())
+    assert [record.getMessage() for record in caplog.records] == [
+        f"nothing of the fleet answers at {fleet.endpoint} yet (robot.local does not resolve). Will keep trying."
+    ]
 
 
 def test_a_local_process_connects_to_nobody_else(
@@ -583,22 +597,36 @@ def test_the_missing_library_is_named(
     assert install_command("minirospy[fleet]", upgrade=True) in capsys.readouterr().err
 
 
-def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:
-    robot, control = fleet.place(), fleet.place()
-    publisher(fleet, robot, "/chat", String)
-    importer = control.gateway(listens=True).importer
-    assert importer is not None
-    gateway = robot.gateway("robot1")
-    fleet.until_shown(control, "/robot1/chat")
-    stranger = fleet.run(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
-    claim = Claim("robot1", "0" * 16, 1, "0" * 16)
-    token = fleet.call(lambda: stranger.declare_token(claim_key(claim)))
-    fleet.until(lambda: "robot1" in importer.robots and importer.robots["robot1"].robot.claim == claim)
-    assert gateway.exporter is not None
-    fleet.until(lambda: gateway.exporter.duplicates)
-    fleet.call(token.undeclare)
-    fleet.until_shown(control, "/robot1/chat")
-    fleet.run(stranger.close())
+def until_line(process: subprocess.Popen[str], text: str) -> str:
+    """Return the first line of a process that has a text."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        if text in line:
+            return line
+    raise AssertionError(f"the process ended without [{text}]")
+
+
+@pytest.mark.parametrize("words", [("control",), ("gateway", "--name", "robot1")])
+def test_a_second_start_that_cannot_listen_does_not_end_the_first(
+    master: str, start: Callable[..., subprocess.Popen[str]], words: tuple[str, ...]
+) -> None:
+    endpoint = f"127.0.0.1:{free_port()}"
+    running = start(*words, "--listen", endpoint)
+    until_line(running, "(gateway ")
+    for wrong in (endpoint, "192.0.2.1:7447", "no-such-host.invalid"):
+        code, text = ended(start(*words, "--listen", wrong))
+        assert code == 1
+        assert "the fleet's network cannot be opened" in text
+        assert "Traceback" not in text
+    # One that waits for a router that is not there has not taken the name either.
+    waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
+    until_line(waiting, "nothing of the fleet answers")
+    assert running.poll() is None
+
+    # One that works does, and the first one says why it ends.
+    start(*words, "--listen", f"127.0.0.1:{free_port()}")
+    assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
+    assert ended(running)[0] == 0
 
 
 def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> None:

@@ -20,9 +20,10 @@ from minirospy.bridge.fleet.clocks import ClockOffset, Delay, Ping, offset_of
 from minirospy.bridge.fleet.contents import MOST_NAMES, FleetContents
 from minirospy.bridge.fleet.definitions import checked_specs
 from minirospy.bridge.fleet.frames import FrameRewriter, prefixed, stripped
+from minirospy.bridge.fleet.holders import HOLD_SECONDS
 from minirospy.bridge.fleet.keys import ROOT, Claim, Offer, ServiceToken, Stamp, TopicToken, Want
 from minirospy.bridge.fleet.lanes import Flow, FlowQueue
-from minirospy.bridge.fleet.network import is_loopback_endpoint, to_endpoint
+from minirospy.bridge.fleet.network import EndpointError, is_loopback_endpoint, to_endpoint
 from minirospy.bridge.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.bridge.fleet.rules import (
     GatewayRules,
@@ -30,7 +31,6 @@ from minirospy.bridge.fleet.rules import (
     Throttle,
     exported_services,
     exported_topics,
-    holder,
     lane_of_type,
     parse_lanes,
     parse_rates,
@@ -183,20 +183,12 @@ def test_a_throttle_keeps_the_mean_rate() -> None:
     assert all(Throttle(0.0).allows(1.0) for _ in range(10))
 
 
-def test_the_holder_of_a_name_is_the_same_for_all() -> None:
-    first, later = Claim("r", GATEWAY, 10, HOST), Claim("r", OTHER, 20, ELSEWHERE)
-    assert holder([first, later]) == holder([later, first]) == first
-    restarted = Claim("r", "1" * 16, 30, HOST)
-    assert holder([first, later, restarted]) == restarted
-    assert holder([later, restarted]) == later
-    assert holder([]) is None
-
-
 # --- contents
 
 
 def test_contents_follow_tokens_in_any_order() -> None:
-    fleet = FleetContents(lambda name: name != "secret")
+    now = 0.0
+    fleet = FleetContents(lambda name: name != "secret", lambda: now)
     claim = Claim("robot1", GATEWAY, 10, HOST)
     assert fleet.add(keys.topic_key(SCAN))
     assert fleet.robots() == {}
@@ -210,6 +202,8 @@ def test_contents_follow_tokens_in_any_order() -> None:
     assert fleet.add(keys.claim_key(second))
     assert fleet.robots()["robot1"].duplicates == (second,)
     assert fleet.remove(keys.claim_key(claim))
+    assert fleet.robots() == {}, "the first machine may be back in a moment"
+    now += HOLD_SECONDS
     assert fleet.robots()["robot1"].claim == second
     assert not fleet.add(keys.claim_key(claim._replace(name="secret")))
     assert fleet.refused == 0
@@ -370,16 +364,56 @@ def test_the_report_survives_any_answer() -> None:
         Answer(claim._replace(gateway=OTHER, start=20, host=ELSEWHERE), {"master": False, "topics": 1}),
         Answer(claim._replace(name="robot2"), parse_answer(b"[" * 100_000)),
     ]
-    found = lines(answers, [Answer(claim._replace(name="-"), parse_answer(hostile.encode()))])
-    assert found[0] == "2 robots, 1 control room"
+    room = {"robots": [{"name": "robot1", "gateway": GATEWAY}]}
+    rooms = [Answer(claim._replace(name="-"), parse_answer(hostile.encode())), Answer(claim, room)]
+    found = lines(answers, rooms)
+    assert found[0] == "2 robots, 2 control rooms"
     assert "clock +3600.000 s, round trip 1.0 ms" in found[1]
     assert "\x1b" not in "".join(found)
     assert found[3] == (
-        "robot1 (?), 1 topic, 0 services, its clock does not answer, NOT SHOWN: another gateway has this name, "
+        f"robot1 (?, machine {ELSEWHERE}, gateway {OTHER}), 1 topic, 0 services, its clock does not answer, "
+        "NOT SHOWN: another gateway has this name, "
         "ITS MASTER DOES NOT ANSWER"
     )
     assert found[4] == "robot2: is there, but does not answer"
-    assert json.loads(as_json(answers, []))["robots"][1]["shown"] is False
+    assert json.loads(as_json(answers, rooms))["robots"][1]["shown"] is False
+    assert json.loads(as_json(answers, []))["robots"][1]["shown"] is True
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("host:99999", "has the port 99999"),
+        ("tcp/host:0", "has the port 0"),
+        ("http://host", "is not an endpoint"),
+        ("http://host:7447", "is not an endpoint"),
+        ("tcp://host:7447", "is not an endpoint"),
+        ("/dev/ttyUSB0", "is not an endpoint"),
+        ("tcp/host", "has no port"),
+        ("tcp/host:7447x", "has no port"),
+        ("tcp/:7447", "no name and no address"),
+        ("tcp/ho$t:7447", "no name and no address"),
+        ("::1", "an IPv6 address is in brackets"),
+    ],
+)
+def test_endpoints_that_can_never_work_are_refused(text: str, reason: str) -> None:
+    with pytest.raises(EndpointError, match=reason):
+        to_endpoint(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "tcp/[fe80::1%eth0]:7447#iface=eth0",
+        "quic/host:7447?rel=1",
+        "unixsock-stream//tmp/x",
+        "serial//dev/ttyUSB0#baudrate=9600",
+        "tcp/host-1.local:1,host-2.local:2",
+    ],
+)
+def test_endpoints_of_zenoh_pass_as_they_are(text: str) -> None:
+    assert to_endpoint(text) == text
+    assert to_endpoint("tcp/0.0.0.0:0", listens=True) == "tcp/0.0.0.0:0"
 
 
 def test_endpoints_may_be_hosts() -> None:

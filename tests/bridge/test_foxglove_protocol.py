@@ -276,7 +276,7 @@ def test_binary_messages_to_clients_are_little_endian() -> None:
         serializing.service_response_head(1, 7)
         == b"\x03" + b"\x01\0\0\0" + b"\x07\0\0\0" + b"\x04\0\0\0" + b"ros1"
     )
-    assert serializing.asset(123, b"data") == b"\x04" + b"\x7b\0\0\0" + b"\x00" + b"\0\0\0\0" + b"data"
+    assert serializing.asset_head(123) == b"\x04" + b"\x7b\0\0\0" + b"\x00" + b"\0\0\0\0"
     assert serializing.asset_failure(1, "no") == b"\x04" + b"\x01\0\0\0" + b"\x01" + b"\x02\0\0\0" + b"no"
     state = PlaybackState(PlaybackStatus.PAUSED, 5, 2.0, did_seek=True, request_id="r1")
     expected = b"\x05\x01" + b"\x05" + bytes(7) + b"\x00\x00\x00\x40" + b"\x01" + b"\x02\0\0\0" + b"r1"

@@ -388,7 +388,7 @@ def test_asset_over_the_bound_is_refused(tmp_path: Path) -> None:
     write_files(tmp_path / "arm", {"package.xml": "<package><name>arm</name></package>", "a.stl": "12345"})
     assets = Assets(Packages.below(tmp_path), most_bytes=4)
     with pytest.raises(BridgeError, match="5 bytes, 4 are allowed"):
-        assets.read("package://arm/a.stl")
+        assets.open("package://arm/a.stl")
 
 
 def test_simulated_time_is_sent_and_stamps_messages(master: str, run_bridge: Callable[..., Running]) -> None:

@@ -1,18 +1,25 @@
-"""JSON of clients: limits, and the parser in pieces against the library's."""
+"""Texts of clients: their memory; JSON with limits, and the parser in pieces against the library's."""
 
 from __future__ import annotations
 
 import json
 import math
 import random
+import sys
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from minirospy.bridge import json_text
-from minirospy.bridge.json_text import is_quick_text, load_json, load_json_in_pieces
+from minirospy.bridge.json_text import (
+    is_quick_text,
+    load_json,
+    load_json_in_pieces,
+    size_in_memory,
+    width_of,
+)
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -108,3 +115,38 @@ def test_large_texts_of_few_values_are_quick() -> None:
     assert not is_quick_text("[" + "[]," * 30_000 + "0]")
     assert is_quick_text('{"data": "' + "A" * 2_000_000 + '"}')
     assert not is_quick_text('{"data": "' + "A" * 5_000_000 + '"}')
+
+
+WIDE = "\U0001f600"
+
+
+def slow_width(text: str) -> int:
+    """Return the width by looking at each character."""
+    highest = max(map(ord, text), default=0)
+    return 4 if highest > 0xFFFF else 2 if highest > 0xFF else 1
+
+
+@given(st.text(max_size=20), st.integers(1, 60))
+@example("", 1)
+@example("a", 1000)
+@example("\xff", 99)
+@example("\xff", 100)
+@example("\u0100", 99)
+@example("\u0100", 100)
+@example("\uffff", 100)
+@example("\U00010000", 100)
+@example(WIDE, 1)
+def test_width_and_size_are_those_of_memory(part: str, times: int) -> None:
+    text = part * times
+    assert width_of(text) == slow_width(text)
+    # Not the text of the test itself, which may keep a copy in UTF-8.
+    made = "".join(text)
+    assert size_in_memory(text.encode(errors="surrogatepass")) == slow_width(made) * len(made)
+
+
+def test_one_wide_character_makes_a_text_four_times_as_large() -> None:
+    data = b"a" * 100_000
+    assert size_in_memory(data) == 100_000
+    data += WIDE.encode()
+    assert size_in_memory(data) == size_in_memory(bytearray(data)) == 4 * 100_001
+    assert sys.getsizeof(data.decode()) > 400_000

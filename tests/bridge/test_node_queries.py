@@ -12,6 +12,7 @@ from minirospy.bridge import node_queries
 from minirospy.bridge.node_queries import AT_ONCE, NodeQueries
 from minirospy.bridge.tasks import Faults
 from minirospy.errors import BridgeError, ServiceException
+from tests.manual_loop import ManualLoop, run_manually
 from tests.waiting import until
 
 LIMIT = 60.0
@@ -20,7 +21,7 @@ LIMIT = 60.0
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait for nodes that are silent. A test of a limit sets it after this."""
-    for name in ("_QUERY_SECONDS", "_AGAIN_SECONDS"):
+    for name in ("_QUERY_SECONDS", "_AGAIN_SECONDS", "_REFUSED_SECONDS"):
         monkeypatch.setattr(node_queries, name, LIMIT)
 
 
@@ -147,6 +148,38 @@ def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
         assert nodes.queried == ["a", "a"]
 
     queried(scene)
+
+
+def test_a_node_that_refuses_is_queried_again_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(node_queries, "_REFUSED_SECONDS", 0.5)
+    monkeypatch.setattr(node_queries, "_AGAIN_SECONDS", 10.0)
+
+    async def scene(loop: ManualLoop) -> None:
+        nodes = Nodes()
+        queries = NodeQueries(nodes.answer, Faults(logging.getLogger("test"), "the query"))
+        nodes.dead.add("a")
+        nodes.silent.add("b")
+        await queries.look(["a"], 0.0)
+        await loop.advance(0)
+        nodes.dead.clear()
+        await loop.advance(0.5)
+        await queries.look(["a"], 0.0)
+        await loop.advance(0)
+        assert queries.found == {"a": "A"}
+
+        # Many that refuse are not queried more often than those that are silent.
+        dead = [f"dead{number}" for number in range(1000)]
+        nodes.dead.update(dead)
+        await queries.look(dead, 0.0)
+        await loop.advance(0)
+        await loop.advance(0.5)
+        before = len(nodes.queried)
+        await queries.look(dead, 0.0)
+        await loop.advance(0)
+        assert len(nodes.queried) - before < 100
+        await queries.close()
+
+    run_manually(scene)
 
 
 def test_a_query_that_takes_too_long_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:

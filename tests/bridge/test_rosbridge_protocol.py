@@ -469,6 +469,36 @@ def test_fragments_that_wait_are_bounded() -> None:
         deque((waiting.add(protocol.Fragment(number, "", 0, 2), 40.0) for number in range(100_000)), 0)
 
 
+def test_fragments_count_by_the_memory_that_they_take() -> None:
+    waiting = Fragments()
+    for number in range(15):
+        # A million characters of four bytes each.
+        assert waiting.add(protocol.Fragment("wide", "\U0001f600" * 1_000_000, number, 99), 0.0) is None
+    assert 60_000_000 < waiting.size < 60_100_000
+    with pytest.raises(OperationError, match="the fragments of message wide are too many"):
+        waiting.add(protocol.Fragment("wide", "\U0001f600" * 1_000_000, 15, 99), 0.0)
+    assert waiting.size == 0
+    waiting.add(protocol.Fragment("i", "x", 0, 2), 0.0)
+    assert waiting.size > 0
+    waiting.clear()
+    assert waiting.size == 0
+    assert waiting.add(protocol.Fragment("i", "y", 1, 2), 0.0) is None
+
+
+def test_one_wide_character_in_fragments_does_not_make_a_message_four_times_as_large() -> None:
+    waiting = Fragments()
+    waiting.add(protocol.Fragment("i", "\U0001f600", 0, 3), 0.0)
+    waiting.add(protocol.Fragment("i", "x" * 8_000_000, 1, 3), 0.0)
+    with pytest.raises(OperationError, match="message i is too large: 64000000 bytes of memory are allowed"):
+        waiting.add(protocol.Fragment("i", "x" * 8_000_000, 2, 3), 0.0)
+    assert waiting.size == 0
+    # Without it there is room.
+    waiting.add(protocol.Fragment("i", "x" * 8_000_000, 0, 2), 0.0)
+    joined = waiting.add(protocol.Fragment("i", "x" * 8_000_000, 1, 2), 0.0)
+    assert joined
+    assert len(joined) == 16_000_000
+
+
 def test_fragments_of_one_character_are_not_a_message_for_each() -> None:
     pieces = protocol.fragments("x" * 1_000_000, 1, None)
     assert len(pieces) == 10_000

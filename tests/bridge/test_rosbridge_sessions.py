@@ -355,6 +355,19 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
             {"op": "subscribe", "topic": "/x", "type": "nowhere_msgs/Thing"},
             "subscribe: Unable to load the manifest for package nowhere_msgs. Caused by: nowhere_msgs",
         ),
+        # Modules without a spec, and such as are no package.
+        *(
+            (
+                {"op": op, "topic": "/x", "service": "/x", "type": f"{module}/Thing"},
+                f"{op}: Unable to load the manifest for package {module}. Caused by: {module}",
+            )
+            for op in ("subscribe", "advertise", "advertise_service")
+            for module in ("__main__", "__mp_main__", ".", "a.b")
+        ),
+        (
+            {"op": "advertise", "topic": "/x", "type": "sys/Thing"},
+            "advertise: Unable to import msg class Thing",
+        ),
         ({"op": "subscribe", "topic": "/x", "type": "Thing"}, "subscribe: Thing is not a valid type string"),
         (
             {"op": "subscribe", "topic": "/nothing"},

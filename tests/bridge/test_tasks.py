@@ -125,9 +125,13 @@ def test_watch_of_a_robots_graph_goes_on(caplog: pytest.LogCaptureFixture) -> No
     assert len(reported(caplog)) == 1
 
 
+async def nothing(*_: object) -> object:
+    return {}
+
+
 def importer(spawn: Callable[[Any], Any] = lambda work: work.close()) -> Importer:
     return Importer(
-        stub(),
+        stub(parameters=stub(listeners=[], add=nothing), get_param=nothing),
         cast(Any, Network()),
         stub(),
         stub(),
@@ -184,7 +188,7 @@ def test_robot_that_cannot_be_shown_keeps_no_other_away(
             shown.append(robot.robot.claim.name)
 
         made._update = update  # type: ignore[method-assign]
-        made.contents.robots = lambda _lost: robots  # type: ignore[method-assign]
+        made.contents.robots = lambda _lost=(): robots  # type: ignore[method-assign]
         await made._reconcile()
         assert shown == ["b"]
         # It is tried again without a new token.

@@ -24,7 +24,10 @@ from websockets.frames import Frame, Opcode
 from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access, Grant
+from minirospy.bridge.web import owners
+from minirospy.bridge.web.admission import Rank
 from minirospy.bridge.web.connection import Connection, Limits
+from minirospy.bridge.web.pipe import Endpoints
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.bridge.web.turns import FairTurns
 from minirospy.errors import BridgeError
@@ -189,7 +192,7 @@ def fragment(length: int, *, starts: bool = False) -> bytes:
 
 
 def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(unfinished=1_000_000))
+    bridge = run_bridge(limits=Limits(memory=1_000_000))
     listener = bridge.bridge.listeners["foxglove"]
 
     def wait_for_unfinished(total: int) -> None:
@@ -204,11 +207,12 @@ def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[...
         ]
         for sock in socks:
             sock.sendall(HANDSHAKE.encode() + fragment(30_000, starts=True))
-        socks[7].sendall(fragment(30_000) * 13 + fragment(9_900))
-        wait_for_unfinished(999_900)
+        # Answers count too until they are sent, so the sum keeps some distance from the limit.
+        socks[7].sendall(fragment(30_000) * 10)
+        wait_for_unfinished(900_000)
 
-        socks[3].sendall(fragment(200))
-        wait_for_unfinished(19 * 30_000 + 200)
+        socks[3].sendall(fragment(30_000) * 5)
+        wait_for_unfinished(19 * 30_000 + 150_000)
         answer = read_all(socks[7])
         assert (1013).to_bytes(2, "big") + b"too many unfinished messages" in answer
         assert_alive(other)
@@ -236,10 +240,19 @@ def test_clients_that_answer_no_ping_are_disconnected(run_bridge: Callable[..., 
     assert bytes([0x80 | Opcode.PING, 9]) + b"minirospy" in data
 
 
+@pytest.fixture
+def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the listeners take the clients of a test for those of another user."""
+    monkeypatch.setattr("minirospy.bridge.web.listener.is_own_user", lambda peer, here: False)
+
+
+@pytest.mark.usefixtures("strangers")
 def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(connections=20, handshake_seconds=1000.0))
+    bridge = run_bridge(limits=Limits(connections=10, reserve=10, handshake_seconds=1000.0))
     first = bridge.client()
-    held = [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(19)]
+    # As few as an address may have that have sent no request.
+    held = [bridge.client().socket.socket for _ in range(3)]
+    held += [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(16)]
     for _ in range(200):
         answer = raw_answer(bridge.port, b"")
         assert answer.startswith(b"HTTP/1.1 503 "), answer
@@ -253,8 +266,9 @@ def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Runn
     assert_alive(bridge.client())
 
 
+@pytest.mark.usefixtures("strangers")
 def test_silent_connections_give_way_to_clients(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(connections=20, handshake_seconds=1000.0))
+    bridge = run_bridge(limits=Limits(connections=20, reserve=0, handshake_seconds=1000.0))
     first = bridge.client()
     held = [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(19)]
     listener = bridge.bridge.listeners["foxglove"]
@@ -262,7 +276,7 @@ def test_silent_connections_give_way_to_clients(run_bridge: Callable[..., Runnin
 
     def age() -> None:
         for each in listener.connections:
-            each.traffic.since -= 300.0
+            each.active -= 10.0
 
     bridge.call(age)
     clients = [bridge.client() for _ in range(19)]
@@ -275,28 +289,127 @@ def test_silent_connections_give_way_to_clients(run_bridge: Callable[..., Runnin
         sock.close()
 
 
-def test_thousand_connections_leave_the_first_ones_unaffected(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(handshake_seconds=1000.0))
+@pytest.mark.usefixtures("strangers")
+def test_thousand_connections_leave_the_first_ones_unaffected(
+    run_bridge: Callable[..., Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bridge = run_bridge(limits=Limits(handshake_seconds=1000.0, connection_burst=2000))
     first = bridge.client()
     first.next("serverInfo")
-    socks = []
-    answers = []
-    try:
-        socks.extend(socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(1000))
-        # The connections are accepted in their order: the limit is 256, one of which is the first.
-        for sock in socks[255:]:
-            with sock:
-                answers.append(b"".join(iter(partial(sock.recv, 4096), b"")))
-        listener = bridge.bridge.listeners["foxglove"]
-        assert len(listener.connections) == 256
-        assert listener.refused == 745
+    listener = bridge.bridge.listeners["foxglove"]
+    with contextlib.ExitStack() as stack:
+        socks = [
+            stack.enter_context(socket.create_connection(("127.0.0.1", bridge.port), 30)) for _ in range(1000)
+        ]
+        # The limit is 256 clients and 32 more until their request is known. The oldest give way to the newest.
+        for sock in socks[: 1000 - 287]:
+            with contextlib.suppress(ConnectionError):
+                assert read_all(sock) == b""
+        assert bridge.call(lambda: len(listener.connections)) == 288
         assert_alive(first)
-    finally:
-        for sock in socks:
-            sock.close()
-    assert len(answers) == 745
-    assert {answer.split(b"\r\n")[0] for answer in answers} == {b"HTTP/1.1 503 Service Unavailable"}
-    assert {answer.rpartition(b"\r\n")[2] for answer in answers} == {b"too many connections.\n"}
+        assert_alive(bridge.client())
+
+
+def idle_clients(bridge: Running, count: int) -> list[socket.socket]:
+    """Return clients that have been served, and do nothing."""
+    socks = []
+    for _ in range(count):
+        socks.append(socket.create_connection(("127.0.0.1", bridge.port), 30))
+        socks[-1].sendall(HANDSHAKE.encode())
+        assert socks[-1].recv(12) == b"HTTP/1.1 101"
+    return socks
+
+
+@pytest.mark.usefixtures("strangers")
+def test_idle_clients_keep_nobody_out(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(connections=20))
+    listener = bridge.bridge.listeners["foxglove"]
+    with contextlib.ExitStack() as stack:
+        idle = [stack.enter_context(sock) for sock in idle_clients(bridge, 20)]
+        answer = raw_answer(bridge.port, HANDSHAKE.encode())
+        assert answer.startswith(b"HTTP/1.1 503 ")
+        assert b"\r\nRetry-After: 5\r\n" in answer
+        assert answer.endswith(b"\r\n\r\ntoo many connections.\n")
+        assert listener.refused == 1
+
+        def age() -> None:
+            for number, each in enumerate(sorted(listener.connections, key=lambda each: each.active)):
+                each.active -= 60.0 - number
+
+        bridge.call(age)
+        # The longest idle one gives way, and is told so.
+        assert_alive(bridge.client())
+        assert (1013).to_bytes(2, "big") + b"another client needs the place" in read_all(idle[0])
+        assert bridge.call(lambda: len(listener.connections)) == 20
+        clients = [bridge.client() for _ in range(19)]
+        for client in clients:
+            assert_alive(client)
+        with pytest.raises(InvalidStatus, match="503"):
+            bridge.client()
+
+
+@pytest.mark.usefixtures("strangers")
+def test_owner_gets_in_whoever_holds_the_connections(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(
+        limits=Limits(connections=20, reserve=2), access=Access(write_token="right-token-000")
+    )
+    listener = bridge.bridge.listeners["foxglove"]
+    with contextlib.ExitStack() as stack:
+        for sock in idle_clients(bridge, 20):
+            stack.enter_context(sock)
+        with pytest.raises(InvalidStatus, match="503"):
+            bridge.client()
+        owners = [bridge.client(path="/?token=right-token-000") for _ in range(20)]
+        for owner in owners:
+            assert_alive(owner)
+        assert bridge.call(lambda: {each.rank for each in listener.connections}) == {Rank.OWN}
+        # They do not displace each other.
+        with pytest.raises(InvalidStatus, match="503"):
+            bridge.client(path="/?token=right-token-000")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the user of a client is known on Linux alone")
+def test_programs_of_the_same_user_get_in_and_stay(
+    run_bridge: Callable[..., Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bridge = run_bridge(limits=Limits(connections=20, reserve=2))
+    listener = bridge.bridge.listeners["foxglove"]
+    own: set[int] = set()
+
+    def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
+        # As by the kernel's table, in which the clients of this test are all of one user.
+        return owners.is_own_user(peer, here) and peer[1] in own
+
+    monkeypatch.setattr("minirospy.bridge.web.listener.is_own_user", is_own_user)
+    with contextlib.ExitStack() as stack:
+        for sock in idle_clients(bridge, 20):
+            stack.enter_context(sock)
+        for _ in range(2):
+            stack.enter_context(socket.create_connection(("127.0.0.1", bridge.port), 30))
+        bridge.call(lambda: setattr(listener, "rate", ConnectionRate(0, 0, time.monotonic)))
+        assert raw_answer(bridge.port, b"").startswith(b"HTTP/1.1 429 ")
+
+        with socket.socket() as mine:
+            mine.bind(("127.0.0.1", 0))
+            own.add(mine.getsockname()[1])
+            mine.settimeout(30)
+            mine.connect(("127.0.0.1", bridge.port))
+            mine.sendall(HANDSHAKE.encode())
+            assert mine.recv(12) == b"HTTP/1.1 101"
+            # However long it is idle, no stranger takes its place.
+            bridge.call(lambda: setattr(listener, "rate", ConnectionRate(1000, 1000, time.monotonic)))
+
+            def age() -> None:
+                for each in listener.connections:
+                    each.active -= 60.0 if each.endpoints.peer_port in own else 50.0
+
+            bridge.call(age)
+            for sock in idle_clients(bridge, 19):
+                stack.enter_context(sock)
+            assert raw_answer(bridge.port, HANDSHAKE.encode()).startswith(b"HTTP/1.1 503 ")
+            assert [each.rank for each in bridge.call(lambda: list(listener.connections))].count(
+                Rank.OWN
+            ) == 1
 
 
 def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Running]) -> None:
@@ -334,6 +447,7 @@ def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> 
     assert_alive(steady)
 
 
+@pytest.mark.usefixtures("strangers")
 def test_connections_that_come_too_often_are_refused(bridge: Running) -> None:
     now = 0.0
     listener = bridge.bridge.listeners["foxglove"]
@@ -395,9 +509,10 @@ class Turns:
 
 
 def test_messages_that_take_long_are_handled_in_turns() -> None:
-    loop, pipe = Turns(), Mock(is_full=False, ports=(1, 2))
+    loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
+    site.admit.return_value = None
     handled: list[str] = []
 
     def handle(text: str) -> None:
@@ -439,9 +554,10 @@ EMPTY_FRAMES = {
 
 def connected(limits: Limits, seconds_of_frame: float) -> tuple[Turns, Connection, Mock]:
     """Return a loop, a connection after its handshake, and its pipe; each frame takes some seconds of the loop's clock."""
-    loop, pipe = Turns(), Mock(is_full=False, ports=(1, 2))
+    loop, pipe = Turns(), Mock(is_full=False, unsent=0, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
+    site.admit.return_value = None
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"
     site.doors = [door]
@@ -527,9 +643,10 @@ def test_client_that_reads_no_pongs_leaves_the_newest_waiting() -> None:
 
 def test_clients_are_pinged_before_they_are_disconnected() -> None:
     """As after a suspend: the bytes that came last are old, and no ping has been sent since."""
-    loop, pipe = Turns(), Mock(is_full=False, ports=(1, 2))
+    loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
+    site.admit.return_value = None
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"
     site.doors = [door]
@@ -599,6 +716,7 @@ def test_disconnected_client_leaves_no_messages_in_memory(run_bridge: Callable[.
     assert (len(connection.queue), connection.queue.size) == (0, 0)
 
 
+@pytest.mark.usefixtures("strangers")
 def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tmp_path: Path) -> None:
     certificate, key = make_certificate(tmp_path)
     bridge = run_bridge(certificate=str(certificate), key=str(key))

@@ -172,3 +172,19 @@ def test_delete_of_everything(master: str, command: Any) -> None:
     for _ in range(2):
         assert command("rosparam", "delete", "/") == (0, "", "")
         assert command("rosparam", "list").out == "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1" + ":59" * 100_000, "1" + ":59" * 300 + ".5", "0x" + "f" * 5_000, "1" * 5_000, "2001-99-99"],
+    ids=["base 60", "base 60 with decimals", "hexadecimal", "decimal", "no date"],
+)
+def test_number_that_takes_hours_is_refused_in_one_line(
+    master: str, command: Any, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "a.yaml").write_text(f"a: {text}\n")
+    done = command("rosparam", "load", str(tmp_path / "a.yaml"))
+    assert done.status == 1
+    (line,) = own_lines(done.err)
+    assert line.startswith("rosparam: ERROR: ")
+    assert len(line) < 400

@@ -451,3 +451,12 @@ def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.M
     monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "data: 'x:=1'")
     assert result == (0, 'publishing and latching [data: "x:=1"] for 0.1 seconds\n', "")
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 20_000, "[" * 20_000 + "]" * 20_000, "2001-99-99"], ids=["open", "closed", "no date"]
+)
+def test_argument_that_yaml_cannot_hold_is_misuse(master: str, command: Any, text: str) -> None:
+    done = command("rostopic", "pub", "-1", "/f", "std_msgs/String", text)
+    assert done.status == 2
+    assert len(own_lines(done.err)) == 1

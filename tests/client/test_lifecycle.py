@@ -678,7 +678,124 @@ print("ends")
         check=False,
     )
     lines = [line for line in done.stdout.splitlines() if not line.startswith("[INFO]")]
-    assert (done.returncode, lines, done.stderr) == (0, ["ends", "hook of /parent"], "")
+    errors = [line for line in done.stderr.splitlines() if NO_NODE.format("the publisher of /t") not in line]
+    assert (done.returncode, lines, errors) == (0, ["ends", "hook of /parent"], [])
+
+
+NO_NODE = (
+    "{} has no effect in this process, which is a fork of node [/parent]: call rospy.init_node() in the child "
+    "process, and create it after that"
+)
+FORK_PROGRAM = """
+import multiprocessing, sys, threading, time
+import rospy
+from std_msgs.msg import Int32
+from std_srvs.srv import Empty
+
+def child():
+{}
+
+{}
+rospy.init_node("parent", argv=[])
+pub = rospy.Publisher("t", Int32, queue_size=10)
+proxy = rospy.ServiceProxy("s", Empty, persistent=True)
+worker = multiprocessing.get_context("fork").Process(target=child)
+"""
+JOIN = "worker.start(); worker.join(); print(worker.exitcode)"
+IN_A_FORK = {
+    "inherited publisher": ("pub.publish(1); pub.publish(data=2)", "the publisher of /t", ""),
+    "latched inherited publisher": ("pub.impl.enable_latch(); pub.publish(1)", "the publisher of /t", ""),
+    "new publisher": ("rospy.Publisher('new', Int32, queue_size=1)", "the publisher of /new", ""),
+    "subscriber": ("rospy.Subscriber('new', Int32, print)", "the subscriber of /new", ""),
+    "service": ("rospy.Service('new', Empty, print)", "the service /new", ""),
+    "listener of tf2": (
+        "import tf2_ros; b = tf2_ros.Buffer(debug=False); tf2_ros.TransformListener(b)",
+        "the subscriber of /tf",
+        "",
+    ),
+    "buffer of tf2": (
+        "import tf2_ros; tf2_ros.Buffer(debug=False).can_transform('a', 'b', rospy.Time(), rospy.Duration(0.01))",
+        "a tf2_ros.Buffer of the parent process",
+        "",
+    ),
+    "waiting for a message": ("rospy.wait_for_message('t', Int32)", "", "wait_for_message('t')"),
+    "waiting for subscribers": ("pub.wait_for_subscribers()", "", "the publisher of /t"),
+    "waiting for an action server": (
+        "import actionlib, actionlib_tutorials.msg as m\n"
+        "    actionlib.SimpleActionClient('a', m.FibonacciAction).wait_for_server()",
+        "the publisher of /a/goal",
+        "the action client of a",
+    ),
+    "simulated time": ("rospy.sleep(0.01)", "", "simulated time"),
+}
+
+
+@POSIX_ONLY
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+@pytest.mark.parametrize("what", IN_A_FORK)
+def test_fork_without_a_node_reports_each_handle_that_has_no_effect(master: str, what: str) -> None:
+    code, logged, raised = IN_A_FORK[what]
+    before = "rospy.set_param('/use_sim_time', True)" if what == "simulated time" else ""
+    body = textwrap.indent(f"try:\n    {code}\nexcept rospy.ROSException as error:\n    print(error)", "    ")
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORK_PROGRAM.format(body, before) + JOIN],
+        capture_output=True,
+        text=True,
+        timeout=GUARD,
+        check=False,
+    )
+    printed = [NO_NODE.format(raised)] if raised else []
+    assert (done.returncode, done.stdout.splitlines()) == (0, [*printed, "0"]), done.stderr
+    assert done.stderr.count(NO_NODE.format(logged)) == (1 if logged else 0)
+    assert "Traceback" not in done.stderr
+
+
+@POSIX_ONLY
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+def test_node_of_a_forked_process_that_returns_leaves_the_master(master: str) -> None:
+    body = """
+    rospy.init_node("child", argv=[])
+    rospy.on_shutdown(lambda: print("hook", flush=True))
+    rospy.Publisher("mine", Int32, queue_size=1)
+    print(rospy.get_master().lookupNode("/child")[0], flush=True)
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORK_PROGRAM.format(body, "") + JOIN],
+        capture_output=True,
+        text=True,
+        timeout=GUARD,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "1\nhook\n0\n", "")
+    assert not is_known(master, "/child")
+
+
+@POSIX_ONLY
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+def test_fork_calls_a_persistent_service_by_its_own_connection(master: str) -> None:
+    body = """
+    proxy()
+    print("called", flush=True)
+"""
+    script = """
+callers = set()
+def handle(request):
+    callers.add(id(request._connection_header))
+    return {}
+service = rospy.Service("s", Empty, handle)
+proxy()
+worker.start(); worker.join()
+proxy()
+print(worker.exitcode, len(callers))
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORK_PROGRAM.format(body, "") + script],
+        capture_output=True,
+        text=True,
+        timeout=GUARD,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "called\n0 2\n", "")
 
 
 @pytest.mark.parametrize("method", [m for m in multiprocessing.get_all_start_methods() if m != "fork"])

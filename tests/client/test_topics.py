@@ -420,3 +420,46 @@ print(second.wait(30))
 """)
     )
     assert output == "True\n"
+
+
+NOT_A_LISTENER = """
+rospy.init_node("talker")
+publisher = rospy.Publisher("/t", Int32, 10)
+got = []
+subscriber = rospy.Subscriber("/t", Int32, lambda message: got.append(message.data))
+print(publisher.wait_for_subscribers(timeout=30))
+publisher.publish(3)
+print(eventually(lambda: got), got, publisher.get_num_connections())
+"""
+
+
+def test_queue_size_as_the_third_argument_is_named_and_the_topic_works(start: Start) -> None:
+    output, errors = finished(start(NOT_A_LISTENER))
+    assert output == "True\nTrue [3] 1\n"
+    warnings = [each for each in errors.splitlines() if "subscriber_listener 10 is ignored" in each]
+    assert len(warnings) == 1
+    assert warnings[0].endswith("write queue_size=10")
+    assert "Traceback" not in errors
+
+
+def test_listener_with_one_method_that_is_a_faulty_property_ends_nothing(start: Start) -> None:
+    output, errors = finished(
+        start("""
+rospy.init_node("talker")
+class Listener:
+    @property
+    def peer_subscribe(self):
+        raise LookupError("bad property")
+publisher = rospy.Publisher("/t", Int32, queue_size=1)
+publisher.impl.subscriber_listeners.append(Listener())
+got = []
+subscriber = rospy.Subscriber("/t", Int32, lambda message: got.append(message.data))
+print(publisher.wait_for_subscribers(timeout=30))
+publisher.publish(3)
+print(eventually(lambda: got), publisher.get_num_connections())
+subscriber.unregister()
+print(eventually(lambda: publisher.get_num_connections() == 0))
+""")
+    )
+    assert output == "True\nTrue 1\nTrue\n"
+    assert errors.count("LookupError: bad property") == 1

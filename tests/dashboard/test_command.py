@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import queue
 import re
 import signal
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import pytest
 
@@ -50,9 +54,9 @@ def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
     started: list[subprocess.Popen[str]],
 ) -> None:
     link = link_of(started, "-m", "minirospy", "dashboard", "topics", "--no-browser", "--port", "0")
-    found = re.fullmatch(r"http://localhost:(\d+)/#/topics\?token=[\w-]{22}", link)
+    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#/topics\?token=[\w-]{22}", link)
     assert found
-    connection = HTTPConnection("localhost", int(found[1]), timeout=60)
+    connection = HTTPConnection("127.0.0.1", int(found[1]), timeout=60)
     connection.request("GET", "/")
     assert connection.getresponse().status == 200
     connection.close()
@@ -95,7 +99,7 @@ def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.P
         "--address",
         "127.0.0.1",
     )
-    assert re.fullmatch(r"http://localhost:\d+/#/topics\?token=[\w-]{22}", link)
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#/topics\?token=[\w-]{22}", link)
 
 
 @pytest.mark.parametrize(
@@ -117,34 +121,98 @@ def test_usage_error_has_status_2(
     assert text in capsys.readouterr().err
 
 
-def test_command_line_of_the_browser_has_no_token(
-    master: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+class Opened(Exception):
+    """Ends the command when the browser has been opened."""
+
+
+def test_browser_is_started_with_a_file_without_code_or_token(
+    master: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    class Opened(Exception):
-        """Ends the command."""
+    opened: queue.Queue[str] = queue.Queue()
+    pages: list[str] = []
 
-    opened: list[str] = []
+    def open_page(address: str) -> None:
+        pages.append(page_at(address).read_text(encoding="utf-8"))
+        opened.put(address)
 
-    def answer(link: str) -> bool:
-        opened.append(link)
-        raise Opened
+    def announce_end(*words: object, **options: object) -> None:
+        if str(words[0]).startswith("The browser opens"):
+            opened.put(opened.get(timeout=60))
+            raise Opened
 
-    monkeypatch.setattr(browser, "open_link", answer)
+    monkeypatch.setattr(browser.webbrowser, "open", open_page)
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    monkeypatch.setattr(command, "print", announce_end, raising=False)
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(browser, "_SNAPS", ())
     with pytest.raises(Opened):
         command.dashboard(["--port", "0"])
-    assert re.fullmatch(r"http://localhost:\d+/#/topics\?code=[\w-]{22}", opened[0])
+    assert "code" not in opened.get()
+    link = r"http://127\.0\.0\.1:\d+/#/topics\?code=[\w-]{22}"
+    assert re.search(f'url={link}"', pages[0])
+    assert re.search(f'href="{link}"', pages[0])
+    assert "token" not in pages[0]
+    # The dashboard has ended.
+    assert not list(tmp_path.iterdir())
 
 
-def test_browser_is_opened_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
-    import queue
+def page_at(address: str) -> Path:
+    assert address.startswith("file:///"), address
+    return Path(url2pathname(urlsplit(address).path))
 
+
+def test_browser_is_opened_with_a_file_of_this_user_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     opened: queue.Queue[str] = queue.Queue()
     monkeypatch.setattr(browser.webbrowser, "open", opened.put)
     monkeypatch.setattr(browser, "has_screen", lambda environ: True)
-    assert open_link("http://localhost:1/#/topics")
-    assert opened.get(timeout=60) == "http://localhost:1/#/topics"
+    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
+    remove = open_link("http://127.0.0.1:1/#/plot?path=/a&code=x")
+    page = page_at(opened.get(timeout=60))
+    assert page.is_relative_to(tmp_path)
+    assert 'href="http://127.0.0.1:1/#/plot?path=/a&amp;code=x"' in page.read_text(encoding="utf-8")
+    if sys.platform != "win32":
+        assert stat.S_IMODE(page.stat().st_mode) == 0o600
+        assert stat.S_IMODE(page.parent.stat().st_mode) == 0o700
+    assert remove
+    remove()
+    remove()
+    assert not list(tmp_path.iterdir())
+
+
+def test_browser_without_access_to_temporary_files_gets_one_in_the_home_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(browser, "_SNAPS", (Path(sys.executable),))
+    monkeypatch.setattr(browser.Path, "home", lambda: tmp_path)
+    file = browser.LinkFile("http://127.0.0.1:1/")
+    (folder,) = tmp_path.iterdir()
+    assert file.path.parent == folder
+    assert not folder.name.startswith(".")
+    file.remove()
+
+
+def test_no_browser_without_a_screen_or_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(browser.webbrowser, "open", pytest.fail)
     monkeypatch.setattr(browser, "has_screen", lambda environ: False)
-    assert not open_link("http://localhost:1/")
+    assert open_link("http://127.0.0.1:1/") is None
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path / "missing"))
+    assert open_link("http://127.0.0.1:1/") is None
+
+
+def test_browser_of_windows_gets_the_link_from_wsl(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: queue.Queue[str] = queue.Queue()
+    monkeypatch.setattr(browser.webbrowser, "open", opened.put)
+    monkeypatch.setenv("WSL_DISTRO_NAME", "Debian")
+    assert open_link("http://127.0.0.1:1/#/topics?code=x")
+    assert opened.get(timeout=60) == "http://127.0.0.1:1/#/topics?code=x"
 
 
 def test_screen_is_known_by_the_environment() -> None:

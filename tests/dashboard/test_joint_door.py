@@ -354,7 +354,7 @@ def test_node_of_launch_files_publishes_without_a_page(master: str) -> None:
     try:
         assert node.stdout
         assert re.match(
-            r"Open in a browser: http://localhost:\d+/#/joints\?token=[\w-]{22}$", node.stdout.readline()
+            r"Open in a browser: http://127\.0\.0\.1:\d+/#/joints\?token=[\w-]{22}$", node.stdout.readline()
         )
         reading = (
             "import rospy; from sensor_msgs.msg import JointState; rospy.init_node('reader', disable_rosout=True);"

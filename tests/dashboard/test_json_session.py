@@ -38,7 +38,11 @@ class Client:
         self.is_owner = is_owner
         self.sent: list[dict[str, Any]] = []
         self.closed: list[int] = []
+        self.held = 0
         self._arrived = asyncio.Event()
+
+    def holds(self, count: int) -> None:
+        self.held = count
 
     def send_text(self, text: str) -> None:
         self.sent.append(json.loads(text))

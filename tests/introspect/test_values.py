@@ -10,6 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy import yaml_text
 from minirospy.errors import ValueTextError
 from minirospy.introspect.values import (
     check_parameter,
@@ -173,3 +174,52 @@ def test_aliases_and_many_brackets_are_read() -> None:
     for _ in range(149):
         (deep,) = deep
     assert deep == []
+
+
+LONG_NUMBERS = {
+    "base 60": "1" + ":59" * 100_000,
+    "base 60 with decimals": "1" + ":59" * 300 + ".5",
+    "decimal": "1" * 5_000,
+    "hexadecimal": "0x" + "f" * 5_000,
+    "binary": "0b" + "1" * 100_000,
+    "with a tag": "!!int '" + "1" * 5_000 + "'",
+    "no date": "2001-99-99",
+    "no number": "!!int x",
+    "no truth": "!!bool x",
+    "no time": "!!timestamp x",
+}
+
+
+@pytest.mark.parametrize("text", LONG_NUMBERS.values(), ids=list(LONG_NUMBERS))
+def test_numbers_that_take_hours_or_are_none_are_refused_in_one_line(text: str) -> None:
+    with pytest.raises(ValueTextError) as raised:
+        parse_value(text)
+    assert "\n" not in raised.value.why
+    assert len(raised.value.why) < 200
+    with pytest.raises(ValueTextError, match="f"):
+        list(parse_documents(f"a: [1, {text}]", "f"))
+    with pytest.raises(yaml.YAMLError):
+        yaml_text.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["1:30", "190:20:30", "-1:30:15.5", "1" * 300, "1" * 300 + ".5", "x" * 5_000]
+)
+def test_numbers_of_usual_length_are_those_of_yaml(text: str) -> None:
+    assert parse_value(text) == yaml.safe_load(text)
+    assert yaml_text.safe_load(text) == yaml.safe_load(text)
+
+
+def test_a_loader_that_learns_later_is_guarded_too() -> None:
+    class Loader(yaml.SafeLoader):
+        pass
+
+    with pytest.raises(yaml.YAMLError):
+        yaml_text.load("!a 1", Loader)
+    Loader.add_constructor("!a", lambda loader, node: "learned")
+    assert yaml_text.load("!a 1", Loader) == "learned"
+
+
+def test_a_long_integer_is_no_parameter_and_not_shown_in_full() -> None:
+    with pytest.raises(ValueTextError, match=r"1{40}\.\.\. is more than a parameter's 32 bits hold$"):
+        check_parameter({"a": int("1" * 900)}, "/n")

@@ -10,7 +10,7 @@ import pytest
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError
 from minirospy.launch.arg_docs import describe_args
-from minirospy.launch.load import load_files, load_text
+from minirospy.launch.load import LaunchSource, load_files, load_sources, load_text
 from minirospy.launch.spec import LaunchSpec, ParameterCommand
 from minirospy.workspace.packages import Packages
 
@@ -366,3 +366,65 @@ def test_file_that_explodes_is_refused_in_one_line(packages: Packages, body: str
         load_text(f"{head}<launch>{body}</launch>", {}, packages, {"HOME": "/home/me"})
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 300
+
+
+def test_files_that_include_the_next_one_twice_are_refused(packages: Packages, tmp_path: Path) -> None:
+    # 2^40 includes, if nobody counts them.
+    for number in range(40):
+        include = f'<include file="$(dirname)/f{number + 1}.launch"/>'
+        (tmp_path / f"f{number}.launch").write_text(f"<launch>{include * 2}</launch>")
+    (tmp_path / "f40.launch").write_text("<launch/>")
+    with pytest.raises(LaunchError, match=r"f\d+\.launch:1: more than 10000 files are included: do files"):
+        load_files([str(tmp_path / "f0.launch")], {}, packages)
+
+    problems: list[LaunchError] = []
+    load_sources([LaunchSource(str(tmp_path / "f0.launch"), None, {})], packages, problems=problems)
+    assert len(problems) == 1
+
+
+def test_args_that_double_are_refused(packages: Packages) -> None:
+    args = "".join(f'<arg name="a{n + 1}" value="$(arg a{n})$(arg a{n})"/>' for n in range(60))
+    with pytest.raises(LaunchError, match="give more than 67108864 characters: does an arg hold another one"):
+        load(packages, '<arg name="a0" value="0123456789"/>' + args)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("$(" + "a" * 60_000, None),
+        ("$(a" * 60_000, "a substitution cannot hold another"),
+        ("$(" + "a" * 60_000 + "(", "a substitution cannot hold another"),
+        ("$(find " + "a" * 60_000 + ")", "aaa] not found"),
+        ("$(" + "a " * 60_000 + ")", "Unknown substitution command"),
+    ],
+    ids=["open", "nested", "bracket", "package", "words"],
+)
+def test_long_substitutions_take_no_time(packages: Packages, text: str, why: str | None) -> None:
+    # The first one took 20 s: each of its characters was tried as the end of two parts.
+    if why is None:
+        assert load(packages, f'<param name="p" value="{text}"/>').params == {"/p": text}
+        return
+    with pytest.raises(LaunchError, match=why):
+        load(packages, f'<param name="p" value="{text}"/>')
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no yes")
+@pytest.mark.parametrize("command", ["yes", "sh -c 'yes &amp; yes'"])
+def test_command_without_end_is_stopped(packages: Packages, command: str) -> None:
+    with pytest.raises(LaunchError, match="has written more than 67108864 bytes, and was stopped"):
+        load(packages, f'<param name="p" command="{command}"/>')
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no file without end")
+@pytest.mark.parametrize(
+    "tag",
+    [
+        '<param name="p" textfile="/dev/zero"/>',
+        '<param name="p" binfile="/dev/zero"/>',
+        '<rosparam file="/dev/zero"/>',
+        '<include file="/dev/zero"/>',
+    ],
+)
+def test_file_without_end_is_refused(packages: Packages, tag: str) -> None:
+    with pytest.raises(LaunchError, match=r"\[/dev/zero\]: it has more than \d+ bytes"):
+        load(packages, tag)

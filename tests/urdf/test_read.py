@@ -158,3 +158,9 @@ def test_shapes_may_share_a_link() -> None:
     assert (
         str(robot.problems[0]) == "Unknown geometry type 'cone': Could not parse visual element for Link [a]"
     )
+
+
+def test_long_numbers_take_no_time() -> None:
+    # Each digit was tried as the end of the whole part, and each rest as its decimals: 30 s.
+    with pytest.raises(NotANumberError):
+        as_float("1" * 100_000 + "x")

@@ -216,3 +216,9 @@ def test_files_and_folders(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(MSGS.glob("*/package.xml")), ids=lambda path: path.parent.name)
 def test_our_own_manifests_are_as_catkin_wants_them(path: Path) -> None:
     assert read_manifest(path).problems == ()
+
+
+def test_condition_of_many_brackets_is_refused() -> None:
+    with pytest.raises(ValueError, match="brackets are nested deeper than 50 levels"):
+        evaluate_condition("(" * 20_000 + "1 == 1" + ")" * 20_000, {})
+    assert evaluate_condition(" or ".join(["(1 == 1)"] * 1_000), {})

@@ -6,10 +6,13 @@ Tokens come and go one by one and in any order, those of a robot before its clai
 
 from __future__ import annotations
 
+import itertools
+import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
+from minirospy.bridge.fleet.holders import Holders
 from minirospy.bridge.fleet.keys import (
     Claim,
     ServiceToken,
@@ -18,11 +21,10 @@ from minirospy.bridge.fleet.keys import (
     parse_service,
     parse_topic,
 )
-from minirospy.bridge.fleet.rules import holder
 
 _Token = TypeVar("_Token", TopicToken, ServiceToken)
 
-__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "MOST_TOKENS", "FleetContents", "Robot"]
+__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "MOST_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MOST_GATEWAYS = 5_000
 MOST_NAMES = 2_000
@@ -41,9 +43,18 @@ class Robot:
     duplicates: tuple[Claim, ...] = ()
 
 
+class Refused(NamedTuple):
+    """A gateway that is not shown: ``holder`` has the name, or had it until a moment ago."""
+
+    claim: Claim
+    holder: Claim | None
+
+
 @dataclass(eq=False)
 class _Gateway:
     claim: Claim | None = None
+    order: int = 0
+    """When the claim was seen: later claims have larger numbers."""
     topics: dict[str, TopicToken] = field(default_factory=dict)
     services: dict[str, ServiceToken] = field(default_factory=dict)
 
@@ -55,14 +66,18 @@ class _Gateway:
 class FleetContents:
     """The tokens that are there."""
 
-    def __init__(self, allows: Callable[[str], bool]) -> None:
-        """``allows(robot)``: which robots are of interest."""
+    def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
+        """``allows(robot)``: which robots are of interest. ``clock`` returns seconds that never go back."""
+        self.holders = Holders(clock)
+        self.waiting: tuple[Refused, ...] = ()
+        """The gateways that :meth:`robots` has left out, because another one has their name."""
         self.refused = 0
         """How many tokens were left out."""
         self.refusal = ""
         """Why the last of these was."""
         self._count = 0
         self._allows = allows
+        self._orders = itertools.count()
         self._gateways: dict[tuple[str, str], _Gateway] = {}
 
     def add(self, key: str) -> bool:
@@ -79,7 +94,12 @@ class FleetContents:
 
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
-            gateway.claim, changed = token, True
+            if gateway.claim not in (None, token):
+                # A gateway declares one claim as long as it runs: the second one is another peer's.
+                return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
+            changed = gateway.claim is None
+            if changed:
+                gateway.claim, gateway.order = token, next(self._orders)
         elif isinstance(token, TopicToken):
             changed = self._put(gateway.topics, token.topic, token)
         else:
@@ -101,6 +121,8 @@ class FleetContents:
 
         # A topic whose flags have changed has a new token already when the old one goes.
         if isinstance(token, Claim):
+            if gateway.claim != token:
+                return False
             gateway.claim = None
         elif isinstance(token, TopicToken):
             if gateway.topics.get(token.topic) != token:
@@ -122,18 +144,27 @@ class FleetContents:
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return the robots by name, each as the gateway that counts announces it; those that are ``lost`` do not count."""
+        """Return the robots by name, each as the gateway that holds its name announces it; ``lost`` ones do not count."""
+        there = [
+            (gateway.order, gateway.claim)
+            for gateway in self._gateways.values()
+            if gateway.claim and gateway.claim.gateway not in lost
+        ]
         claims: dict[str, list[Claim]] = {}
-        for gateway in self._gateways.values():
-            if gateway.claim and gateway.claim.gateway not in lost:
-                claims.setdefault(gateway.claim.name, []).append(gateway.claim)
-        found = {}
+        for _, claim in sorted(there):
+            claims.setdefault(claim.name, []).append(claim)
+
+        found: dict[str, Robot] = {}
+        waiting = []
         for name, named in sorted(claims.items()):
-            best = holder(named)
-            assert best
-            gateway = self._gateways[name, best.gateway]
-            others = tuple(sorted(claim for claim in named if claim != best))
-            found[name] = Robot(best, dict(gateway.topics), dict(gateway.services), others)
+            best = self.holders.choose(name, named)
+            others = tuple(claim for claim in named if claim != best)
+            waiting += [Refused(claim, self.holders.holder(name)) for claim in others]
+            if best:
+                gateway = self._gateways[name, best.gateway]
+                found[name] = Robot(best, dict(gateway.topics), dict(gateway.services), others)
+        self.holders.forget(claims)
+        self.waiting = tuple(waiting)
         return found
 
     def _put(self, table: dict[str, _Token], name: str, token: _Token) -> bool:

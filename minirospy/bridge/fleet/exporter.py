@@ -26,9 +26,10 @@ from minirospy.bridge.fleet.keys import (
 from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.outbound import OutboundTopic
 from minirospy.bridge.fleet.robot_graph import RobotGraph
-from minirospy.bridge.fleet.rules import GatewayRules, holder
+from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -72,6 +73,7 @@ class Exporter:
         self._tokens: dict[str, Later] = {}
         self._readers: dict[str, set[str]] = {}
         self._claims = {claim}
+        self._rivals = RateLimitedLogger(_log)
         self._flows = Intake.flows(_MOST_IN_FLOWS)
         self._faults = Faults(_log, "the watch of the robot's graph")
         self._watching: asyncio.Task[None] | None = None
@@ -165,13 +167,17 @@ class Exporter:
             self._claims.add(claim)
         else:
             self._claims.discard(claim)
-        best = holder(self._claims)
-        was_first, self.duplicates = not self.duplicates, tuple(sorted(self._claims - {self.claim}))
-        if best != self.claim and was_first:
-            _log.error(
-                "a robot of the name [%s] is in the fleet already, on another machine: this one is not shown until that "
-                "one leaves, or this one has another name (--name)",
+        before, self.duplicates = self.duplicates, tuple(sorted(self._claims - {self.claim}))
+        others = [each for each in self.duplicates if each.host != self.claim.host]
+        if others and not any(each.host != self.claim.host for each in before):
+            self._rivals.error(
+                "another machine, %s (gateway %s), calls itself [%s], too: a control room shows the one that it saw first, and "
+                "refuses the other. Give one of them another name (--name). This machine is %s (gateway %s)",
+                others[0].host,
+                others[0].gateway,
                 self.claim.name,
+                self.claim.host,
+                self.claim.gateway,
             )
 
     async def _adjust(self) -> None:

@@ -24,6 +24,7 @@ from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.tasks import Faults
 from minirospy.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -75,15 +76,24 @@ class Gateway:
         self._declared: list[Later] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._faults = Faults(_log, "a task of the gateway")
+        self._failures = RateLimitedLogger(_log)
+
+    async def connect(self) -> None:
+        """Open the session, which waits for a router where one is to be there. Needs no started node. Raises BridgeError."""
+        if self.network is None:
+            self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet, and pass on until :meth:`close`.
+        """Connect to the fleet unless :meth:`connect` has, and pass on until :meth:`close`.
 
-        Waits for a router where one is to be there. Raises BridgeError, MasterUnreachableError, RpcError,
-        ROSInterruptException where the node is shut down before.
+        Raises BridgeError, MasterUnreachableError, RpcError, ROSInterruptException where the node is shut down before.
         """
         options = self.options
-        network = self.network = await self._connected()
+        # A thousand robots have thousands of topics: a master that does not register them is one line.
+        self.node.registration_faults = RateLimitedLogger(self.node.log)
+        await self._wait_for_network()
+        network = self.network
+        assert network
         definitions = self._definitions = Definitions(self.node, network)
         sender = self._sender = Sender(network, options.clock)
         intake = self._intake = Intake()
@@ -186,6 +196,7 @@ class Gateway:
             found["ros1_keys"] = self.ros1.status()
         if self.importer:
             found["refused"] = self.importer.contents.refused
+            found["refused_gateways"] = len(self.importer.contents.waiting)
             found["robots"] = [
                 {
                     "name": name,
@@ -217,15 +228,15 @@ class Gateway:
             ]
         return found
 
-    async def _connected(self) -> FleetNetwork:
-        """Return the session, unless the node is shut down before there is one."""
-        opening = asyncio.ensure_future(FleetNetwork.open(self.options.network))
+    async def _wait_for_network(self) -> None:
+        """Open the session, unless the node is shut down before there is one."""
+        opening = asyncio.ensure_future(self.connect())
         ending = asyncio.ensure_future(self.node.spin())
         try:
             await asyncio.wait([opening, ending], return_when=asyncio.FIRST_COMPLETED)
             if not opening.done():
                 raise ROSInterruptException("ROS shutdown request")
-            return opening.result()
+            opening.result()
         finally:
             for task in (opening, ending):
                 task.cancel()
@@ -258,7 +269,7 @@ class Gateway:
             try:
                 await work
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
-                _log.warning("%s", error)
+                self._failures.warning("%s", error)
             except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
                 self._faults.report(error)
 

@@ -63,8 +63,9 @@ class Shared:
     rules: GatewayRules
     spawn: Callable[[Coroutine[object, object, None]], object]
     clock: Callable[[], int]
+    left_out: RateLimitedLogger
+    """Logs topics that cannot be shown."""
     statics: dict[str, StaticTransforms] = field(default_factory=dict)
-    opening: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(16))
 
 
 class ImportedTopic:
@@ -161,8 +162,7 @@ class ImportedTopic:
     async def _open(self) -> None:
         shared, token = self._shared, self.token
         if token.is_published:
-            async with shared.opening:
-                interface = await shared.definitions.interface(token.type, token.md5sum, token.gateway)
+            interface = await shared.definitions.interface(token.type, token.md5sum, token.gateway)
             if self._is_closed:
                 return
             try:
@@ -174,7 +174,7 @@ class ImportedTopic:
                     on_change=self._links_changed,
                 )
             except ValueError as error:
-                _log.warning("%s is not shown: %s", self.name, error)
+                shared.left_out.warning("%s is not shown: %s", self.name, error)
                 return
             if token.is_latched and token.type in TF_TYPES:
                 made = StaticTransforms()

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
-from minirospy.bridge.fleet.contents import FleetContents, Robot
+from minirospy.bridge.fleet.contents import FleetContents, Refused, Robot
 from minirospy.bridge.fleet.definitions import Definitions
+from minirospy.bridge.fleet.holders import HOLD_SECONDS, parse_machines
 from minirospy.bridge.fleet.imported_topic import ImportedTopic, Shared
-from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key, parse_claim
+from minirospy.bridge.fleet.keys import ROOT, Claim, ServiceToken, call_key, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
 from minirospy.bridge.fleet.presence import Presence
 from minirospy.bridge.fleet.rules import GatewayRules
@@ -21,6 +22,7 @@ from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.master.heap import return_free_memory
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -28,7 +30,10 @@ from minirospy.wire.tcpros import InterfaceType
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
 
-__all__ = ["ImportedRobot", "Importer"]
+__all__ = ["MACHINES", "ImportedRobot", "Importer"]
+
+MACHINES = "/fleet/machines"
+"""The parameter of the machines that the operator has chosen, by names of robots; `minirospy fleet takeover` sets it."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
@@ -38,7 +43,14 @@ _AGAIN_SECONDS = 5.0
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
+_MOST_PING = 64  # bytes of an answer to a ping, which has 8
 _CALL_SECONDS = 3600.0
+_CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
+TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # some 4 MB; links linger until then
+MAX_ROBOT_NAMES = 2_000  # of _MOST_IMPORTED that one robot may take
+NAMES_AT_ONCE = 100  # of a robot that are closed together: each is a task, and a call of the master
+MAX_LISTED = 5  # robots that one log line names
+LINES = 5  # log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
 _AT_ONCE = 20
 """Robots that are removed at a time."""
@@ -80,7 +92,9 @@ class Importer:
         self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
         self._node = node
         self._network = network
-        self._shared = Shared(node, network, definitions, sender, intake, gateway, rules, spawn, clock)
+        self._shared = Shared(
+            node, network, definitions, sender, intake, gateway, rules, spawn, clock, RateLimitedLogger(_log)
+        )
         self._rules = rules
         self._spawn = spawn
         self._clock = clock
@@ -88,6 +102,17 @@ class Importer:
         self._is_reconciling = False
         self._is_full = False
         self._left_out = RateLimitedLogger(_log)
+        self._clocks = RateLimitedLogger(_log, LINES)
+        self._comings = RateLimitedLogger(_log, LINES)
+        self._rivals = RateLimitedLogger(_log, LINES)
+        self._waiting: tuple[Refused, ...] = ()
+        """The gateways that were refused at the last look, so that each is named once."""
+        self._removed = 0
+        """Names that have been removed since memory was given back last."""
+        self._trimming: asyncio.TimerHandle | None = None
+        self._machines: dict[str, str] = {}
+        """The machine of each robot that was shown last."""
+        self._challenging: set[str] = set()
         self._is_closed = False
         self._faults = Faults(_log, "showing the fleet's robots")
         self._presence = Presence(
@@ -102,7 +127,10 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`."""
+        """Show robots until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        self._node.parameters.listeners.append(self._parameter_changed)
+        await self._node.parameters.add(MACHINES)
+        await self._read_machines()
         self._declared = [
             self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
             for kind in ("robot", "topic", "service")
@@ -115,8 +143,11 @@ class Importer:
     async def close(self) -> None:
         """Remove all robots. Idempotent."""
         self._is_closed = True
-        if self._reconciling:
-            self._reconciling.cancel()
+        if self._parameter_changed in self._node.parameters.listeners:
+            self._node.parameters.listeners.remove(self._parameter_changed)
+        for timer in (self._reconciling, self._trimming):
+            if timer:
+                timer.cancel()
         watching, self._watching = self._watching, []
         for task in watching:
             task.cancel()
@@ -138,9 +169,30 @@ class Importer:
                 self._presence.check_soon()
 
     def _soon(self, seconds: float) -> None:
-        if self._reconciling is None and not self._is_closed:
-            loop = asyncio.get_running_loop()
-            self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+        if self._is_closed:
+            return
+        loop = asyncio.get_running_loop()
+        pending = self._reconciling
+        if pending is not None:
+            if pending.when() <= loop.time() + seconds:
+                return
+            pending.cancel()
+        self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+
+    # --- the operator's choices
+
+    def _parameter_changed(self, name: str, _: object) -> None:
+        if f"{name}/".startswith(f"{MACHINES}/") or f"{MACHINES}/".startswith(f"{name}/"):
+            self._spawn(self._follow_machines())
+
+    async def _follow_machines(self) -> None:
+        await self._read_machines()
+        self._soon(0.0)
+
+    async def _read_machines(self) -> None:
+        self.contents.holders.machines = parse_machines(await self._node.get_param(MACHINES, {}))
+
+    # --- what is shown
 
     async def _reconcile(self) -> None:
         """Show what the fleet has now."""
@@ -155,6 +207,9 @@ class Importer:
             await self._show(self.contents.robots(self._presence.lost))
         finally:
             self._is_reconciling = False
+        pause = self.contents.holders.pause({refused.claim.name for refused in self.contents.waiting})
+        if pause is not None:
+            self._soon(max(pause, _SETTLE_SECONDS))
         if time.monotonic() - started > _SETTLE_SECONDS and self._reconciling is not None:
             # While a thousand robots come, the loop has other work, too.
             self._reconciling.cancel()
@@ -162,12 +217,13 @@ class Importer:
             self._soon(2 * (time.monotonic() - started))
 
     async def _show(self, robots: dict[str, Robot]) -> None:
-        gone = []
+        gone, left, joined = [], [], []
         for name, shown in list(self.robots.items()):
             robot = robots.get(name)
             if robot is None or robot.claim != shown.robot.claim:
                 gone.append(self.robots.pop(name))
-                _log.info("robot [%s] has left", name)
+                left.append(name)
+        self._report_names(left, "left")
         for first in range(0, len(gone), _AT_ONCE):
             # One of them that fails does not keep the others.
             for error in await asyncio.gather(
@@ -175,23 +231,112 @@ class Importer:
             ):
                 if isinstance(error, Exception):
                     self._faults.report(error)
+        self._trim_soon(sum(len(robot.topics) + len(robot.services) for robot in gone))
+        for name, robot in robots.items():
+            if name not in self.robots:
+                self.robots[name] = ImportedRobot(robot)
+                joined.append(name)
+                self._report_machine(robot.claim)
+        self._report_names(joined, "joined")
+        self._report_refused()
+
         for name, robot in robots.items():
             known = self.robots.get(name)
             if known is None:
-                known = self.robots[name] = ImportedRobot(robot)
-                _log.info("robot [%s] has joined", name)
-            if robot.duplicates and robot.duplicates != known.robot.duplicates:
-                _log.warning(
-                    "%d gateways call themselves [%s]: only the one that started first is shown",
-                    len(robot.duplicates) + 1,
-                    name,
-                )
+                continue  # closed meanwhile
             known.robot = robot
             try:
                 await self._update(known)
             except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
                 self._faults.report(error)
                 self._soon(_AGAIN_SECONDS)
+
+    def _report_names(self, names: list[str], what: str) -> None:
+        """Log the robots that have joined or left, in one line."""
+        if len(names) == 1:
+            self._comings.info("robot [%s] has %s", names[0], what)
+        elif names:
+            rest = len(names) - MAX_LISTED
+            shown = ", ".join(f"[{name}]" for name in names[:MAX_LISTED])
+            more = f" and {rest} more" if rest > 0 else ""
+            self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
+
+    def _report_machine(self, claim: Claim) -> None:
+        """Log that a robot's name has passed to another machine."""
+        before = self._machines.get(claim.name, claim.host)
+        if before != claim.host:
+            is_chosen = claim.name in self.contents.holders.machines
+            self._rivals.warning(
+                "robot [%s] is another machine now: %s (gateway %s) in place of %s, %s",
+                claim.name,
+                claim.host,
+                claim.gateway,
+                before,
+                "as the operator has chosen" if is_chosen else f"which has been gone for {HOLD_SECONDS:g} s",
+            )
+        if len(self._machines) >= _MOST_IMPORTED:
+            self._machines.clear()
+        self._machines[claim.name] = claim.host
+
+    def _report_refused(self) -> None:
+        """Log each gateway that another one keeps from a name, once; check whether the other one of a machine still answers."""
+        known, self._waiting = set(self._waiting), self.contents.waiting
+        for refused in self._waiting:
+            claim, holder = refused
+            if refused in known or holder is None:
+                continue
+            if claim.host == holder.host:
+                self._challenge(refused)
+            elif claim.name in self.contents.holders.machines:
+                self._rivals.warning(
+                    "robot [%s] is shown only from machine %s, which the operator has chosen: machine %s (gateway %s) "
+                    "is refused",
+                    claim.name,
+                    self.contents.holders.machines[claim.name],
+                    claim.host,
+                    claim.gateway,
+                )
+            else:
+                self._rivals.warning(
+                    "two machines call themselves [%s]: %s (gateway %s) came first and is shown, %s (gateway %s) is refused "
+                    "until the first has been gone for %g s. To change it: minirospy fleet takeover %s %s",
+                    claim.name,
+                    holder.host,
+                    holder.gateway,
+                    claim.host,
+                    claim.gateway,
+                    HOLD_SECONDS,
+                    claim.name,
+                    claim.host,
+                )
+
+    def _challenge(self, refused: Refused) -> None:
+        """Ask the holder of a name whether it is there: its machine may have started its gateway again."""
+        name = refused.claim.name
+        if name not in self._challenging:
+            self._challenging.add(name)
+            self._spawn(self._ask_holder(refused))
+
+    async def _ask_holder(self, refused: Refused) -> None:
+        claim, holder = refused
+        assert holder
+        try:
+            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=_CHALLENGE_SECONDS)
+        except QueryFailed:
+            self.contents.holders.give_up(holder)
+            self._soon(0.0)
+        else:
+            if refused in self.contents.waiting:
+                self._rivals.warning(
+                    "two gateways of machine %s call themselves [%s]: %s came first and is shown, %s is refused. End one of "
+                    "them, or give it another name (--name)",
+                    claim.host,
+                    claim.name,
+                    holder.gateway,
+                    claim.gateway,
+                )
+        finally:
+            self._challenging.discard(claim.name)
 
     async def _update(self, shown: ImportedRobot) -> None:
         robot = shown.robot
@@ -208,16 +353,23 @@ class Importer:
             if (
                 topic not in shown.topics
                 and self._rules.topics(f"/{token.robot}{topic}")
-                and self._has_room()
+                and self._has_room(shown)
             ):
                 imported = shown.topics[topic] = ImportedTopic(self._shared, token, lambda: shown.clock)
                 imported.start()
         for service, service_token in robot.services.items():
             name = f"/{robot.claim.name}{service}"
-            if service not in shown.services and self._rules.services(name) and self._has_room():
+            if service not in shown.services and self._rules.services(name) and self._has_room(shown):
                 shown.services[service] = service_token, self._serve(name, service_token, shown.left)
 
-    def _has_room(self) -> bool:
+    def _has_room(self, shown: ImportedRobot) -> bool:
+        if len(shown.topics) + len(shown.services) >= MAX_ROBOT_NAMES:
+            self._left_out.warning(
+                "robot [%s] has more than %d topics and services: the others are not shown. Give it --topics or --services",
+                shown.robot.claim.name,
+                MAX_ROBOT_NAMES,
+            )
+            return False
         count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
         if count < _MOST_IMPORTED:
             return True
@@ -229,12 +381,25 @@ class Importer:
             )
         return False
 
+    def _trim_soon(self, removed: int) -> None:
+        """Give the memory of names that have been removed back to the system, a while later: links linger until then."""
+        self._removed += removed
+        if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
+            loop = asyncio.get_running_loop()
+            self._trimming = loop.call_later(TRIM_SECONDS, self._trim)
+
+    def _trim(self) -> None:
+        self._removed, self._trimming = 0, None
+        asyncio.get_running_loop().run_in_executor(None, return_free_memory)
+
     async def _remove(self, shown: ImportedRobot) -> None:
         shown.left.set()
-        await asyncio.gather(
-            *(topic.close() for topic in shown.topics.values()),
-            *(offered.close() for _, offered in shown.services.values()),
-        )
+        parts: list[ImportedTopic | RawService] = [
+            *shown.topics.values(),
+            *(offered for _, offered in shown.services.values()),
+        ]
+        for first in range(0, len(parts), NAMES_AT_ONCE):
+            await asyncio.gather(*(part.close() for part in parts[first : first + NAMES_AT_ONCE]))
 
     def _serve(self, name: str, token: ServiceToken, left: asyncio.Event) -> RawService:
         key = call_key(token.robot, token.gateway, token.service, token.md5sum)
@@ -287,7 +452,7 @@ class Importer:
         """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
         start = f"{ROOT}/ping/"
         try:
-            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS)
+            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MOST_PING)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
             return None
@@ -309,7 +474,7 @@ class Importer:
         before, found = shown.clock, offset_of(pings)
         shown.clock = found or before
         if found and abs(found.offset) > _WARN_OFFSET + found.round_trip and before is None:
-            _log.warning(
+            self._clocks.warning(
                 "the clock of robot [%s] is %.3f s %s this one: times in its messages are its own",
                 shown.robot.claim.name,
                 abs(found.offset) / 1e9,

@@ -20,6 +20,7 @@ from minirospy.bridge.fleet.rules import STOP_SECONDS
 from minirospy.bridge.fleet.stopping import CommandStream
 from minirospy.errors import BridgeError, DeserializationError, ROSException, ServiceException
 from minirospy.idl.protocols import Message
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -84,6 +85,7 @@ class InboundTopic:
         self._rewriter: FrameRewriter | None = None
         self._is_ready = False
         self._is_closed = False
+        self._misfits = RateLimitedLogger(_log)
         self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
         self._stream: CommandStream | None = None
         self._stop_seconds = stop_seconds
@@ -164,7 +166,7 @@ class InboundTopic:
                 on_change=self._on_change,
             )
         except ValueError as error:
-            _log.warning("%s", error)
+            self._misfits.warning("%s", error)
             return
         if self._stop_seconds and CommandStream.guards(self.token.type):
             self._stream = CommandStream(

@@ -11,8 +11,7 @@ from typing import TypeVar
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
 from minirospy.bridge.fleet.keys import ROOT, Claim, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions, QueryFailed
-from minirospy.bridge.fleet.report import Answer, is_shallow, parse_answer
-from minirospy.bridge.fleet.rules import holder
+from minirospy.bridge.fleet.report import Answer, is_shallow, is_shown, parse_answer
 from minirospy.errors import BridgeError
 from minirospy.runtime.transport.loop import new_event_loop
 
@@ -61,7 +60,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
 
 async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds: float) -> object:
     """Return a robot's parameter, or a namespace of them. Raise BridgeError."""
-    claim = holder(each for each in await _claims(network, "robot", seconds) if each.name == robot)
+    claim = await _shown_claim(network, robot, seconds)
     if claim is None:
         raise BridgeError(
             f"no robot [{robot}] is in the fleet: `minirospy fleet status` lists those that are"
@@ -76,6 +75,24 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
     if not is_shallow(value):
         raise BridgeError(f"robot [{robot}]: the value of [{name}] is nested too deeply")
     return value
+
+
+async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
+    """Return the claim to a name; of several the one that the control rooms show. Raise BridgeError if that is not clear."""
+    claims = [each for each in await _claims(network, "robot", seconds) if each.name == robot]
+    if len(claims) > 1:
+        _, controls = await fleet_status(network, seconds)
+        shown = [claim for claim in claims if is_shown(claim, controls)]
+        # Of one machine the newest: the token of the gateway before may still be there.
+        claims = (
+            [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
+        )
+    if len(claims) > 1:
+        machines = ", ".join(sorted({claim.host for claim in claims}))
+        raise BridgeError(
+            f"several machines call themselves [{robot}] ({machines}): give each its own name (--name)"
+        )
+    return claims[0] if claims else None
 
 
 async def _claims(network: FleetNetwork, kind: str, seconds: float) -> list[Claim]:

@@ -42,6 +42,7 @@ __all__ = [
     "definition_key",
     "in_key",
     "is_global_name",
+    "is_machine",
     "is_md5",
     "is_robot_name",
     "mangled",
@@ -81,7 +82,10 @@ _STAMP = struct.Struct("<Iq")
 
 
 class Claim(NamedTuple):
-    """A gateway's word that it speaks for a robot, since ``start`` (its own clock, ns), on a machine ``host``."""
+    """A gateway's word that it speaks for a robot, since ``start`` (its own clock, ns), on a machine ``host``.
+
+    Neither is verified: nothing is decided by ``start``.
+    """
 
     name: str
     gateway: str
@@ -145,6 +149,11 @@ class Stamp(NamedTuple):
 def is_robot_name(name: str) -> bool:
     """Return whether a robot may have this name: it becomes a namespace of ROS."""
     return bool(_ROBOT.fullmatch(name))
+
+
+def is_machine(value: object) -> bool:
+    """Return whether a value identifies a machine, as the last part of a robot's token does."""
+    return isinstance(value, str) and bool(_GATEWAY.fullmatch(value))
 
 
 def is_md5(text: str) -> bool:

@@ -24,6 +24,7 @@ from minirospy.bridge.zenoh_library import (
     DEFAULT_ENDPOINT,
     DEFAULT_PORT,
     Declared,
+    EndpointError,
     NetworkOptions,
     Outlet,
     Query,
@@ -35,6 +36,7 @@ from minirospy.bridge.zenoh_library import (
     one_line,
     require_zenoh,
     to_endpoint,
+    unresolved,
 )
 from minirospy.errors import BridgeError, MinirospyError
 from minirospy.escape import escaped
@@ -44,6 +46,7 @@ __all__ = [
     "DEFAULT_PORT",
     "Beacon",
     "Declared",
+    "EndpointError",
     "FleetNetwork",
     "NetworkOptions",
     "Outlet",
@@ -58,6 +61,8 @@ _T = TypeVar("_T")
 
 MOST_TEXT = 16 << 20
 """Bytes of a query or a reply that is read at most: a response of a service, a definition."""
+MAX_REPLIES = 10_000  # to one query: peers choose how many; a fleet has at most 5,000 gateways
+EARLY_SHARE = 0.9  # of its seconds: a query that ends before has not waited in vain, its link broke
 _RETRY_SECONDS = 1.0
 _LINGER_SECONDS = 2.0
 _QUERIES = 200
@@ -96,6 +101,7 @@ class FleetNetwork:
         self._calls = _Share(_QUERIES)
         self._control = _Share(_CONTROL_QUERIES)
         self._is_closed = False
+        self._faults = Faults(_log, "taking a message or query of the fleet")
         faults = Faults(_log, "the search for links of Zenoh")
         self._lingering = (
             asyncio.ensure_future(keep_running(_remove_linger, faults)) if has_many_links else None
@@ -120,12 +126,16 @@ class FleetNetwork:
                 text = one_line(error)
                 if "Unable to connect" not in text:
                     raise BridgeError(f"the fleet's network cannot be opened: {text}") from error
+                unknown = await loop.run_in_executor(
+                    None, unresolved, json.loads(config.get_json("connect/endpoints") or "[]")
+                )
+                why = f" ({', '.join(map(escaped, unknown))} does not resolve)" if unknown else ""
                 if not waits:
                     raise BridgeError(
-                        f"nothing of the fleet answers at {endpoints}: give --connect, or start `minirospy fleet router`"
+                        f"nothing of the fleet answers at {endpoints}{why}: give --connect, or start `minirospy fleet router`"
                     ) from error
             if not is_reported:
-                _log.warning("nothing of the fleet answers at %s yet. Will keep trying.", endpoints)
+                _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
                 is_reported = True
             await asyncio.sleep(_RETRY_SECONDS)
 
@@ -173,14 +183,15 @@ class FleetNetwork:
         """Return the keys of the tokens that are there."""
         found: list[str] = []
 
-        def arrived(reply: Reply) -> None:
-            if reply.ok is not None:
+        def arrived(reply: Reply) -> bool:
+            if reply.ok is not None and len(found) < MAX_REPLIES:
                 found.append(str(reply.ok.key_expr))
+            return len(found) >= MAX_REPLIES
 
         await self._collected(
             lambda handler: self._session.liveliness().get(pattern, handler, timeout=seconds), arrived
         )
-        return found
+        return list(found)
 
     # --- messages
 
@@ -201,8 +212,8 @@ class FleetNetwork:
                     sample.payload.to_bytes(),
                     attachment.to_bytes() if attachment else b"",
                 )
-            except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
-                _log.exception("a message of the fleet could not be taken")
+            except Exception as error:  # noqa: BLE001 - Zenoh would print it, or end its thread
+                self._faults.report(error)
 
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
@@ -293,8 +304,12 @@ class FleetNetwork:
         ``of_others``: of one that another session has, where several could answer.
         """
         options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
-        found = await self.queries(key, request, seconds=seconds, **options)
+        started = self._loop.time()
+        found = await self.queries(key, request, seconds=seconds, most=1, **options)
         if not found:
+            waited = self._loop.time() - started
+            if waited < EARLY_SHARE * seconds:
+                raise QueryFailed(f"no answer: nobody answers there, or the link broke after {waited:.1f} s")
             raise QueryFailed(f"no answer within {seconds:g} s")
         answer = next(iter(found.values()))
         if isinstance(answer, QueryFailed):
@@ -302,23 +317,36 @@ class FleetNetwork:
         return answer
 
     async def queries(
-        self, pattern: str, request: bytes = b"", *, seconds: float, **options: object
+        self,
+        pattern: str,
+        request: bytes = b"",
+        *,
+        seconds: float,
+        most: int = MAX_REPLIES,
+        size: int = MOST_TEXT,
+        **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return all answers by their keys; ``options`` of Zenoh's go before ours."""
+        """Return the answers by their keys, ``most`` of at most ``size`` bytes; ``options`` of Zenoh's go before ours.
+
+        Returns with the last one: what else answers the query, or never does, is not waited for.
+        """
         found: dict[str, bytes | QueryFailed] = {}
 
-        def arrived(reply: Reply) -> None:
+        def arrived(reply: Reply) -> bool:
+            if len(found) >= most:
+                return True
             if reply.ok is not None:
-                is_short = len(reply.ok.payload) <= MOST_TEXT
+                is_short = len(reply.ok.payload) <= size
                 answer = (
                     reply.ok.payload.to_bytes()
                     if is_short
-                    else QueryFailed(f"the answer has more than {MOST_TEXT} bytes")
+                    else QueryFailed(f"the answer has more than {size} bytes")
                 )
                 found.setdefault(str(reply.ok.key_expr), answer)
             elif reply.err is not None:
                 text = reply.err.payload.to_bytes()[:2000].decode(errors="replace")
                 found.setdefault("", QueryFailed(escaped(text)))
+            return len(found) >= most
 
         zenoh = self._zenoh
         await self._collected(
@@ -329,6 +357,8 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
+                    # By default Zenoh keeps the answers back until the last one is there, or never comes.
+                    "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
                     **options,
@@ -336,16 +366,21 @@ class FleetNetwork:
             ),
             arrived,
         )
-        return found
+        return dict(found)
 
     # --- within
 
-    async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], object]) -> None:
-        """Start a query, and return when its last reply has arrived."""
+    async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
+        """Start a query, and return when its last reply has arrived, or ``arrived`` returns that none is needed any more."""
         if self._is_closed:
             raise QueryFailed("the gateway is closed")
         ended = asyncio.Event()
-        handler = self._zenoh.handlers.Callback(arrived, lambda: self._soon(ended.set), indirect=False)
+
+        def replied(reply: Reply) -> None:
+            if arrived(reply):
+                self._soon(ended.set)
+
+        handler = self._zenoh.handlers.Callback(replied, lambda: self._soon(ended.set), indirect=False)
         try:
             await self._loop.run_in_executor(self._caller, start, handler)
         except self._zenoh.ZError as error:
@@ -389,7 +424,7 @@ class FleetNetwork:
         except MinirospyError as error:
             reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
         except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here
-            _log.exception("a query of the fleet could not be answered")
+            self._faults.report(error)
             reply = functools.partial(query.reply_err, f"the gateway failed: {type(error).__name__}".encode())
         finally:
             if reply is None:

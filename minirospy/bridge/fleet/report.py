@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 from minirospy.bridge.fleet.clocks import ClockOffset
 from minirospy.bridge.fleet.keys import Claim
-from minirospy.bridge.fleet.rules import holder
 from minirospy.escape import escaped
 
-__all__ = ["Answer", "as_json", "is_shallow", "lines", "parse_answer"]
+__all__ = ["Answer", "as_json", "is_shallow", "is_shown", "lines", "parse_answer"]
 
 Json = Mapping[str, object]
 MOST_LEVELS = 50
@@ -49,7 +48,7 @@ def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
     ]
     for answer in sorted(robots, key=lambda each: (each.claim.name, each.claim.start)):
-        found += _robot_lines(answer, _is_shown(answer, robots))
+        found += _robot_lines(answer, robots, controls)
     for answer in controls:
         found += _control_lines(answer)
     return found
@@ -69,31 +68,41 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
             "status": answer.status,
         }
 
-    robots = list(robots)
+    robots, controls = list(robots), list(controls)
     return json.dumps(
         {
-            "robots": [described(each, _is_shown(each, robots)) for each in robots],
+            "robots": [described(each, is_shown(each.claim, controls)) for each in robots],
             "controls": [described(each, True) for each in controls],
         },
         indent=1,
     )
 
 
-def _is_shown(answer: Answer, robots: Iterable[Answer]) -> bool:
-    return holder(each.claim for each in robots if each.claim.name == answer.claim.name) == answer.claim
+def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
+    """Return whether a control room shows a gateway's robot; True if no control room shows one of this name."""
+    shown = {
+        _text(robot, "gateway")
+        for control in controls
+        for robot in _tables(control.status, "robots")
+        if _text(robot, "name") == claim.name
+    }
+    return not shown or claim.gateway in shown
 
 
-def _robot_lines(answer: Answer, is_shown: bool) -> list[str]:
+def _robot_lines(answer: Answer, robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
+    claim = answer.claim
+    has_rivals = any(each.claim.name == claim.name and each.claim != claim for each in robots)
+    which = f", machine {claim.host}, gateway {claim.gateway}" if has_rivals else ""
     status = answer.status
     if not status:
-        return [f"{answer.claim.name}: is there, but does not answer"]
+        return [f"{claim.name}{which}: is there, but does not answer"]
     parts = [
-        f"{answer.claim.name} ({_text(status, 'machine')})",
+        f"{claim.name} ({_text(status, 'machine')}{which})",
         _count(_number(status, "topics"), "topic"),
         _count(_number(status, "services"), "service"),
         _clock(answer.clock),
     ]
-    if not is_shown:
+    if not is_shown(claim, controls):
         parts.append("NOT SHOWN: another gateway has this name")
 
     if status.get("master") is False:

@@ -104,6 +104,7 @@ class Ros1Side:
         self._others: set[str] = set()
         self._adjusting = asyncio.Lock()
         self._left_out = RateLimitedLogger(_log)
+        self._misfits = RateLimitedLogger(_log, 5)
         self._faults = Faults(_log, "passing the keys of zenoh-bridge-ros1")
         self._marker: RawSubscription | None = None
         self._beacons_received: Later | None = None
@@ -263,7 +264,7 @@ class Ros1Side:
                 remote, self._has_news = list(self._sightings), False
             found, conflicts = shared_topics(self.graph.topics, remote)
             for name in conflicts.keys() - self._conflicts.keys():
-                _log.warning("%s of others is not passed: it is of type %s", name, conflicts[name])
+                self._misfits.warning("%s of others is not passed: it is of type %s", name, conflicts[name])
             self._conflicts = conflicts
 
             for name, topic in list(self.topics.items()):

@@ -1,4 +1,4 @@
-"""Which topics and services a gateway passes on, how often, and in which lane; who speaks for a robot. Pure."""
+"""Which topics and services a gateway passes on, how often, and in which lane. Pure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 from fnmatch import fnmatchcase
 
 from minirospy.bridge.access import NameFilter
-from minirospy.bridge.fleet.keys import Claim, is_global_name
+from minirospy.bridge.fleet.keys import is_global_name
 from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import Snapshot
 
@@ -19,7 +19,6 @@ __all__ = [
     "Throttle",
     "exported_services",
     "exported_topics",
-    "holder",
     "is_logger_service",
     "lane_of_type",
     "parse_lanes",
@@ -189,22 +188,6 @@ def exported_services(
 def is_logger_service(service: str) -> bool:
     """Return whether a service is one of the two that each node has for its loggers."""
     return service.endswith(_LOGGER_SERVICES)
-
-
-def holder(claims: Iterable[Claim]) -> Claim | None:
-    """Return the claim that counts where several gateways speak for a robot of one name.
-
-    Of one machine the newest: the gateway was started again, and the old one's token is not gone yet. Of several machines
-    the one that started first, by their own clocks: all that see the same claims choose the same one.
-    """
-    newest: dict[str, Claim] = {}
-    first: dict[str, int] = {}
-    for claim in claims:
-        first[claim.host] = min(claim.start, first.get(claim.host, claim.start))
-        other = newest.get(claim.host)
-        if other is None or (claim.start, claim.gateway) > (other.start, other.gateway):
-            newest[claim.host] = claim
-    return min(newest.values(), key=lambda claim: (first[claim.host], claim.host), default=None)
 
 
 def _halves(word: str, option: str, example: str) -> tuple[str, str]:

@@ -12,6 +12,7 @@ from minirospy.bridge.fleet.keys import Stamp, serialize_stamp
 from minirospy.bridge.fleet.lanes import Flow, FlowQueue
 from minirospy.bridge.fleet.network import FleetNetwork, Outlet
 from minirospy.bridge.fleet.rules import Lane, Throttle
+from minirospy.bridge.tasks import Faults
 
 __all__ = ["Intake", "Outflow", "Sender"]
 
@@ -204,6 +205,7 @@ class Intake(_Worker):
 
     def __init__(self) -> None:
         super().__init__("fleet-intake")
+        self._faults = Faults(_log, "publishing a message of the fleet")
         self._queue: FlowQueue[_Arrival] = FlowQueue()
 
     @staticmethod
@@ -241,5 +243,5 @@ class Intake(_Worker):
                 deliver, message, attachment = taken[1]
                 try:
                     deliver(message, attachment)
-                except Exception:  # noqa: BLE001 - of one message: the others go on
-                    _log.exception("a message of the fleet could not be published")
+                except Exception as error:  # noqa: BLE001 - of one message: the others go on
+                    self._faults.report(error)

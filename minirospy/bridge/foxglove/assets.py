@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 from urllib.parse import unquote
 
 from minirospy.errors import BridgeError, NotFoundError
@@ -36,20 +37,18 @@ class Assets:
         except re.error as error:
             raise BridgeError(f"'{error.pattern!s}' is not a regular expression: {error}") from error
 
-    def read(self, uri: str) -> bytes:
-        """Return a file's bytes. Raise BridgeError with the reason."""
+    def open(self, uri: str) -> tuple[BinaryIO, int]:
+        """Return an open file and its size. Raise BridgeError with the reason."""
         path = self._path(uri)
         try:
-            size = path.stat().st_size
-            if size > self._most_bytes:
-                raise BridgeError(f"{uri}: {size} bytes, {self._most_bytes} are allowed")
-            with path.open("rb") as file:
-                data = file.read(self._most_bytes + 1)
+            file = path.open("rb")
         except OSError as error:
             raise BridgeError(f"{uri}: {error.strerror}") from None
-        if len(data) > self._most_bytes:
-            raise BridgeError(f"{uri}: more than {self._most_bytes} bytes")
-        return data
+        size = os.fstat(file.fileno()).st_size
+        if size > self._most_bytes:
+            file.close()
+            raise BridgeError(f"{uri}: {size} bytes, {self._most_bytes} are allowed")
+        return file, size
 
     def _path(self, uri: str) -> Path:
         if not any(each.fullmatch(uri) for each in self._allowed):

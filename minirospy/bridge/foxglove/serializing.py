@@ -24,8 +24,8 @@ from minirospy.bridge.foxglove.protocol import (
 __all__ = [
     "advertise",
     "advertise_services",
-    "asset",
     "asset_failure",
+    "asset_head",
     "connection_graph_update",
     "message_head",
     "parameter_values",
@@ -188,9 +188,9 @@ def service_response_head(service_id: int, call_id: int, encoding: str = MESSAGE
     return _SERVICE_HEAD.pack(3, service_id, call_id, len(name)) + name
 
 
-def asset(request_id: int, data: bytes) -> bytes:
-    """Return the frame with a file."""
-    return _ASSET_HEAD.pack(4, request_id, 0, 0) + data
+def asset_head(request_id: int) -> bytes:
+    """Return the beginning of the frame with a file, whose bytes follow."""
+    return _ASSET_HEAD.pack(4, request_id, 0, 0)
 
 
 def asset_failure(request_id: int, why: str) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from minirospy.bridge.foxglove import parsing, protocol, serializing
 from minirospy.bridge.foxglove.protocol import Channel, Event, Parameter, StatusLevel
 from minirospy.bridge.graph import Arrival, Publication
+from minirospy.bridge.web.files import FileAnswer
 from minirospy.errors import (
     BridgeError,
     BridgeProtocolError,
@@ -38,6 +40,8 @@ _MOST_PARAMETERS = 10_000
 """Names of parameters whose changes one client may subscribe to."""
 
 _MAX_STATUSES = 100  # about one message of a client: it may name thousands of channels that do not exist
+_VALUE_FACTOR = 4
+"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
 
 _TIME = "time"
 """The key under which the time waits for a slow client."""
@@ -54,6 +58,10 @@ class FoxgloveSession:
         self._subscriptions: dict[int, tuple[Channel, Callable[[Arrival], None]]] = {}
         self._publications: dict[int, Publication] = {}
         self._calls: set[asyncio.Task[None]] = set()
+        self._calls_size = 0
+        """Memory of the calls under way."""
+        self._operation_size = 0
+        """Memory of the operation that is being carried out."""
         self._dropped = 0
         self._are_drops_shown = False
         self._statuses = 0
@@ -80,10 +88,12 @@ class FoxgloveSession:
 
     def received_text(self, text: str) -> None:
         """Take over a JSON message."""
+        self._operation_size = _VALUE_FACTOR * sys.getsizeof(text)
         self._handle(parsing.parse_text, text)
 
     def received_binary(self, data: bytes) -> None:
         """Take over a binary message."""
+        self._operation_size = len(data)
         self._handle(parsing.parse_binary, data)
 
     def ended(self) -> None:
@@ -167,12 +177,24 @@ class FoxgloveSession:
             raise BridgeError(f"{doing} is not allowed: {why}")
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
+        """Start the request that was received, which keeps the content of its message."""
         if len(self._calls) >= _MOST_CALLS:
             work.close()
             raise BridgeError(f"{_MOST_CALLS} requests are under way: wait for an answer")
         task = self._graph.spawn(work)
         self._calls.add(task)
-        task.add_done_callback(self._calls.discard)
+        size = self._operation_size
+        self._count_call(size)
+
+        def ended(task: asyncio.Task[None]) -> None:
+            self._calls.discard(task)
+            self._count_call(-size)
+
+        task.add_done_callback(ended)
+
+    def _count_call(self, size: int) -> None:
+        self._calls_size += size
+        self.client.holds(self._calls_size)
 
     def _subscribe(self, event: protocol.Subscribe) -> None:
         for subscription_id, channel_id in event.subscriptions:
@@ -321,18 +343,16 @@ class FoxgloveSession:
     def _fetch_asset(self, event: protocol.FetchAsset) -> None:
         try:
             self._require("assets", "fetching assets")
-            self._spawn(self._send_asset(event))
         except BridgeError as error:
             self.client.send_binary(serializing.asset_failure(event.request_id, str(error)))
-
-    async def _send_asset(self, event: protocol.FetchAsset) -> None:
-        loop = asyncio.get_running_loop()
-        try:
-            data = await loop.run_in_executor(None, self._door.assets.read, event.uri)
-        except BridgeError as error:
-            self.client.send_binary(serializing.asset_failure(event.request_id, str(error)))
-        else:
-            self.client.send_binary(serializing.asset(event.request_id, data))
+            return
+        self.client.send_file(
+            FileAnswer(
+                partial(self._door.assets.open, event.uri),
+                lambda _: serializing.asset_head(event.request_id),
+                partial(serializing.asset_failure, event.request_id),
+            )
+        )
 
     def _call_service(self, event: protocol.ServiceRequest) -> None:
         try:

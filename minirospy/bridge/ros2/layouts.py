@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from minirospy.bridge.ros2.field_order import Array, Node, Reordered, inverse, reorder
+from minirospy.bridge.ros2.field_order import Fixed as Wide
+from minirospy.bridge.ros2.field_order import Text as String
 from minirospy.bridge.ros2.rules import Rules, TypeRule, snake_case
 from minirospy.errors import BridgeError, DefinitionError
 from minirospy.idl.cdr import (
@@ -84,13 +87,16 @@ def transcoder(
         made = make_transcoder(ros1.full_name, layout)
     except DefinitionError as error:
         raise TypesDiffer(str(error)) from error
+    order = _Ordering(ros1_lookup, ros2_lookup, rules).message(ros1, ros2)
+    if order is not None:
+        made = _in_order(made, order)
     return _with_levels(made) if ros1.full_name == "rosgraph_msgs/Log" else made
 
 
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return how a message of both types is laid out. Raise TypesDiffer."""
+    """Return how a message of both types is laid out, with ROS 1's fields in ROS 2's order. Raise TypesDiffer."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -110,22 +116,18 @@ class _Pairing:
     def message(self, ros1: MessageSpec, ros2: MessageSpec, around: tuple[str, ...]) -> Layout:
         self._enter(around)
         rule = self._rules.message(ros1.full_name)
-        fields1 = self._inlined(ros1, rule)
+        fields1 = _inlined(ros1, rule, self._ros1)
         pairs = _paired(ros1.full_name, fields1, ros2, rule)
         order = {each.name: number for number, each in enumerate(ros2.fields)}
 
         items: list[Item] = []
         place = 0
-        for each in fields1:
+        for each in (fields1[number] for number in _order(fields1, pairs, ros2)):
             partner = pairs.get(each.name)
             if partner is None:
                 items += self._alone(each.type, Side.ROS1, around)
                 continue
             number = order[partner.name]
-            if number < place:
-                raise TypesDiffer(
-                    f"[{ros1.full_name}] has its field [{each.name}] at another place than [{ros2.full_name}]"
-                )
             for skipped in ros2.fields[place:number]:
                 items += self._alone(skipped.type, Side.ROS2, around)
             where = f"[{each.name}] of [{ros1.full_name}]"
@@ -138,17 +140,6 @@ class _Pairing:
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
-
-    def _inlined(self, spec: MessageSpec, rule: TypeRule) -> tuple[Field, ...]:
-        found: list[Field] = []
-        for each in spec.fields:
-            if each.name != rule.inlined:
-                found.append(each)
-            elif each.type.base in _TIMES:
-                found += [Field("sec", FieldType("int32")), Field("nanosec", FieldType("uint32"))]
-            else:
-                found += self._ros1(each.type.base).fields
-        return tuple(found)
 
     def _field(self, ros1: FieldType, ros2: FieldType, where: str, around: tuple[str, ...]) -> list[Item]:
         if ros1.is_array != ros2.is_array or ros1.length != ros2.length:
@@ -190,6 +181,87 @@ class _Pairing:
     def _enter(self, around: tuple[str, ...]) -> None:
         if len(around) > MOST_LEVELS or self._items > _MOST_ITEMS:
             raise TypesDiffer(f"[{around[0]}] is too large, or nested too deeply")
+
+
+class _Ordering:
+    """Walks two specs side by side that :class:`_Pairing` has accepted, for the order of their fields."""
+
+    def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
+        self._ros1 = ros1_lookup
+        self._ros2 = ros2_lookup
+        self._rules = rules
+        self._is_changed = False
+
+    def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
+        """Return how the fields of ROS 1 come into ROS 2's order; None if they are in it."""
+        found = self._message(ros1, ros2)
+        return found if self._is_changed else None
+
+    def _message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered:
+        rule = self._rules.message(ros1.full_name)
+        fields = _inlined(ros1, rule, self._ros1)
+        pairs = _paired(ros1.full_name, fields, ros2, rule)
+        order = _order(fields, pairs, ros2)
+        self._is_changed |= order != tuple(range(len(fields)))
+        nodes = []
+        for each in fields:
+            partner = pairs.get(each.name)
+            nodes.append(self._node(each.type, partner.type if partner else None))
+        return Reordered(tuple(nodes), order)
+
+    def _node(self, ros1: FieldType, ros2: FieldType | None) -> Node:
+        base = _SAME.get(ros1.base, ros1.base)
+        one: Node
+        if base in _WIDTHS:
+            one = Wide(_WIDTHS[base])
+        elif base in _TIMES:
+            one = Wide(8)
+        elif base == "string":
+            one = String()
+        elif ros2 is not None:
+            one = self._message(self._ros1(base), self._ros2(ros2.base))
+        else:
+            fields = self._ros1(base).fields
+            one = Reordered(tuple(self._node(each.type, None) for each in fields), tuple(range(len(fields))))
+        return Array(one, ros1.length) if ros1.is_array else one
+
+
+def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
+    """Return the functions for messages of ROS 1 whose fields are in its own order."""
+    back = inverse(order)
+
+    def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
+        return made.to_cdr(reorder(order, data), header)
+
+    def to_ros1(data: bytes | memoryview) -> bytes:
+        return reorder(back, made.to_ros1(data))
+
+    return Transcoder(to_cdr, to_ros1)
+
+
+def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
+    """Return the fields of ROS 1, with those of the field that a rule names in its place."""
+    found: list[Field] = []
+    for each in spec.fields:
+        if each.name != rule.inlined:
+            found.append(each)
+        elif each.type.base in _TIMES:
+            found += [Field("sec", FieldType("int32")), Field("nanosec", FieldType("uint32"))]
+        else:
+            found += lookup(each.type.base).fields
+    return tuple(found)
+
+
+def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
+    """Return the numbers of ROS 1's fields in ROS 2's order; one that ROS 2 lacks stays behind the field before it."""
+    places = {each.name: number for number, each in enumerate(ros2.fields)}
+    keys = []
+    place = -1
+    for each in fields:
+        partner = pairs.get(each.name)
+        place = places[partner.name] if partner else place
+        keys.append(place)
+    return tuple(sorted(range(len(fields)), key=keys.__getitem__))
 
 
 def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 import yaml
 
 from minirospy.errors import BridgeError
+from minirospy.yaml_text import safe_load
 
 __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
@@ -163,7 +164,7 @@ _KEYS = {
 def parse_rules(text: str, where: str) -> Rules:
     """Return the rules of a file. Raise BridgeError with what is wrong, and in which rule."""
     try:
-        loaded = yaml.safe_load(text)
+        loaded = safe_load(text)
     except yaml.YAMLError as error:
         problem = " ".join(str(error).split())
         raise BridgeError(f"{where}: is not YAML: {problem}") from error

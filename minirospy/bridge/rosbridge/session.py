@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import sys
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, field
@@ -44,7 +45,14 @@ _MOST_CALLS = 200
 _MOST_TOPICS = 1000
 _MOST_SERVICES = 200
 _MOST_WAITING = 64_000_000
-"""Calls under way, topics published or subscribed, services offered, bytes that wait for an earlier message: of a client."""
+"""Calls under way, topics published or subscribed, services offered, bytes that wait for an earlier message (and the same of
+latched messages): of a client."""
+
+_LARGE_LATCHED = 100_000
+"""Bytes of a latched message that is not kept when its publisher has left."""
+
+_VALUE_FACTOR = 4
+"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
 
 _MAX_READ_ONLY_CBOR = 8 * 1024  # bytes: a client that subscribes needs less, and each may be a value
 
@@ -70,6 +78,9 @@ class _Published:
 
     publication: Publication
     message_class: type[Message]
+    latch: bool = False
+    latched: int = 0
+    """Bytes of the last message, if it is kept for later subscribers."""
     ids: set[object] = field(default_factory=set)
     numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
 
@@ -97,8 +108,15 @@ class RosbridgeSession:
         self._tasks: set[asyncio.Task[None]] = set()
         self._faults = Faults(_log, "a client's call of a service")
         self._calls = 0
+        self._calls_size = 0
+        """Memory of the calls under way."""
+        self._latched_size = 0
+        """Memory of the last messages of topics that the client publishes latched."""
         self._inbox: deque[str | bytes] = deque()
         self._inbox_size = 0
+        """Memory of the operations that wait, and of the one that is waited for."""
+        self._operation_size = 0
+        """Memory of the operation that is being carried out."""
         self._is_working = False
         self._is_large = False
         # The operation that is carried out came in a large message: a thread makes the ROS message of it, too.
@@ -136,12 +154,14 @@ class RosbridgeSession:
             topic.close()
         self._subscribed.clear()
         for published in self._published.values():
-            self._door.release(published.publication)
+            self._release(published)
         self._published.clear()
         for name, service in list(self._door.services.items()):
             if service.session is self:
                 self._door.close_service(service, f"the client that offers {name} has disconnected")
+        # The session is part of reference cycles: what it keeps is freed now, not when they are collected.
         self._inbox.clear()
+        self._fragments.clear()
         for task in list(self._tasks):
             task.cancel()
         self._door.left(self)
@@ -171,31 +191,44 @@ class RosbridgeSession:
 
     # --- one operation after the other
 
+    def count(self) -> None:
+        """Count what is kept of the client in the account of the server."""
+        self.client.holds(
+            self._inbox_size + self._fragments.size + self.room.taken + self._calls_size + self._latched_size
+        )
+
     def _received(self, data: str | bytes) -> None:
         if not self._is_working:
-            self._start(self._begin(data))
+            self._start(self._begin(data), sys.getsizeof(data))
             return
         self._inbox.append(data)
-        self._inbox_size += len(data)
+        self._inbox_size += sys.getsizeof(data)
         if self._inbox_size > _MOST_WAITING:
             self.client.close(_POLICY, "too much waits for an earlier operation")
+        self.count()
 
-    def _start(self, first: _Pending | None) -> None:
+    def _start(self, first: _Pending | None, size: int) -> None:
         if first is not None:
             self._is_working = True
+            self._inbox_size += size
             # A task that is cancelled before its first step does not start the work.
-            self._spawn(self._work(first)).add_done_callback(lambda _: first.work.close())
+            self._spawn(self._work(first, size)).add_done_callback(lambda _: first.work.close())
+            self.count()
 
-    async def _work(self, first: _Pending) -> None:
-        """Finish an operation, then those that have come meanwhile."""
+    async def _work(self, first: _Pending, size: int) -> None:
+        """Finish an operation, whose message has this size, then those that have come meanwhile."""
         try:
             await self._finish(first)
+            self._inbox_size -= size
             while self._inbox:
                 data = self._inbox.popleft()
-                self._inbox_size -= len(data)
+                size = sys.getsizeof(data)
                 pending = self._begin(data)
+                del data
                 if pending is not None:
                     await self._finish(pending)
+                self._inbox_size -= size
+            self.count()
         except Exception:  # noqa: BLE001 whatever an operation raises ends this client alone, as in its connection
             _log.exception("an operation of %s could not be carried out", self.client.name)
             self.client.close(_FAILED, "the bridge failed on this message")
@@ -203,6 +236,7 @@ class RosbridgeSession:
 
     def _begin(self, data: str | bytes) -> _Pending | None:
         """Carry out an operation; return what is left to be waited for."""
+        self._operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
         try:
@@ -297,6 +331,15 @@ class RosbridgeSession:
         published.ids.discard(event.id)
         if not published.ids:
             del self._published[event.topic]
+            self._latched_size -= published.latched
+            self._release(published)
+            self.count()
+
+    def _release(self, published: _Published) -> None:
+        """End a publication: after a while, in which it may be advertised again, but at once if it keeps a large message."""
+        if published.latched > _LARGE_LATCHED:
+            published.publication.close()
+        else:
             self._door.release(published.publication)
 
     def _publish(self, event: protocol.Publish) -> _Work | None:
@@ -320,6 +363,7 @@ class RosbridgeSession:
         if self._is_large:
             return self._publish_large(published, event)
         body = self._body(published, event)
+        self._count_latched(published, body)
         if published.publication.has_joined:
             published.publication.publish(body)
             return None
@@ -327,7 +371,19 @@ class RosbridgeSession:
 
     async def _publish_large(self, published: _Published, event: protocol.Publish) -> None:
         body = await self._door.in_thread(lambda: self._body(published, event))
+        self._count_latched(published, body)
         await self._publish_when_joined(published.publication, body)
+
+    def _count_latched(self, published: _Published, body: bytes) -> None:
+        """Count a message that stays as the latched one. Raise BridgeError if the client has too many bytes of them."""
+        if not published.latch:
+            return
+        grown = len(body) - published.latched
+        if self._latched_size + grown > _MOST_WAITING:
+            raise BridgeError(f"a client may have {_MOST_WAITING} bytes of latched messages")
+        self._latched_size += grown
+        published.latched = len(body)
+        self.count()
 
     def _body(self, published: _Published, event: protocol.Publish) -> bytes:
         message = published.message_class()
@@ -351,7 +407,7 @@ class RosbridgeSession:
         if known not in (ANY, found._type):
             raise _conflict(topic, found._type, known)
         publication = self._graph.advertise(resolved, InterfaceType.of(found), latch=latch)
-        published = self._published[topic] = _Published(publication, found)
+        published = self._published[topic] = _Published(publication, found, latch)
         return published
 
     # --- topics that the client subscribes to
@@ -424,10 +480,15 @@ class RosbridgeSession:
             return
         if self._calls >= _MOST_CALLS:
             raise BridgeError(f"{_MOST_CALLS} calls are under way: wait for an answer")
+        size = self._operation_size
         self._calls += 1
+        self._calls_size += size
+        self.count()
 
         def ended(_: object) -> None:
             self._calls -= 1
+            self._calls_size -= size
+            self.count()
 
         self._spawn(self._call(event, is_large=self._is_large)).add_done_callback(ended)
 
@@ -493,7 +554,10 @@ class RosbridgeSession:
     # --- the others
 
     def _fragment(self, event: protocol.Fragment) -> _Pending | None:
-        text = self._fragments.add(event, asyncio.get_running_loop().time())
+        try:
+            text = self._fragments.add(event, asyncio.get_running_loop().time())
+        finally:
+            self.count()
         return self._begin(text) if text is not None else None
 
     def _set_level(self, event: protocol.SetLevel) -> None:

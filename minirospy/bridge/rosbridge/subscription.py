@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import OrderedDict, deque
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
+from minirospy.bridge.json_text import width_of
 from minirospy.bridge.rosbridge.protocol import Fragment, OperationError, Subscribe
 from minirospy.bridge.web.queue import DEFAULT_LIMIT, ENTRY_BYTES
 
@@ -16,7 +18,7 @@ _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
 MOST_FRAGMENT_BYTES = 64_000_000
-"""Of the incomplete messages of one client, and of what keeps them."""
+"""Memory of the incomplete messages of one client, and of what keeps them: a wide character takes two or four bytes."""
 _MOST_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
@@ -121,7 +123,7 @@ class _Parts(NamedTuple):
 
     @property
     def size(self) -> int:
-        return _MESSAGE_BYTES + sum(len(part) + _FRAGMENT_BYTES for part in self.parts.values())
+        return _MESSAGE_BYTES + sum(sys.getsizeof(part) + _FRAGMENT_BYTES for part in self.parts.values())
 
 
 class Fragments:
@@ -132,7 +134,8 @@ class Fragments:
         self._timeout = timeout
         # The one that got a fragment longest ago is first.
         self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
-        self._size = 0
+        self.size = 0
+        """Bytes of memory that all of them take."""
 
     def add(self, fragment: Fragment, now: float) -> str | None:
         """Return the message that a fragment completes. Raises OperationError."""
@@ -140,14 +143,14 @@ class Fragments:
         known = self._messages.get(fragment.id)
         if known is None:
             known = self._messages[fragment.id] = _Parts(fragment.total, {}, [now])
-            self._size += known.size
+            self.size += known.size
         if fragment.total != known.total or fragment.number in known.parts:
             raise OperationError(f"error while trying to append fragment {fragment.number}", fragment.id)
-        self._size += len(fragment.data) + _FRAGMENT_BYTES
+        self.size += sys.getsizeof(fragment.data) + _FRAGMENT_BYTES
         known.parts[fragment.number] = fragment.data
         known.since[0] = now
         self._messages.move_to_end(fragment.id)
-        if self._size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
+        if self.size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
             self._forget(fragment.id)
             raise OperationError(
                 f"the fragments of message {fragment.id} are too many: {MOST_FRAGMENT_BYTES} bytes and "
@@ -157,9 +160,21 @@ class Fragments:
 
         if len(known.parts) < known.total:
             return None
-        text = "".join(known.parts[number] for number in range(known.total))
         self._forget(fragment.id)
-        return text
+        # One wide character makes all of the message wide.
+        width = max(map(width_of, known.parts.values()))
+        if width * sum(map(len, known.parts.values())) > MOST_FRAGMENT_BYTES:
+            raise OperationError(
+                f"message {fragment.id} is too large: {MOST_FRAGMENT_BYTES} bytes of memory are allowed, of which each "
+                f"character takes {width}",
+                fragment.id,
+            )
+        return "".join(known.parts[number] for number in range(known.total))
+
+    def clear(self) -> None:
+        """Forget all incomplete messages."""
+        self._messages.clear()
+        self.size = 0
 
     def _forget_old(self, now: float) -> None:
         while self._messages:
@@ -169,4 +184,4 @@ class Fragments:
             self._forget(id_)
 
     def _forget(self, id_: Hashable) -> None:
-        self._size -= self._messages.pop(id_).size
+        self.size -= self._messages.pop(id_).size

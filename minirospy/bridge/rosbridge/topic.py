@@ -78,7 +78,9 @@ class ClientTopic:
         now = asyncio.get_running_loop().time()
         if self._pacer.arrived(arrival, now):
             self._send(arrival)
-        elif self._timer is None:
+            return
+        self._session.count()
+        if self._timer is None:
             self._wait()
 
     def _wait(self) -> None:
@@ -89,6 +91,7 @@ class ClientTopic:
     def _is_due(self) -> None:
         arrival = self._pacer.next(asyncio.get_running_loop().time())
         if arrival:
+            self._session.count()
             self._send(arrival)
         self._wait()
 

@@ -33,11 +33,18 @@ def service_class(name: str) -> ServiceClass:
 def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Class:
     try:
         found = get(name)
-    except (MinirospyError, ImportError, SyntaxError) as error:
-        raise _unknown(name, kind, str(error)) from error
+    except Exception as error:
+        # Of a module of messages, which may be anybody's: whatever it raises is why the type is not known.
+        raise _unknown(
+            name, kind, f"{type(error).__name__}: {error}" if _is_foreign(error) else str(error)
+        ) from error
     if found is None:
         raise _unknown(name, kind, "no such definition is installed here")
     return found
+
+
+def _is_foreign(error: Exception) -> bool:
+    return not isinstance(error, MinirospyError | ImportError | SyntaxError)
 
 
 def _unknown(name: str, kind: str, why: str) -> UnknownTypeError:
@@ -54,7 +61,11 @@ def _unknown(name: str, kind: str, why: str) -> UnknownTypeError:
 
 
 def _is_installed(package: str) -> bool:
-    return package.isidentifier() and importlib.util.find_spec(package) is not None
+    try:
+        return package.isidentifier() and importlib.util.find_spec(package) is not None
+    except (ImportError, ValueError):
+        # ValueError: a module without a spec, such as __main__.
+        return False
 
 
 class ArrivingTypes:
@@ -75,7 +86,7 @@ class ArrivingTypes:
     def _find(self, name: str, md5sum: str, text: str) -> type[Message] | None:
         try:
             installed = get_message_class(name)
-        except (MinirospyError, ImportError, SyntaxError):
+        except Exception:  # noqa: BLE001 - of a module of messages, which may be anybody's
             installed = None
         if installed is not None and installed._md5sum == md5sum:
             return installed

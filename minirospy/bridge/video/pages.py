@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from minirospy.bridge.graph import Arrival, SharedGraph
 from minirospy.bridge.video import options
+from minirospy.bridge.video.capacity import Capacity
 from minirospy.bridge.video.options import VideoRequest, request_of
-from minirospy.bridge.video.pictures import COMPRESSED, IMAGE, encoded
+from minirospy.bridge.video.pictures import COMPRESSED, IMAGE, MAX_PIXELS, encoded, work_of
 from minirospy.bridge.web.client import Exchange, HttpHandler
 from minirospy.errors import BridgeError, MasterUnreachableError, RpcError
 from minirospy.introspect.snapshot import Snapshot, fetch
@@ -21,6 +23,8 @@ __all__ = ["VideoPages"]
 _SNAPSHOT_SECONDS = 10.0
 _MOST_FEEDS = 32
 """Topics and encodings at a time: each image is encoded for each of them."""
+_MOST_KEPT = 32_000_000
+"""Bytes of encoded images that are kept for clients that join, of all feeds; larger ones are not kept."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -38,13 +42,14 @@ Listener = Callable[[File | BridgeError], None]
 class _Feed:
     """The images of a topic in one encoding: the newest is encoded, in a worker, as often as that goes."""
 
-    def __init__(self, graph: SharedGraph, request: VideoRequest) -> None:
+    def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
         self.last: File | BridgeError | None = None
         """What was encoded last: a client that joins need not wait for the next image of a slow or latched topic."""
 
         self._graph = graph
         self._request = request
+        self._shared = shared
         self._newest: Arrival | None = None
         self._work: asyncio.Task[None] | None = None
 
@@ -56,6 +61,7 @@ class _Feed:
         """Unsubscribe."""
         self._graph.unsubscribe(self._request.topic, self._arrived)
         self._newest = None
+        self._keep(None)
 
     def _arrived(self, arrival: Arrival) -> None:
         self._newest = arrival
@@ -69,17 +75,38 @@ class _Feed:
             type_ = arrival.header.get("type", "")
             found: File | BridgeError
             try:
-                data, content_type = await loop.run_in_executor(
-                    None, encoded, type_, bytes(arrival.body), self._request.picture
-                )
+                async with self._shared.work.taken(work_of(type_, arrival.body)):
+                    data, content_type = await loop.run_in_executor(
+                        None, encoded, type_, bytes(arrival.body), self._request.picture
+                    )
             except BridgeError as error:
                 found = error
             else:
                 found = File(data, content_type, arrival.nanoseconds)
-            self.last = found
+            self._keep(found if self.listeners else None)
             for listener in tuple(self.listeners):
                 listener(found)
         self._work = None
+
+    def _keep(self, found: File | BridgeError | None) -> None:
+        """Keep what was encoded last, if all feeds together keep little enough."""
+        self._shared.kept -= _size(self.last)
+        self.last = found
+        if self._shared.kept + _size(found) > _MOST_KEPT:
+            self.last = None
+        self._shared.kept += _size(self.last)
+
+
+def _size(found: File | BridgeError | None) -> int:
+    return len(found.data) if isinstance(found, File) else 0
+
+
+@dataclass
+class _Shared:
+    """What all feeds share: the pixels that are worked on at a time, the bytes of images that are kept."""
+
+    work: Capacity
+    kept: int = 0
 
 
 class VideoPages:
@@ -88,6 +115,7 @@ class VideoPages:
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
         self._feeds: dict[VideoRequest, _Feed] = {}
+        self._shared = _Shared(Capacity(MAX_PIXELS))
         self._log = RateLimitedLogger(logging.getLogger(graph.node.log.name))
 
     @property
@@ -206,7 +234,7 @@ class VideoPages:
         feed = self._feeds.get(request)
         is_new = feed is None
         if feed is None:
-            feed = self._feeds[request] = _Feed(self._graph, request)
+            feed = self._feeds[request] = _Feed(self._graph, request, self._shared)
         feed.listeners.append(listener)
         joined = feed
 

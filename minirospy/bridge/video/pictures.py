@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import struct
 from typing import TYPE_CHECKING
 
 from minirospy.bridge.video.options import Picture
 from minirospy.errors import BridgeError
 from minirospy.images.compressed import Options, decode, encode, opencv
 from minirospy.images.encodings import converted, is_converted_by_opencv
+from minirospy.images.sizes import size_of
 from minirospy.images.view import pixels
 
 if TYPE_CHECKING:
     from minirospy.images.encodings import Pixels
 
-__all__ = ["COMPRESSED", "IMAGE", "encoded"]
+__all__ = ["COMPRESSED", "IMAGE", "MAX_PIXELS", "encoded", "work_of"]
 
 IMAGE = "sensor_msgs/Image"
 COMPRESSED = "sensor_msgs/CompressedImage"
 
 _FASTEST_PNG = 1
-_MOST_PIXELS = 16_000_000
-"""Of an image that is made larger."""
+MAX_PIXELS = 16_000_000
+"""Pixels of a compressed image, and of one that is made larger."""
+_LENGTH = struct.Struct("<I")
+_STAMPED = 12  # bytes of a header's number and time, before the length of its frame
+_HEAD_BYTES = 100_000  # of a file, in which its size is: other data may be before it, such as a preview
+_ROWS = 256  # of an image of numbers that are scaled at a time: as numbers of 64 bits they take eight times the memory
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
@@ -35,7 +41,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
             data = bytes(message.data)
             if _is_as_wanted(data, picture):
                 return data, _content_type(data)
-            image = decode(data)
+            image = decode(data, MAX_PIXELS)
         elif type_ == IMAGE:
             raw = Image()
             raw.deserialize(body)
@@ -67,16 +73,11 @@ def _is_as_wanted(data: bytes, picture: Picture) -> bool:
 
 def _colors(image: Pixels, encoding: str) -> Pixels:
     """Return an image as gray or BGR of 8 bits; numbers that are not colors are scaled to their largest."""
-    import numpy as np
 
     if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
         return image
     if encoding.startswith(("32F", "64F", "16S", "32S")) or encoding in ("16UC1", "8S", "8SC1"):
-        values = np.nan_to_num(image.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
-        if values.ndim == 3:
-            values = values[..., 0]
-        largest = float(values.max(initial=0.0))
-        return (np.clip(values, 0, None) * (255 / largest if largest > 0 else 0)).astype(np.uint8)
+        return _scaled(image[..., 0] if image.ndim == 3 else image)
     if encoding.startswith("bayer") and opencv() is None:
         return _debayered(image, encoding)
     if encoding in ("mono16",):
@@ -84,6 +85,37 @@ def _colors(image: Pixels, encoding: str) -> Pixels:
     if is_converted_by_opencv(encoding, "bgr8"):
         return _by_opencv(image, encoding)
     return converted(image, encoding, "bgr8")
+
+
+def _scaled(image: Pixels) -> Pixels:
+    """Return numbers as gray: the largest is white; negative ones, infinities and NaN are black."""
+    import numpy as np
+
+    def values(start: int) -> Pixels:
+        found = image[start : start + _ROWS].astype(np.float64)
+        return np.nan_to_num(found, nan=0.0, posinf=0.0, neginf=0.0)
+
+    starts = range(0, len(image), _ROWS)
+    largest = max((float(values(start).max(initial=0.0)) for start in starts), default=0.0)
+    factor = 255 / largest if largest > 0 else 0
+    found = np.empty(image.shape, np.uint8)
+    for start in starts:
+        found[start : start + _ROWS] = (np.clip(values(start), 0, None) * factor).astype(np.uint8)
+    return found
+
+
+def work_of(type_: str, body: bytes | memoryview) -> int:
+    """Return how many pixels are worked on for a serialized message, as far as that can be known before."""
+    if type_ != COMPRESSED:
+        return len(body) // 3
+    try:
+        (frame_id,) = _LENGTH.unpack_from(body, _STAMPED)
+        (format_,) = _LENGTH.unpack_from(body, _STAMPED + 4 + frame_id)
+    except struct.error:
+        return 0
+    start = _STAMPED + 4 + frame_id + 4 + format_ + 4
+    size = size_of(bytes(body[start : start + _HEAD_BYTES]))
+    return min(size[0] * size[1], MAX_PIXELS) if size else MAX_PIXELS
 
 
 def _by_opencv(image: Pixels, encoding: str) -> Pixels:
@@ -123,9 +155,9 @@ def _changed(image: Pixels, picture: Picture) -> Pixels:
         image = image[::-1, ::-1]
     height, width = image.shape[:2]
     wanted = (picture.width or width, picture.height or height)
-    if wanted[0] * wanted[1] > max(_MOST_PIXELS, width * height):
+    if wanted[0] * wanted[1] > max(MAX_PIXELS, width * height):
         raise BridgeError(
-            f"an image of {wanted[0]}x{wanted[1]} pixels is too large: {_MOST_PIXELS} are allowed"
+            f"an image of {wanted[0]}x{wanted[1]} pixels is too large: {MAX_PIXELS} are allowed"
         )
     return image if wanted == (width, height) else _resized(image, wanted)
 

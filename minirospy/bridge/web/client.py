@@ -6,9 +6,12 @@ import http
 import struct
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from minirospy.bridge.access import Credentials, Grant, Refusal
+from minirospy.bridge.web.account import MAX_BYTES, Account
+from minirospy.bridge.web.files import FileAnswer
 from minirospy.bridge.web.queue import DEFAULT_LIMIT, Piece, SendQueue
 from minirospy.bridge.web.turns import FairTurns
 
@@ -54,14 +57,16 @@ class Limits:
     message: int = 64_000_000
     read_only_message: int = 64 * 1024
     """Bytes of a message of a client that may not write: it subscribes, and sends nothing large."""
-    unfinished: int = 256_000_000
-    """Bytes of messages that have not arrived whole yet, of all clients."""
+    memory: int = MAX_BYTES
+    """Bytes that are held for all clients together: see account.py."""
     messages_a_second: int = 20_000
     """Frames of any kind: empty ones, pings and parts of a message are counted too."""
     queue: int = DEFAULT_LIMIT
     connections: int = 256
     connections_a_second: float = 50.0
     connection_burst: int = 500
+    reserve: int = 32
+    """Connections beyond that number which may be open until their request is known."""
     handshake_seconds: float = 30.0
     """A browser opens connections in advance, and uses them for ten seconds: those must not end here first."""
     ping_seconds: float = 20.0
@@ -77,8 +82,9 @@ class HttpRequest(NamedTuple):
     headers: Mapping[str, str]
     peer: str
     peer_port: int = 0
+    address: str = ""
     port: int = 0
-    """The ports of the client and of the server."""
+    """The client's port, and the server's address and port, of this connection; see Endpoints in pipe.py."""
 
 
 class Session(Protocol):
@@ -120,7 +126,10 @@ class Site(Protocol):
 
     def page(self, path: str) -> HttpHandler | None: ...
 
-    def unfinished_grew(self, count: int) -> None: ...
+    def admit(self, connection: Connection, grant: Grant) -> Refusal | None: ...
+
+    @property
+    def account(self) -> Account: ...
 
     def left(self, connection: Connection) -> None: ...
 
@@ -170,6 +179,16 @@ class WebClient:
     def send_binary(self, *pieces: Piece) -> None:
         """Send an answer as one binary message; it is never dropped."""
         self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
+
+    def send_file(self, answer: FileAnswer) -> None:
+        """Send a file as one binary message, read in pieces when its turn comes; ``answer`` is without frames."""
+        self._connection.answer_file(
+            FileAnswer(answer.open, partial(_file_head, answer), partial(_file_failure, answer))
+        )
+
+    def holds(self, count: int) -> None:
+        """Count the bytes that the session keeps of the client: of messages that wait for others, or are handled."""
+        self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
         """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
@@ -247,6 +266,16 @@ class Exchange:
     def end(self) -> None:
         """End the answer after what waits."""
         self._connection.close_when_sent()
+
+
+def _file_head(answer: FileAnswer, size: int) -> bytes:
+    head = answer.head(size)
+    return frame_head(_BINARY, len(head) + size) + head
+
+
+def _file_failure(answer: FileAnswer, why: str) -> bytes:
+    message = answer.failure(why)
+    return frame_head(_BINARY, len(message)) + message
 
 
 def frame_head(opcode: int, length: int) -> bytes:

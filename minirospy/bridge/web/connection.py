@@ -24,6 +24,8 @@ from websockets.server import ServerProtocol
 from websockets.streams import StreamReader
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
+from minirospy.bridge.json_text import size_in_memory
+from minirospy.bridge.web.admission import Rank
 from minirospy.bridge.web.client import (
     PLAIN_HEADERS,
     Door,
@@ -37,6 +39,7 @@ from minirospy.bridge.web.client import (
     frame_head,
     response_head,
 )
+from minirospy.bridge.web.files import FileAnswer, FileSender
 from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.escape import escaped
@@ -44,7 +47,7 @@ from minirospy.escape import escaped
 if TYPE_CHECKING:
     from websockets.typing import Subprotocol
 
-    from minirospy.bridge.web.pipe import Pipe
+    from minirospy.bridge.web.pipe import Endpoints, Pipe
 
 __all__ = [
     "Connection",
@@ -83,11 +86,16 @@ class Connection:
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         self.peer = peer
-        self.queue = SendQueue(site.limits.queue)
+        self.share = site.account.open(peer, self._shed)
+        self.queue = SendQueue(site.limits.queue, share=self.share)
         self.traffic = Traffic()
         self.session: Session | None = None
         self.client: WebClient | None = None
         self.exchange: Exchange | None = None
+        self.rank = Rank.SILENT
+        """The rights, once the request is known."""
+        self.active = loop.time()
+        """When the connection was opened, or a message was received or taken."""
         self.unfinished = 0
         """Bytes of a message that has not arrived whole."""
         self._site = site
@@ -98,7 +106,7 @@ class Connection:
             max_size=site.limits.message,
             logger=_QUIET,
         )
-        self._share = site.turns.join(self._work)
+        self._turn = site.turns.join(self._work)
         self._door: Door | None = None
         self._fragments = bytearray()
         self._is_held_back = False
@@ -111,6 +119,12 @@ class Connection:
         self._is_scheduled = False
         self._is_closing = False
         self._is_over = False
+        self._file: FileSender | None = None
+        """The file that is being sent."""
+        self._writing: list[Piece] = []
+        """Pieces that the pipe has not written yet, while their large ones are counted."""
+        self._held = 0
+        """Bytes that the session keeps of the client."""
         self._second = 0.0
         self._in_second = 0
         self._received = loop.time()
@@ -145,7 +159,7 @@ class Connection:
         # A large message is read in large pieces, unless other clients wait for their turns.
         is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
-        if self._is_held_back or self._is_paused or self._site.turns.start(self._share):
+        if self._is_held_back or self._is_paused or self._site.turns.start(self._turn):
             self._pipe.pause()
         self._count_unfinished()
 
@@ -159,7 +173,7 @@ class Connection:
             return
         self._is_over = self._is_closing = True
         self._timer.cancel()
-        self._site.turns.leave(self._share)
+        self._site.turns.leave(self._turn)
         self._discard_unfinished()
         try:
             if self.session:
@@ -171,6 +185,10 @@ class Connection:
         self.session = self.exchange = None
         # The connection is part of reference cycles: what waited is freed now, not when they are collected.
         self.queue.clear()
+        if self._file:
+            self._file.close()
+        self._wrote()
+        self._site.account.close(self.share)
         self._site.left(self)
 
     # --- to the pipe
@@ -185,12 +203,24 @@ class Connection:
             self._abort()
             return
         self.queue.put_answer(pieces)
+        self._count()
         self._schedule()
+
+    def answer_file(self, answer: FileAnswer) -> None:
+        """Send a file, which is never dropped."""
+        if not self._is_closing:
+            self.queue.put_file(answer)
+            self._count()
+            self._schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
         """Send what may be dropped."""
         if not self._is_closing:
             self.queue.put(key, pieces, newest_only=newest_only)
+            if self._pipe.is_full:
+                self._count()
+            else:
+                self.active = self._loop.time()
             self._schedule()
 
     def close_when_sent(self) -> None:
@@ -223,7 +253,24 @@ class Connection:
         self._worked_on = 0
         self._count_unfinished()
         if not self._is_over and not self._is_held_back:
-            self._site.turns.start(self._share)
+            self._site.turns.start(self._turn)
+
+    def session_holds(self, count: int) -> None:
+        """Count what the session keeps of the client."""
+        self._held = count
+        if not self._is_over:
+            self._count()
+
+    def give_way(self) -> None:
+        """End the connection, since another client needs its place."""
+        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
+        if not self._is_closing or self._pipe.is_full:
+            self._abort()
+
+    @property
+    def endpoints(self) -> Endpoints:
+        """The ports of both ends, and the address of this one."""
+        return self._pipe.endpoints
 
     def abort(self) -> None:
         """End the connection now."""
@@ -294,7 +341,8 @@ class Connection:
         self._protocol.send_response(response)
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
-        self._share.weight = _WEIGHTS[grant]
+        self.share.is_owner = self.client.is_owner
+        self._turn.weight = _WEIGHTS[grant]
         if not self.client.may_write:
             self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
         self._watch(self._ping)
@@ -312,11 +360,14 @@ class Connection:
         )
         is_page = headers.get("upgrade", "").lower() != "websocket"
         grant = self._site.check(credentials, is_page=is_page)
-        if isinstance(grant, Refusal):
-            return grant
+        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
+        if refusal:
+            return refusal
+        assert isinstance(grant, Grant)
         parts = urlsplit(request.path)
         query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
-        return HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.ports), grant, is_page
+        seen = HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.endpoints)
+        return seen, grant, is_page
 
     def _watch(self, check: Callable[[], None]) -> None:
         """Call ``check`` from now on in place of what watched the connection until now."""
@@ -353,7 +404,7 @@ class Connection:
     def _refuse(self, refusal: Refusal) -> None:
         _log.info("refused %s: %d %s", self.peer, refusal.status, escaped(refusal.text))
         body = (refusal.text + "\n").encode()
-        extra = {"WWW-Authenticate": "Bearer"} if refusal.status == 401 else {}
+        extra = {401: {"WWW-Authenticate": "Bearer"}, 503: {"Retry-After": "5"}}.get(refusal.status, {})
         self.answer(
             (
                 response_head(
@@ -391,9 +442,12 @@ class Connection:
     def _delivered(self, data: bytes) -> None:
         assert self.session
         self.traffic.received += 1
+        self.active = self._loop.time()
         try:
             if self._opcode is Opcode.BINARY:
                 self.session.received_binary(data)
+            elif size_in_memory(data) > self._limits.message:
+                self.close_websocket(CloseCode.MESSAGE_TOO_BIG, "its wide characters take too much memory")
             else:
                 self.session.received_text(data.decode())
         except UnicodeDecodeError:
@@ -405,10 +459,38 @@ class Connection:
             self._worked_on = len(data)
 
     def _count_unfinished(self) -> None:
-        waiting = len(self._protocol.reader.buffer) + len(self._fragments) + self._worked_on
-        grown = waiting - self.unfinished
-        self.unfinished += grown
-        self._site.unfinished_grew(grown)
+        self.unfinished = len(self._protocol.reader.buffer) + len(self._fragments) + self._worked_on
+        self._count()
+
+    def _count(self) -> None:
+        """Count in the account what the client holds alone; this may make clients give up memory, this one too."""
+        queue = self.queue
+        size = self.unfinished + self._held + queue.size + queue.answers - queue.large
+        if self._pipe.is_full:
+            size += max(0, self._pipe.unsent - sum(map(len, self._writing)))
+        self.share.set(size)
+
+    def _shed(self) -> None:
+        """Give up memory: messages that may be dropped, else the connection."""
+        if self.unfinished > self.queue.size + self.queue.answers and not self._held:
+            self.refuse_unfinished()
+            return
+        if self.queue.size:
+            self.queue.drop_messages()
+            self._count()
+            return
+        _log.warning("%s: the server holds too much memory for it: disconnected", self.peer)
+        self._discard_unfinished()
+        self._abort()
+        self.queue.clear()
+        self._held = 0
+        self._count()
+
+    def _wrote(self) -> None:
+        """Count the pieces that were with the pipe no more."""
+        if self._writing:
+            self.share.release(self._writing)
+            self._writing = []
 
     def _discard_unfinished(self) -> None:
         self._protocol.reader.buffer.clear()
@@ -426,7 +508,7 @@ class Connection:
     def _go_on(self) -> None:
         self._is_held_back = False
         if not self._is_paused:
-            self._site.turns.start(self._share)
+            self._site.turns.start(self._turn)
 
     def _schedule(self) -> None:
         # What arrives in the same turn of the loop goes out with one call.
@@ -438,6 +520,14 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
+        if not self._pipe.is_full:
+            self._wrote()
+        self._write()
+        if self.share.size and not self._is_over:
+            self._count()
+
+    def _write(self) -> None:
+        """Write what waits, as much of it as the pipe takes and as fits into one iteration of the loop."""
         written = 0
         while not self._pipe.is_full:
             if written >= _PUMP_BYTES:
@@ -445,21 +535,36 @@ class Connection:
                 return
             batch: list[Piece] = []
             size = 0
-            while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES:
+            while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:
                 pieces = self.queue.pop()
                 if pieces is None:
                     break
+                if isinstance(pieces, FileAnswer):
+                    self._file = FileSender(pieces, self._loop, self._pump)
+                    break
                 batch += pieces
                 size += sum(map(len, pieces))
+            if not batch and self._file:
+                piece = self._file.take()
+                if piece is None:
+                    if self._file.has_failed:
+                        self._abort()  # its size has been sent: what follows would be taken for the file
+                    return
+                batch.append(piece)
+                if self._file.is_done:
+                    self._file = None
             if not batch:
                 if self._is_closing:
                     self._pipe.close()
                 return
             self._progressed = self._loop.time()
-            written += size
+            written += sum(map(len, batch))
             self._pipe.write(batch)
             if self._is_over:
                 return
+            if self._pipe.is_full and not self._pipe.copies:
+                self._writing = batch
+                self.share.hold(batch)
 
     def _ping(self) -> None:
         """See whether the client is there: it answers a ping, or takes what is sent."""

@@ -13,8 +13,11 @@ from collections.abc import Callable, Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from minirospy.bridge.access import Access, Credentials, Grant, Refusal
+from minirospy.bridge.web.account import Account
+from minirospy.bridge.web.admission import Rank, displaced, rank_of
 from minirospy.bridge.web.client import PLAIN_HEADERS, response_head
 from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
+from minirospy.bridge.web.owners import is_own_user
 from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.bridge.web.turns import FairTurns, cpu_meter
@@ -56,6 +59,7 @@ class Listener:
         pages: Mapping[str, HttpHandler] | None = None,
         public_pages: Mapping[str, HttpHandler] | None = None,
         tls: ssl.SSLContext | None = None,
+        account: Account | None = None,
         on_change: Callable[[int], object] = lambda _: None,
     ) -> None:
         """``pages``: path -> what answers it; ``public_pages`` need no token. ``on_change`` gets the number of connections."""
@@ -68,7 +72,8 @@ class Listener:
             self.limits.connections_a_second, self.limits.connection_burst, time.monotonic
         )
         self.turns = FairTurns(_call_soon, time.monotonic, meter=cpu_meter())
-        self._unfinished = 0
+        self.account = account or Account(self.limits.memory)
+        """The memory of all clients, also of other listeners of the server."""
 
         self.host = ""
         self.port = 0
@@ -143,11 +148,18 @@ class Listener:
         """Return what answers a path."""
         return self._pages.get(path)
 
-    def unfinished_grew(self, count: int) -> None:
-        """Count bytes of messages that have not arrived whole; disconnect the client with the most, beyond the limit."""
-        self._unfinished += count
-        if count > 0 and self._unfinished > self.limits.unfinished:
-            max(self.connections, key=lambda connection: connection.unfinished).refuse_unfinished()
+    def admit(self, connection: Connection, grant: Grant) -> Refusal | None:
+        """Give a connection whose request is known a place; return why there is none."""
+        rank = rank_of(grant)
+        served = [each for each in self._open() if each.rank > Rank.SILENT]
+        if len(served) >= self.limits.connections:
+            if self._is_own(connection):
+                rank = Rank.OWN
+            if not self._make_room(connection.peer, rank, served):
+                self.refused += 1
+                return Refusal(503, "too many connections.")
+        connection.rank = rank
+        return None
 
     def left(self, connection: Connection) -> None:
         """Forget a connection."""
@@ -169,7 +181,7 @@ class Listener:
                 return
 
             sock.setblocking(False)
-            refusal = self._refusal_of(str(address[0]))
+            refusal = self._refusal_of((str(address[0]), address[1]), sock.getsockname()[:2])
             if refusal:
                 _refuse(sock, refusal)
                 continue
@@ -196,30 +208,49 @@ class Listener:
         pipe.resume()
 
     def _connected_tls(self, pipe: TlsPipe, peer: str) -> PipeEvents | None:
-        refusal = self._refusal_of(peer)
+        peer_port, address, port = pipe.endpoints
+        refusal = self._refusal_of((peer, peer_port), (address, port))
         if refusal:
             pipe.write((refusal,))
             return None
         return self._add(Connection(self, pipe, peer, asyncio.get_running_loop()))
 
-    def _refusal_of(self, peer: str) -> bytes | None:
-        """Return the answer to a client that may not connect now."""
-        if len(self.connections) >= self.limits.connections and not self._drop_silent():
-            refusal = _TOO_MANY
-        elif not self.rate.admits(peer):
-            refusal = _TOO_OFTEN
-        else:
+    def _refusal_of(self, peer: tuple[str, int], here: tuple[str, int]) -> bytes | None:
+        """Return the answer to a client that may not connect now. A client of this user always may."""
+        limits = self.limits
+        is_full = len(self.connections) >= limits.connections + limits.reserve
+        is_too_often = not self.rate.admits(peer[0])
+        if not (is_full or is_too_often):
             return None
+        is_own = is_own_user(peer, here)
+        if is_too_often and not is_own:
+            refusal = _TOO_OFTEN
+        elif not is_full or self._make_room(peer[0], Rank.OWN if is_own else Rank.SILENT, self._open()):
+            return None
+        else:
+            refusal = _TOO_MANY
         self.refused += 1
         return refusal
 
-    def _drop_silent(self) -> bool:
-        """Disconnect the client that has sent no request for longest, if it had time for that; return whether there was one."""
-        latest = time.monotonic() - self.limits.handshake_seconds / 6
-        silent = [each for each in self.connections if each.is_silent and each.traffic.since < latest]
-        if silent:
-            min(silent, key=lambda each: each.traffic.since).abort()
-        return bool(silent)
+    def _make_room(self, peer: str, rank: Rank, occupants: Sequence[Connection]) -> bool:
+        """Disconnect the one of these clients that gives way to a new one from ``peer``; return whether there was one."""
+        now = asyncio.get_running_loop().time()
+        while found := displaced(peer, rank, occupants, now):
+            if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
+                found.rank = Rank.OWN  # not looked up before there was a reason
+                continue
+            _log.info("%s gives way to %s", found.peer, peer)
+            found.give_way()
+            return True
+        return False
+
+    def _is_own(self, connection: Connection) -> bool:
+        """Return whether a client is known to be a program of the user who runs the server."""
+        peer_port, address, port = connection.endpoints
+        return is_own_user((connection.peer, peer_port), (address, port))
+
+    def _open(self) -> list[Connection]:
+        return [each for each in self.connections if each.is_open]
 
     def _add(self, connection: Connection) -> Connection:
         self.connections.add(connection)

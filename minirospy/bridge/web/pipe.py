@@ -11,16 +11,24 @@ import contextlib
 import socket
 import ssl
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from minirospy.bridge.web.queue import Piece
 
-__all__ = ["LARGE_READ", "SMALL_READ", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
+__all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
 SMALL_READ = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
 LARGE_READ = 256 * 1024  # of a client that is alone with a large message
 _MOST_PIECES = 128
 """Pieces of one call of sendmsg; a system takes 1024 at most."""
+
+
+class Endpoints(NamedTuple):
+    """The peer's port, and the address and port of this end; empty if the connection has ended."""
+
+    peer_port: int = 0
+    address: str = ""
+    port: int = 0
 
 
 class PipeEvents(Protocol):
@@ -37,7 +45,7 @@ class PipeEvents(Protocol):
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet; ``ports``: of the peer, and one's own.
+    """One connection. ``is_full``: what was written is not with the kernel yet; ``copies``: it waits as a copy.
 
     ``read_bytes``: how many to take from the kernel at a time, where that can be chosen.
     """
@@ -51,7 +59,10 @@ class Pipe(Protocol):
     def unsent(self) -> int: ...
 
     @property
-    def ports(self) -> tuple[int, int]: ...
+    def copies(self) -> bool: ...
+
+    @property
+    def endpoints(self) -> Endpoints: ...
 
     def write(self, pieces: Sequence[Piece]) -> None: ...
 
@@ -64,6 +75,8 @@ class Pipe(Protocol):
 
 class PlainPipe:
     """A TCP connection."""
+
+    copies = False
 
     def __init__(self, sock: socket.socket, loop: asyncio.AbstractEventLoop, events: PipeEvents) -> None:
         self.read_bytes = SMALL_READ
@@ -86,9 +99,9 @@ class PlainPipe:
         return sum(map(len, self._rest))
 
     @property
-    def ports(self) -> tuple[int, int]:
-        """The ports of the peer and of this end."""
-        return _ports(self._sock)
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces, or keep what the kernel does not take now."""
@@ -171,11 +184,11 @@ class PlainPipe:
         self._events.ended()
 
 
-def _ports(sock: socket.socket) -> tuple[int, int]:
+def _endpoints(sock: socket.socket) -> Endpoints:
     try:
-        return sock.getpeername()[1], sock.getsockname()[1]
+        return Endpoints(sock.getpeername()[1], *sock.getsockname()[:2])
     except OSError:  # it has disconnected
-        return 0, 0
+        return Endpoints()
 
 
 def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
@@ -186,6 +199,8 @@ def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
 
 class TlsPipe(asyncio.Protocol):
     """An encrypted connection."""
+
+    copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
@@ -206,9 +221,9 @@ class TlsPipe(asyncio.Protocol):
         return self._transport.get_write_buffer_size() if self._transport else 0
 
     @property
-    def ports(self) -> tuple[int, int]:
-        """The ports of the peer and of this end."""
-        return _ports(self._transport.get_extra_info("socket")) if self._transport else (0, 0)
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._transport.get_extra_info("socket")) if self._transport else Endpoints()
 
     def write(self, pieces: Sequence[Piece]) -> None:
         """Send pieces."""

@@ -10,7 +10,12 @@ from __future__ import annotations
 
 from collections import Counter, OrderedDict, deque
 from collections.abc import Hashable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.bridge.web.account import LARGE_PIECE, Piece, Share
+
+if TYPE_CHECKING:
+    from minirospy.bridge.web.files import FileAnswer
 
 __all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MOST_ANSWERS", "Piece", "SendQueue"]
 
@@ -23,14 +28,16 @@ ENTRY_BYTES = 350
 MOST_ANSWERS = 64_000_000
 """Bytes of answers that may wait for a client which does not read them."""
 
-Piece = bytes | memoryview | bytearray
+
+_FILE_BYTES = 1000
+"""Memory of a file that waits to be opened, with its entry."""
 
 
 class _Entry(NamedTuple):
     """A message or, with the key None, an answer; ``size``: of its pieces, and of itself."""
 
     key: Hashable | None
-    pieces: tuple[Piece, ...]
+    pieces: tuple[Piece, ...] | FileAnswer
     size: int
 
 
@@ -47,13 +54,20 @@ class _Waiting:
 class SendQueue:
     """The queue of one client, in the order of arrival."""
 
-    def __init__(self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES) -> None:
-        """``limit``: bytes of messages, each with ``entry_bytes``; a single one may be larger, and then waits alone."""
+    def __init__(
+        self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None
+    ) -> None:
+        """``limit``: bytes of messages, each with ``entry_bytes``; a single one may be larger, and then waits alone.
+
+        Large pieces are counted in ``share``.
+        """
         self.limit = limit
         self.size = 0
         """Bytes of the messages that wait, and of their entries."""
         self.answers = 0
         """The same of the answers."""
+        self.large = 0
+        """Bytes of large pieces among both, which are counted in the share."""
         self.sent = 0
         """Messages that were popped."""
         self.sent_bytes = 0
@@ -61,6 +75,7 @@ class SendQueue:
         """How many messages gave way to newer ones."""
         self.dropped_of: Counter[Hashable] = Counter()
         """The same by key, of the keys that are in use."""
+        self._share = share
         self._entry_bytes = entry_bytes
         self._number = 0
         self._entries: OrderedDict[int, _Entry] = OrderedDict()
@@ -88,6 +103,8 @@ class SendQueue:
             self._drop_oldest(max(self._waiting, key=lambda each: self._waiting[each].size))
 
         self._number += 1
+        if size >= LARGE_PIECE:
+            self._hold(pieces)
         self._entries[self._number] = _Entry(key, pieces, size)
         self._waiting.setdefault(key, waiting)
         waiting.numbers.append(self._number)
@@ -98,14 +115,24 @@ class SendQueue:
         """Append what is never dropped."""
         size = sum(map(len, pieces)) + self._entry_bytes
         self._number += 1
+        if size >= LARGE_PIECE:
+            self._hold(pieces)
         self._entries[self._number] = _Entry(None, pieces, size)
         self.answers += size
 
-    def pop(self) -> tuple[Piece, ...] | None:
-        """Return the oldest entry's pieces; None where nothing waits."""
+    def put_file(self, answer: FileAnswer) -> None:
+        """Append a file, which is never dropped. It is not read before it is popped."""
+        self._number += 1
+        self._entries[self._number] = _Entry(None, answer, _FILE_BYTES)
+        self.answers += _FILE_BYTES
+
+    def pop(self) -> tuple[Piece, ...] | FileAnswer | None:
+        """Return the oldest entry's pieces, or a file; None if nothing waits."""
         if not self._entries:
             return None
         _, entry = self._entries.popitem(last=False)
+        if entry.size >= LARGE_PIECE:
+            self._release(entry)
         if entry.key is None:
             self.answers -= entry.size
             return entry.pieces
@@ -122,11 +149,20 @@ class SendQueue:
         waiting = self._waiting.pop(key, None)
         if waiting:
             for number in waiting.numbers:
-                del self._entries[number]
+                self._release(self._entries.pop(number))
             self.size -= waiting.size
+
+    def drop_messages(self) -> None:
+        """Drop all messages, and keep the answers."""
+        for key in list(self._waiting):
+            while key in self._waiting:
+                self._drop_oldest(key)
 
     def clear(self) -> None:
         """Remove everything that waits; nothing of it counts as dropped."""
+        if self.large:
+            for entry in self._entries.values():
+                self._release(entry)
         self._entries.clear()
         self._waiting.clear()
         self.size = self.answers = 0
@@ -134,12 +170,30 @@ class SendQueue:
     def _drop_oldest(self, key: Hashable) -> None:
         waiting = self._waiting[key]
         entry = self._entries.pop(waiting.numbers.popleft())
+        if entry.size >= LARGE_PIECE:
+            self._release(entry)
         self.dropped += 1
         self.dropped_of[key] += 1
         self._shrunk(key, waiting, entry.size)
+
+    def _hold(self, pieces: tuple[Piece, ...]) -> None:
+        self.large += _large(pieces)
+        if self._share:
+            self._share.hold(pieces)
+
+    def _release(self, entry: _Entry) -> None:
+        if isinstance(entry.pieces, tuple):
+            self.large -= _large(entry.pieces)
+            if self._share:
+                self._share.release(entry.pieces)
 
     def _shrunk(self, key: Hashable, waiting: _Waiting, size: int) -> None:
         waiting.size -= size
         self.size -= size
         if not waiting.numbers:
             self._waiting.pop(key, None)
+
+
+def _large(pieces: tuple[Piece, ...]) -> int:
+    """Return the bytes of the large ones among some pieces."""
+    return sum(size for size in map(len, pieces) if size >= LARGE_PIECE)

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
+from minirospy.xml_text import XmlError, check_xml
 
 __all__ = ["COMMAND", "Counts", "main", "read_counts", "results_below"]
 
@@ -50,7 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def read_counts(file: Path) -> Counts:
     """Return the counts of a file, summed over its suites. Raises ValueError with the reason where it is not a result file."""
     try:
-        root = ElementTree.fromstring(file.read_bytes())
+        check_xml(text := file.read_bytes())
+        root = ElementTree.fromstring(text)
         if root.tag not in ("testsuite", "testsuites"):
             raise ValueError("the root tag is neither 'testsuite' nor 'testsuites'")
         suites = [root] if root.tag == "testsuite" else [each for each in root if each.tag == "testsuite"]
@@ -59,7 +61,7 @@ def read_counts(file: Path) -> Counts:
             tests, errors, failures = (int(suite.attrib[key]) for key in ("tests", "errors", "failures"))
             skipped = next((int(suite.attrib[key]) for key in _SKIPPED if key in suite.attrib), 0)
             counts = counts.plus(Counts(tests, errors, failures, skipped))
-    except (ElementTree.ParseError, OSError) as error:
+    except (ElementTree.ParseError, XmlError, OSError) as error:
         raise ValueError(str(error)) from error
     except KeyError as error:
         raise ValueError(f"its <testsuite> has no attribute {error}") from error

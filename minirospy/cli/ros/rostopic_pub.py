@@ -15,6 +15,7 @@ from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Verb
 from minirospy.errors import MessageException, NotFoundError, SerializationError, UsageError, ValueTextError
 from minirospy.introspect.graph import Graph, why_illegal
+from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -226,7 +227,7 @@ def _ros_argument_error(text: str) -> str:
     import yaml
 
     try:
-        yaml.safe_load(text)
+        safe_load(text)
     except yaml.YAMLError as error:
         return f"Argument error: {error}"
     return ""

@@ -6,13 +6,16 @@ that ask for what has become the only behaviour are accepted. Source: http://wik
 
 from __future__ import annotations
 
+import contextlib
 import io
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from minirospy.cli.command import run
 from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.installation import install_command
+from minirospy.xml_text import check_xml
 
 __all__ = ["main"]
 
@@ -51,6 +54,19 @@ def _xacro(words: Sequence[str]) -> int:
                 raise xacro.XacroException(str(error.exc)) from error
             raise
 
+    parse = xacro.parse
+
+    def checked_parse(inp: object, filename: str | None = None) -> object:
+        """Parse a file or text, after it was checked for what unfolds to gigabytes."""
+        if inp is None and filename is not None:
+            # A file that cannot be opened is left to xacro, which has its own error for it.
+            with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
+                inp = file.read()
+        if isinstance(inp, str):
+            check_xml(inp)
+        return parse(inp, filename)
+
+    xacro.parse = checked_parse
     xacro.eval_extension = eval_extension
     sys.argv = ["xacro", *(word for word in words if word not in _ALWAYS)]
     try:

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 
 from sensor_msgs.msg import CameraInfo
 
+from minirospy.yaml_text import load
+
 __all__ = ["CalibrationError", "ini_of", "parse_ini", "parse_yaml", "yaml_of"]
 
 _MATRICES = (
@@ -36,7 +38,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
 
     try:
         # All scalars as texts: a name may look like a number, and 1e3 is a text in YAML 1.1.
-        tree = yaml.load(text, yaml.BaseLoader)
+        tree = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         raise CalibrationError(" ".join(str(error).split())) from error
     if not isinstance(tree, dict):

@@ -21,6 +21,7 @@ from minirospy.compat.dynamic_reconfigure import (
     find_reconfigure_services,
 )
 from minirospy.errors import MinirospyError, UsageError
+from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from minirospy.compat.dynamic_reconfigure.encoding import Config
@@ -137,7 +138,7 @@ def _dictionary(text: str) -> Values:
     import yaml
 
     try:
-        values = yaml.safe_load(text)
+        values = safe_load(text)
     except yaml.YAMLError as error:
         raise UsageError(f"the values are not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(values, dict):

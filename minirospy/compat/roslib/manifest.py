@@ -15,6 +15,7 @@ from minirospy.compat.roslib.packages import InvalidROSPkgException, get_pkg_dir
 from minirospy.compat.rospkg.common import MANIFEST_FILE
 from minirospy.compat.rospkg.manifest import Export
 from minirospy.compat.rospkg.manifest import RosDep as ROSDep
+from minirospy.xml_text import XmlError, check_xml
 
 if TYPE_CHECKING:
     from xml.dom.minidom import Element
@@ -120,8 +121,9 @@ def parse(string: str, filename: str = "string") -> Manifest:
     from xml.dom.minidom import parseString
 
     try:
+        check_xml(string)
         document = parseString(string)
-    except ExpatError as error:
+    except (ExpatError, XmlError) as error:
         raise ManifestException(f"invalid XML: {error}") from error
     root = document.documentElement
     if root is None or root.tagName != "package":

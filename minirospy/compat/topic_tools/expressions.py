@@ -20,6 +20,7 @@ from minirospy.errors import MinirospyError
 from minirospy.idl.load import message_class
 from minirospy.idl.message import fill_message_args
 from minirospy.idl.protocols import Message
+from minirospy.yaml_text import safe_load
 
 __all__ = ["relay_field_main", "transform_main"]
 
@@ -111,7 +112,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     import yaml
 
     try:
-        template = yaml.safe_load(options.expression)
+        template = safe_load(options.expression)
     except yaml.YAMLError as error:
         raise MinirospyError(f"the expression is not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(template, dict):

@@ -1,7 +1,5 @@
 """rospy, provided by minirospy."""
 
-from std_msgs.msg import Header as Header
-
 from minirospy.client import DEBUG as DEBUG
 from minirospy.client import ERROR as ERROR
 from minirospy.client import FATAL as FATAL
@@ -73,6 +71,7 @@ from minirospy.client import spin as spin
 from minirospy.client import wait_for_message as wait_for_message
 from minirospy.client import wait_for_service as wait_for_service
 from minirospy.client.lifecycle import ROSInterruptException as ROSInterruptException
+from minirospy.client.messages import Header as Header
 from minirospy.client.time import ROSTimeMovedBackwardsException as ROSTimeMovedBackwardsException
 from minirospy.compat.rospy import live as _live  # after the modules that it completes
 from minirospy.compat.rospy.core import get_ros_root as get_ros_root

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import minirospy
+from minirospy.closing import close_all
 from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
 from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import MasterApi, Notice, nothing
@@ -172,9 +173,7 @@ class Master(MasterApi):
         for timer in (self._touching, self._collecting):
             if timer:
                 timer.cancel()
-        await self._server.close()
-        await self._notifier.close()
-        self._replaced.close()
+        await close_all([self._server.close, self._notifier.close, self._replaced.close])
         self.record = nothing
         if self._journal:
             if keep_journal:

@@ -12,14 +12,13 @@ import socket
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from minirospy.closing import close_all, close_each
 from minirospy.environment import Environment
-from minirospy.errors import (
-    WireError,
-)
+from minirospy.errors import WireError
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi
-from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription
+from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription, Unreachable
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, tcp
@@ -80,6 +79,7 @@ class Node:
 
         self._readers = ReaderSet()
         self._header_memory = tcp.HeaderMemory()
+        self._unreachable = Unreachable()
         self._rpc = AsyncRpcClient(same_host=environment.same_host)
         tables: Mapping[str, Mapping[str, Publication | Subscription | ServiceServer]] = {
             "Publisher": self.publications,
@@ -167,16 +167,12 @@ class Node:
         )
 
         # Its name goes before the port, which the next server takes with its own name.
-        await self._unix_listener.close()
-        await self._listener.close()
-        for table in (self.publications, self.subscriptions, self.services):
-            for part in table.values():
-                part.close()
-        await asyncio.gather(*(subscription.wait_closed() for subscription in self.subscriptions.values()))
-        if self._server:
-            await self._server.close()
-        await self._rpc.close()
-        await self._registrations.cancel()
+        await close_all([self._unix_listener.close, self._listener.close])
+        tables = (self.publications, self.subscriptions, self.services)
+        close_each([part.close for table in tables for part in table.values()])
+        waits = [subscription.wait_closed for subscription in self.subscriptions.values()]
+        servers = [self._server.close] if self._server else []
+        await close_all([*waits, *servers, self._rpc.close, self._registrations.cancel])
 
     def stop_unregistering(self) -> None:
         """Let :meth:`close` return although the master has not answered (on the loop)."""
@@ -230,6 +226,7 @@ class Node:
             on_loop=on_loop,
             header_memory=self._header_memory,
             this_host=self.this_host,
+            unreachable=self._unreachable,
         )
 
     async def subscribe(self, subscription: Subscription) -> None:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from minirospy.errors import CallFailed, ServiceException, ThreadLimitError, WireError
 from minirospy.runtime.node.service_client import PeerEndedError, Reader, parse_service_uri
 from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.workers import Workers
 from minirospy.wire.header import Header
 from minirospy.wire.service import (
@@ -72,6 +73,7 @@ class ServiceServer:
     ) -> None:
         self.name = name
         self.type = type_
+        self._refusals = RateLimitedLogger(_log)
         self._handler = handler
         self._answer = service_header(name, type_, caller_id, request_type, response_type)
         self._workers = workers
@@ -139,25 +141,37 @@ class ServiceServer:
                     return
 
                 connection.busy = True
-                request = reader.read(parse_request_head(head))
+                request = self._read_request(reader, parse_request_head(head))
                 sock.sendall(self._respond(memoryview(request), fields))
                 connection.busy = False
                 if not persistent:
                     return
         except (OSError, WireError) as error:
-            _log.debug("service %s: client %s: %s", self.name, fields.get("callerid"), error)
+            self._client_failed(error, fields)
         finally:
             with self._lock:
                 self._open.discard(connection)
             sock.close()
 
+    def _read_request(self, reader: Reader, size: int) -> bytes:
+        try:
+            return reader.read(size)
+        except MemoryError:
+            raise WireError(f"no memory for a request of {size} bytes") from None
+
+    def _client_failed(self, error: OSError | WireError, fields: Header) -> None:
+        """Log why a client is disconnected; that it has left says nothing."""
+        is_refused = isinstance(error, WireError) and not isinstance(error, PeerEndedError)
+        log = self._refusals.warning if is_refused else _log.debug
+        log("service %s: client %s is disconnected: %s", self.name, fields.get("callerid"), error)
+
     def _respond(self, request: memoryview, fields: Header) -> bytes:
         try:
             return serialize_response(self._handler(request, fields))
-        except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+        except BaseException as error:  # noqa: BLE001 - the edge to user code, which may call sys.exit(): the client waits
             return self._failure(error)
 
-    def _failure(self, error: Exception) -> bytes:
+    def _failure(self, error: BaseException) -> bytes:
         """Return the answer to a call whose handler raised; log what the handler did not mean to send."""
         if isinstance(error, ServiceException):
             return serialize_failure(error)
@@ -167,6 +181,9 @@ class ServiceServer:
             text = str(error)
         except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
             text = type(error).__name__
+        if not isinstance(error, Exception):
+            # Its text may be a number alone, or nothing.
+            text = f"{type(error).__name__}: {text}".removesuffix(": ")
         return serialize_failure(ServiceException(f"error processing request: {text}"))
 
 
@@ -222,7 +239,7 @@ class LoopServiceServer(ServiceServer):
                 if not persistent:
                     return
         except (OSError, WireError) as error:
-            _log.debug("service %s: client %s: %s", self.name, fields.get("callerid"), error)
+            self._client_failed(error, fields)
         finally:
             self._open.discard(connection)
             sock.close()
@@ -323,7 +340,10 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 async def _receive(sock: socket.socket, count: int) -> bytes:
     """Return exactly ``count`` bytes, on the loop. Raises WireError where the peer ends before."""
     loop = asyncio.get_running_loop()
-    buffer = bytearray(count)
+    try:
+        buffer = bytearray(count)
+    except MemoryError:
+        raise WireError(f"no memory for a body of {count} bytes") from None
     at = 0
     with memoryview(buffer) as view:
         while at < count:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 
+from minirospy.closing import close_each
 from minirospy.environment import split_uri
 from minirospy.errors import (
     SUSPENDED,
@@ -45,7 +46,7 @@ from minirospy.wire.tcpros import (
     subscriber_header,
 )
 
-__all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription"]
+__all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unreachable"]
 
 _log = logging.getLogger(__name__)
 
@@ -58,6 +59,8 @@ _WARN_AFTER = 3
 _REFUSALS_LOGGED = 10
 """Log lines about publishers that answer nonsense, before the rest are counted."""
 
+TOGETHER_SECONDS = 0.25  # in which the topics of one publisher that cannot be reached make one line
+MAX_TOPICS_SHOWN = 5  # topics that such a line names
 _LEAVE_SECONDS = 10.0
 _WORKED_SECONDS = 5.0
 """A link that was open for this long, or brought a message, was a good one."""
@@ -167,9 +170,14 @@ class Publication:
             latched = self._latched if self.latch else None
             if latched is not None:
                 link.send(latched)
-        link.open()
-        if self._on_link:
-            self._on_link(link, True)
+        try:
+            link.open()
+            if self._on_link:
+                self._on_link(link, True)
+        except BaseException:
+            # The caller closes the socket: a link without one must not be counted, or be closed later.
+            link.close()
+            raise
         return None
 
     def forget_latched(self) -> None:
@@ -179,8 +187,7 @@ class Publication:
 
     def close(self) -> None:
         """End all links (on the loop)."""
-        for link in self.links:
-            link.close()
+        close_each([link.close for link in self.links])
 
     def _link_closed(self, link: OutLink) -> None:
         self.links = tuple(other for other in self.links if other is not link)
@@ -230,6 +237,47 @@ class InLink:
         sockets.hang_up(self.sock)
 
 
+class Unreachable:
+    """Logs publishers that cannot be reached: one line for all topics of a node, such as those of a bridge that was killed.
+
+    On the loop.
+    """
+
+    def __init__(self) -> None:
+        # A list may name a thousand publishers that refuse: to log all of them takes the loop 0.2 s.
+        self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
+        self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
+        """By the publisher's URI: topics, the error and the advice of the first one."""
+        self._timer: asyncio.TimerHandle | None = None
+
+    def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
+        """Log a publisher a moment later, together with the other topics that lose it."""
+        self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
+
+    def close(self) -> None:
+        """Log what waits, and how many lines were omitted. Idempotent."""
+        if self._timer:
+            self._timer.cancel()
+        self._report()
+        self._limited_log.close()
+
+    def _report(self) -> None:
+        self._timer = None
+        waiting, self._waiting = self._waiting, {}
+        for uri, (topics, error, advice) in waiting.items():
+            shown = ", ".join(topics[:MAX_TOPICS_SHOWN])
+            rest = len(topics) - MAX_TOPICS_SHOWN
+            self._limited_log.warning(
+                "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
+                f"{shown} and {rest} more topic{'s' if rest > 1 else ''}" if rest > 0 else shown,
+                uri,
+                error,
+                advice,
+            )
+
+
 class Subscription:
     """A topic that this node listens to: one connection to each publisher, made again when it breaks.
 
@@ -254,8 +302,12 @@ class Subscription:
         on_loop: bool = False,
         header_memory: tcp.HeaderMemory | None = None,
         this_host: str = "",
+        unreachable: Unreachable | None = None,
     ) -> None:
-        """``this_host``: what :func:`local.this_host` says, where publishers of this machine may be reached so."""
+        """``this_host``: what :func:`local.this_host` says, where publishers of this machine may be reached so.
+
+        ``unreachable``: that of the node, whose other subscriptions may lose the same publisher.
+        """
         self.topic = topic
         self.type = type_
         self.newest = newest
@@ -276,6 +328,7 @@ class Subscription:
         self._named: list[str] = []
         self._settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
+        self._unreachable = unreachable or Unreachable()
         # /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
@@ -315,6 +368,7 @@ class Subscription:
     def close(self) -> None:
         """End all links (on the loop)."""
         self._closed = True
+        self._unreachable.close()
         self._limited_log.close()
         if self._settling:
             self._settling.cancel()
@@ -419,7 +473,8 @@ class Subscription:
                     lambda: left_out(link.header),
                 )
             elif self._on_loop:
-                watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended)
+                fail = partial(setattr, link, "fault")
+                watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended, fail)
             else:
                 try:
                     self._workers.start(self._read, link, deliver, loop)
@@ -497,6 +552,9 @@ class Subscription:
             )
         except (OSError, WireError) as error:
             link.fault = error
+        except MemoryError:
+            # To keep a message, or to give it to a callback that has no memory either.
+            link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(self._link_ended, link)
@@ -540,14 +598,7 @@ class Subscription:
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
-            # A list may name a thousand publishers that refuse: to log all of them takes the loop 0.2 s.
-            self._limited_log.warning(
-                "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
-                self.topic,
-                uri,
-                error,
-                _advice(uri, error, nameless=nameless),
-            )
+            self._unreachable.add(uri, self.topic, error, _advice(uri, error, nameless=nameless))
         self._start_connecting(action)
 
 

@@ -25,8 +25,12 @@ class Access:
 
     @classmethod
     def parse(cls, text: str) -> Access:
-        """Of networks with commas or spaces between them."""
-        return cls(text.replace(",", " ").split())
+        """Return the access of networks with commas or spaces between them; "" admits everybody. Raises UsageError."""
+        networks = text.replace(",", " ").split()
+        if text and not networks:
+            # Perhaps variables that are not set: they must not admit everybody.
+            raise UsageError(f"'{text}' names no network: write as 192.168.65.0/24, or an address")
+        return cls(networks)
 
     def allows(self, peer: str, here: str = "") -> bool:
         """Return whether a connection from the address ``peer`` is allowed; ``here`` is this end's address."""

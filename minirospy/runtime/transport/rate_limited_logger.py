@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import TYPE_CHECKING
 
 from minirospy.escape import escaped
+
+if TYPE_CHECKING:
+    import asyncio
 
 __all__ = ["RateLimitedLogger"]
 
@@ -13,7 +17,7 @@ _SECONDS = 10.0
 
 
 class RateLimitedLogger:
-    """Logs ``lines`` warnings and errors every ten seconds, and counts the others."""
+    """Logs ``lines`` lines every ten seconds, and counts the others."""
 
     def __init__(self, log: logging.Logger, lines: int = 1) -> None:
         self._log = log
@@ -28,6 +32,19 @@ class RateLimitedLogger:
         if self._omitted:
             self._log.warning("%d more like the last ones", self._omitted)
             self._omitted = 0
+
+    def info(self, text: str, *args: object) -> None:
+        """Log what is no fault, or count it."""
+        self._write(logging.INFO, text, args)
+
+    def close_later(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Have :meth:`close` called when the current ten seconds are over, if the line before was the first to be omitted."""
+        if self._omitted == 1:
+            loop.call_later(max(0.0, self._end - time.monotonic()), self.close)
+
+    def critical(self, text: str, *args: object) -> None:
+        """Log a fatal error, or count it."""
+        self._write(logging.CRITICAL, text, args)
 
     def error(self, text: str, *args: object) -> None:
         """Log an error, or count it."""

@@ -91,8 +91,12 @@ def watch_frames(
     sock: socket.socket,
     deliver: Callable[[memoryview], None],
     on_end: Callable[[], None],
+    on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop: for receivers that do so little that a thread each would cost more."""
+    """Read frames on the loop: for receivers that do so little that a thread each would cost more.
+
+    ``on_fault`` gets what ended the connection, an OSError or WireError, before ``on_end`` is called.
+    """
     reader = FrameReader()
 
     def readable() -> None:
@@ -103,7 +107,10 @@ def watch_frames(
         except (BlockingIOError, InterruptedError):
             return
         except (OSError, WireError) as error:
-            _log.debug("connection ended: %s", error)
+            on_fault(error)
+            count = 0
+        except MemoryError:
+            on_fault(WireError(f"no memory for a message of {reader.wanted} bytes"))
             count = 0
         if not count:
             loop.remove_reader(sock)

@@ -234,9 +234,9 @@ class Listener:
         except (OSError, WireError) as error:
             self.log_refusal(f"connection from {address} refused: {error}")
             peer.close()
-        except Exception:
+        except Exception:  # noqa: BLE001 - one connection's fault must not end the others, nor stay unseen
+            _log.exception("connection from %s closed: a fault in this node", address)
             peer.close()
-            raise
 
     def _end_oldest(self, why: str) -> None:
         for task in list(self._handshakes)[:1]:

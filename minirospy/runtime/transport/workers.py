@@ -47,7 +47,7 @@ class Workers:
         while True:
             try:
                 function(*args)
-            except Exception:  # noqa: BLE001 - the edge to user code: a fault there must not end the worker
+            except BaseException:  # noqa: BLE001 - the edge to user code: a fault there, or sys.exit(), must not end the worker
                 _log.exception("fault in a worker")
             del function, args
             with self._lock:
@@ -96,5 +96,5 @@ class InOrder:
                 function, args = self._waiting.popleft()
             try:
                 function(*args)
-            except Exception:  # noqa: BLE001 - the edge to user code: the others run all the same
+            except BaseException:  # noqa: BLE001 - the edge to user code: the others run all the same
                 _log.exception("fault in a worker")

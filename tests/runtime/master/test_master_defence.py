@@ -314,6 +314,10 @@ def test_networks() -> None:
     for wrong in ("192.168.65.0/33", "here", "http://x"):
         with pytest.raises(UsageError, match="is not a network"):
             Access.parse(wrong)
+    for empty in (" ", ",", " , ,"):
+        with pytest.raises(UsageError, match="names no network"):
+            Access.parse(empty)
+    assert Access.parse("").allows("8.8.8.8")
 
 
 def test_the_start_up_line_warns_of_the_open_internet(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from minirospy.environment import Environment
-from minirospy.errors import RpcFault
+from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.node import registration
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.tcpros import InterfaceType
@@ -301,3 +302,26 @@ def test_close_does_not_wait_for_a_master_that_refuses_connections() -> None:
         await node.close()
 
     run(scene)
+
+
+def test_close_ends_what_remains_after_a_part_that_fails(caplog: pytest.LogCaptureFixture) -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            uri = node.uri
+            closed = []
+
+            def fail() -> None:
+                raise ValueError("Invalid file descriptor: -1")
+
+            for topic in ALL[:2]:
+                node.publications[topic].close = fail  # type: ignore[method-assign]
+            node.publications[ALL[2]].close = lambda: closed.append(ALL[2])  # type: ignore[method-assign]
+            await node.close()
+            assert closed == [ALL[2]]
+            assert master.unregistered == ALL
+            with pytest.raises(RpcUnreachable):
+                await AsyncRpcClient().call(uri, "getPid", "/test")
+
+    run(scene)
+    assert caplog.text.count("ValueError: Invalid file descriptor: -1") == 2

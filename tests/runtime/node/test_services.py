@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import struct
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, NamedTuple
@@ -39,6 +40,14 @@ FAULTS: dict[bytes, tuple[Exception, bytes]] = {
 }
 """Requests, what the handler raises, and what the client gets."""
 
+EXITS: dict[bytes, tuple[BaseException, bytes]] = {
+    b"exit": (SystemExit(3), b"error processing request: SystemExit: 3"),
+    b"exit without a status": (SystemExit(), b"error processing request: SystemExit"),
+    b"generator": (GeneratorExit(), b"error processing request: GeneratorExit"),
+    b"interrupt": (KeyboardInterrupt(), b"error processing request: KeyboardInterrupt"),
+}
+"""The same, of what is no Exception: in a coroutine it is asyncio's to decide."""
+
 
 class Scene(NamedTuple):
     """A node, its loop, and its services /worker and /loop, which do the same."""
@@ -69,6 +78,8 @@ def scene(master: str) -> Iterator[Scene]:
             raise ServiceException("zażółć")
         if bytes(request) in FAULTS:
             raise FAULTS[bytes(request)][0]
+        if bytes(request) in EXITS:
+            raise EXITS[bytes(request)][0]
         if bytes(request) == b"none":
             return None  # type: ignore[return-value]
         return bytes(request)[::-1]
@@ -136,6 +147,30 @@ def test_calls_on_the_loop(scene: Scene, service: str) -> None:
             await AsyncServiceClient.connect(scene.node.service_uri, service, "1" * 32, "/test")
 
     scene.run(main())
+
+
+@both
+def test_request_over_the_limit_is_refused_with_its_reason(
+    scene: Scene, service: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    client = scene.client(service)
+    client._sock.sendall(struct.pack("<I", 0xFFFFFFFE))
+    assert client._sock.recv(1) == b""
+    client.close()
+    # The connection is closed after the line is logged.
+    assert (
+        f"service {service}: client /test is disconnected: a body of 4294967294 bytes is over" in caplog.text
+    )
+
+
+@pytest.mark.parametrize("request_", EXITS)
+def test_handler_that_exits_is_answered_and_served_on(scene: Scene, request_: bytes) -> None:
+    client = scene.client("/worker", persistent=True)
+    with pytest.raises(CallFailed) as caught:
+        client.call(request_)
+    assert caught.value.text == EXITS[request_][1]
+    assert client.call(b"abc") == b"cba"
+    client.close()
 
 
 @both

@@ -28,6 +28,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
@@ -136,9 +137,11 @@ async def subscribe_to(
     monkeypatch: pytest.MonkeyPatch,
     node: Node,
     deliver: Callable[[memoryview, Header], None],
+    *,
+    on_loop: bool = False,
 ) -> Subscription:
     """Return a subscription that was notified of one publisher, which ``foreign`` plays."""
-    subscription = node.make_subscription("/t", STRING, deliver)
+    subscription = node.make_subscription("/t", STRING, deliver, on_loop=on_loop)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
     return subscription
@@ -198,8 +201,9 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
     assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
 
 
+@pytest.mark.parametrize("on_loop", [False, True])
 def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, on_loop: bool
 ) -> None:
     delays: list[float] = []
 
@@ -212,7 +216,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
         monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign, box = Foreign(garbage), Box()
-            subscription = await subscribe_to(foreign, monkeypatch, b, box)
+            subscription = await subscribe_to(foreign, monkeypatch, b, box, on_loop=on_loop)
             start = subscription._start_connecting
             monkeypatch.setattr(
                 subscription, "_start_connecting", lambda action: (delays.append(action.delay), start(action))
@@ -275,6 +279,35 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     assert len(lines) == 1
     assert lines[0].startswith(f"cannot connect to the publisher of /t at {uri}: ")
     assert advice in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("count", "topics"),
+    [
+        (1, "/t0"),
+        (5, "/t0, /t1, /t2, /t3, /t4"),
+        (6, "/t0, /t1, /t2, /t3, /t4 and 1 more topic"),
+        (40, "/t0, /t1, /t2, /t3, /t4 and 35 more topics"),
+    ],
+)
+def test_a_publisher_of_many_topics_that_cannot_be_reached_is_one_line(
+    count: int, topics: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uri = "http://127.0.0.1:1/"
+
+    async def scene() -> None:
+        # Until the node closes.
+        monkeypatch.setattr("minirospy.runtime.node.topics.TOGETHER_SECONDS", 1e6)
+        async with graph("/b") as (_, (b,)):
+            for number in range(count):
+                subscription = b.make_subscription(f"/t{number}", STRING, Box())
+                b.subscriptions[subscription.topic] = subscription
+                subscription._plan.publishers_changed([uri])
+                subscription._retry(uri, TimeoutError("no answer"))
+
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert [line.partition(" at ")[0] for line in lines] == [f"cannot connect to the publisher of {topics}"]
 
 
 def test_many_publishers_that_cannot_be_reached_are_some_lines_and_a_number(
@@ -1035,3 +1068,26 @@ def test_a_publisher_that_registers_again_is_connected_once(
         await foreign.close()
 
     run_manually(scene)
+
+
+def test_subscriber_whose_listener_fails_is_not_counted_and_the_fault_is_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The fault is in the publisher's own function: the connection ends, and the node still closes."""
+
+    async def scene() -> None:
+        async with graph("/talker") as (_, (talker,)):
+            publication = Publication("/t", STRING, on_link=fail)
+            await talker.advertise(publication)
+            sock = await raw_subscriber(talker)
+            with sock, contextlib.suppress(ConnectionResetError):
+                while await asyncio.get_running_loop().sock_recv(sock, 1000):
+                    pass
+            assert publication.links == ()
+
+    def fail(_link: OutLink, is_up: bool) -> None:
+        if is_up:
+            raise LookupError("a faulty listener")
+
+    run(scene)
+    assert caplog.text.count("LookupError: a faulty listener") == 1

@@ -18,6 +18,7 @@ from minirospy.errors import WireError
 from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable
+from minirospy.wire import framing
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 
 KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
@@ -476,3 +477,37 @@ def test_peer_that_does_not_read_is_not_waited_for(
     # TCP finds a little more room for a while, and each time the peer is given another chance.
     assert 1 <= len(waits) < 20
     assert link.waiting <= 3
+
+
+@pytest.mark.parametrize(
+    ("head", "why"),
+    [
+        (struct.pack("<I", 0xFFFFFFFF), "a message of 4294967295 bytes is over the limit of 1073741824"),
+        (struct.pack("<I", 1 << 29), "no memory for a message of 536870912 bytes"),
+    ],
+)
+def test_message_that_the_loop_refuses_ends_the_link_with_its_reason(
+    pair: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch, head: bytes, why: str
+) -> None:
+    def no_memory(size: int) -> bytearray:
+        if size > CHUNK:
+            raise MemoryError
+        return bytearray(size)
+
+    async def scene() -> list[str]:
+        said: list[str] = []
+        ended = asyncio.Event()
+        pair[0].setblocking(False)
+        readers.watch_frames(
+            asyncio.get_running_loop(),
+            pair[0],
+            lambda _: None,
+            ended.set,
+            lambda error: said.append(str(error)),
+        )
+        monkeypatch.setattr(framing, "bytearray", no_memory, raising=False)
+        pair[1].sendall(head)
+        await asyncio.wait_for(ended.wait(), 30)
+        return said
+
+    assert asyncio.run(scene()) == [why]

@@ -13,6 +13,8 @@ from typing import Any, ClassVar, Generic, TypeVar
 from xml.dom import minidom
 from xml.etree import ElementTree as ET
 
+from minirospy.xml_text import XmlError, check_xml
+
 __all__ = [
     "Attribute", "Codec", "Element", "Many", "NamedAttribute", "Number", "Object", "ObjectOf", "ParseError", "Path",
     "Raw", "Text", "VectorOf", "on_error", "on_error_stderr", "report", "to_yaml", "xml_string",
@@ -208,7 +210,7 @@ class Object:
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
         """Return the object of an XML text. Raises ParseError, xml.etree.ElementTree.ParseError."""
-        return cls.from_xml(ET.fromstring(xml_string), Path(cls.TAG))
+        return cls.from_xml(_root(xml_string), Path(cls.TAG))
 
     @classmethod
     def from_xml_file(cls: type[_T], file_path: str) -> _T:
@@ -224,7 +226,7 @@ class Object:
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
         """Read an XML text into this object, and return it. Raises as from_xml_string."""
-        self.read_xml(ET.fromstring(xml_string), Path(self.TAG))
+        self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
     def read_xml(self, node: ET.Element, path: Path) -> None:
@@ -393,6 +395,14 @@ def to_yaml(obj: object) -> object:
     if isinstance(obj, Iterable) and not isinstance(obj, str | ET.Element):
         return [to_yaml(each) for each in obj]
     return str(obj)
+
+
+def _root(xml_string: str | bytes) -> ET.Element:
+    try:
+        check_xml(xml_string)
+    except XmlError as error:
+        raise ET.ParseError(str(error)) from None
+    return ET.fromstring(xml_string)
 
 
 def xml_string(rootXml: ET.Element, addHeader: bool = True) -> str:

@@ -1,0 +1,119 @@
+"""Messages of ROS 1 whose fields are in another order than in ROS 2: the bytes of the fields, put into the other order. Pure.
+
+A message of ROS 1 has no padding, so that the bytes of a field do not depend on its place. The generated functions of
+:mod:`minirospy.idl.cdr` then convert a message whose fields are in ROS 2's order.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from minirospy.errors import DeserializationError
+
+__all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
+
+_COUNT = struct.Struct("<I")
+_SPARE = 10_000  # elements without bytes that a message may have beyond one for each of its bytes, as in idl/cdr.py
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A field of ``size`` bytes."""
+
+    size: int
+
+
+@dataclass(frozen=True)
+class Text:
+    """A string."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """Elements; ``length`` is None if it varies."""
+
+    element: Node
+    length: int | None = None
+
+
+@dataclass(frozen=True)
+class Reordered:
+    """A message: its fields as they are read, and the numbers of these in the order in which they are written."""
+
+    fields: tuple[Node, ...]
+    order: tuple[int, ...]
+
+
+Node: TypeAlias = Fixed | Text | Array | Reordered
+
+
+def inverse(node: Node) -> Node:
+    """Return what puts the fields back."""
+    if isinstance(node, Array):
+        return Array(inverse(node.element), node.length)
+    if isinstance(node, Reordered):
+        fields = tuple(inverse(node.fields[number]) for number in node.order)
+        return Reordered(fields, tuple(node.order.index(number) for number in range(len(node.order))))
+    return node
+
+
+def reorder(node: Node, data: bytes | memoryview) -> bytes:
+    """Return a message with its fields in the other order. Raise DeserializationError if it ends too early."""
+    view = memoryview(data)
+    parts: list[bytes | memoryview] = []
+    try:
+        end = _write(node, view, 0, parts)
+    except struct.error as error:
+        raise DeserializationError("the message ends too early") from error
+    parts.append(view[end:])  # what follows the message is refused when it is converted
+    return b"".join(parts)
+
+
+def _write(node: Node, data: memoryview, start: int, parts: list[bytes | memoryview]) -> int:
+    """Append the bytes of a node that starts at ``start``; return where it ends."""
+    if isinstance(node, Array) and not isinstance(node.element, Fixed):
+        count, end = _count(node, data, start)
+        parts.append(data[start:end])
+        for _ in range(count):
+            end = _write(node.element, data, end, parts)
+        return end
+    if isinstance(node, Reordered):
+        return _write_fields(node, data, start, parts)
+    if isinstance(node, Fixed):
+        end = start + node.size
+    elif isinstance(node, Array):
+        assert isinstance(node.element, Fixed)
+        count, end = _count(node, data, start)
+        end += count * node.element.size
+    else:
+        (size,) = _COUNT.unpack_from(data, start)
+        end = start + 4 + size
+    if end > len(data):
+        raise DeserializationError("the message ends too early")
+    parts.append(data[start:end])
+    return end
+
+
+def _write_fields(node: Reordered, data: memoryview, start: int, parts: list[bytes | memoryview]) -> int:
+    written: list[Sequence[bytes | memoryview]] = []
+    end = start
+    for field in node.fields:
+        pieces: list[bytes | memoryview] = []
+        end = _write(field, data, end, pieces)
+        written.append(pieces)
+    for number in node.order:
+        parts += written[number]
+    return end
+
+
+def _count(node: Array, data: memoryview, start: int) -> tuple[int, int]:
+    """Return how many elements an array has, and where the first one starts."""
+    if node.length is not None:
+        return node.length, start
+    (count,) = _COUNT.unpack_from(data, start)
+    if count > len(data) - start + _SPARE:
+        raise DeserializationError("a length is longer than the message")
+    return count, start + 4

@@ -1,0 +1,107 @@
+"""Files that are sent to clients in pieces, each read in a worker when the client has taken the one before.
+
+A mesh of 60 MB thus takes one piece of memory for each client, however many clients request it and read nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from minirospy.errors import BridgeError
+
+__all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
+
+_log = logging.getLogger(__name__)
+
+PIECE_BYTES = 128 * 1024  # read at a time: large enough for a worker's overhead, small for 256 clients
+
+
+@dataclass(frozen=True)
+class FileAnswer:
+    """An answer that has a file at its end. Nothing is opened or read before its turn comes."""
+
+    open: Callable[[], tuple[BinaryIO, int]]
+    """Return the file and its size. Blocking; raises BridgeError with the reason."""
+    head: Callable[[int], bytes]
+    """Return what is sent before a file of this size."""
+    failure: Callable[[str], bytes]
+    """Return what is sent instead if the file cannot be opened."""
+
+
+class FileSender:
+    """The state of one file that is sent to one client. On the loop."""
+
+    def __init__(
+        self, answer: FileAnswer, loop: asyncio.AbstractEventLoop, on_piece: Callable[[], object]
+    ) -> None:
+        """``on_piece`` is called when the next piece has been read, or the file has failed."""
+        self.is_done = False
+        """Whether everything has been taken."""
+        self.has_failed = False
+        """Whether the file has become shorter or unreadable after its size was sent."""
+        self._answer = answer
+        self._loop = loop
+        self._on_piece = on_piece
+        self._file: BinaryIO | None = None
+        self._left = 0
+        """Bytes of the file that have not been read."""
+        self._piece: bytes | None = None
+        self._reading: asyncio.Future[bytes] | None = None
+        self._is_closed = False
+
+    def take(self) -> bytes | None:
+        """Return the next piece; None while it is being read."""
+        piece, self._piece = self._piece, None
+        if piece is None:
+            self._read()
+        elif not self._left:
+            self.is_done = True
+            self.close()
+        return piece
+
+    def close(self) -> None:
+        """Close the file, once it is not being read. Idempotent."""
+        self._is_closed = True
+        if self._file and not self._reading:
+            self._file.close()
+
+    def _read(self) -> None:
+        if not self._reading and not self._is_closed:
+            work = self._next if self._file else self._first
+            self._reading = self._loop.run_in_executor(None, work)
+            self._reading.add_done_callback(self._was_read)
+
+    def _first(self) -> bytes:
+        """Open the file; return the first piece, with the head. In a worker."""
+        try:
+            self._file, size = self._answer.open()
+        except BridgeError as error:
+            return self._answer.failure(str(error))
+        self._left = size
+        return self._answer.head(size) + (self._next() if size else b"")
+
+    def _next(self) -> bytes:
+        """Return the next piece of the file. In a worker."""
+        assert self._file
+        piece = self._file.read(min(PIECE_BYTES, self._left))
+        if not piece:
+            raise OSError("it has become shorter meanwhile")
+        self._left -= len(piece)
+        return piece
+
+    def _was_read(self, reading: asyncio.Future[bytes]) -> None:
+        self._reading = None
+        if self._is_closed:
+            self.close()
+            return
+        if reading.cancelled() or (error := reading.exception()):
+            self.has_failed = True
+            _log.warning("a file could not be sent: %s", "cancelled" if reading.cancelled() else error)
+            self.close()
+        else:
+            self._piece = reading.result()
+        self._on_piece()

@@ -1,0 +1,5 @@
+"""The message that rospy itself offers, as a module that is imported after ROS 1's packages are preferred."""
+
+from std_msgs.msg import Header
+
+__all__ = ["Header"]

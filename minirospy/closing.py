@@ -1,0 +1,34 @@
+"""Close several parts, of which one may fail: the others are closed all the same."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from collections.abc import Awaitable, Callable, Iterable
+
+__all__ = ["close_all", "close_each"]
+
+_log = logging.getLogger(__name__)
+
+CloseFunction = Callable[[], object]
+AsyncCloseFunction = Callable[[], Awaitable[object] | object]
+
+
+def close_each(functions: Iterable[CloseFunction]) -> None:
+    """Call each function in order; log an exception and go on with the next."""
+    for function in functions:
+        try:
+            function()
+        except Exception:  # noqa: BLE001 - whatever fails, the rest must be closed
+            _log.exception("closing failed; what remains is closed all the same")
+
+
+async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
+    """Do the same with functions that may be coroutine functions, one after the other. A cancellation ends it."""
+    for function in functions:
+        try:
+            closing = function()
+            if inspect.isawaitable(closing):
+                await closing
+        except Exception:  # noqa: BLE001 - whatever fails, the rest must be closed
+            _log.exception("closing failed; what remains is closed all the same")

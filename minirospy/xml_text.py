@@ -1,0 +1,150 @@
+"""XML text -> elements with their lines: the reader of launch files, robot descriptions, manifests and test results. Pure.
+
+A document type is accepted, as ROS accepts it, unless it declares entities or default values of attributes: a few hundred
+characters of these unfold to gigabytes. Nothing is ever loaded from another file or address.
+Source: https://www.w3.org/TR/xml/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from minirospy.errors import MinirospyError
+
+__all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
+
+MAX_LEVELS = 100  # tags inside tags; readers and libraries recurse once or more for each level
+_MAX_ELEMENTS = 1_000_000  # tags of a document; each takes about 500 bytes of memory, from 4 bytes of text
+
+
+class XmlError(MinirospyError):
+    """A text that is refused: ``line`` is where, 0 if it is not known, and ``why`` the reason."""
+
+    def __init__(self, line: int, why: str) -> None:
+        super().__init__(line, why)
+        self.line = line
+        self.why = why
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.why}" if self.line else self.why
+
+
+class XmlSyntaxError(XmlError):
+    """A text that is not XML."""
+
+
+@dataclass
+class XmlElement:
+    """A tag on ``line``; ``text`` is its text without that of its children."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[XmlElement] = field(default_factory=list)
+    text: str = ""
+
+    def all(self, tag: str) -> Iterator[XmlElement]:
+        """Yield the children of this tag, in order."""
+        return (child for child in self.children if child.tag == tag)
+
+    def first(self, tag: str) -> XmlElement | None:
+        """Return the first child of this tag; None if there is none."""
+        return next(self.all(tag), None)
+
+
+def new_parser() -> expat.XMLParserType:
+    """Return a parser that refuses what unfolds (XmlError, raised by Parse), and gives text in large pieces."""
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+
+    def entity(name: str, is_parameter: bool, *_: object) -> None:
+        kind = f"{'%' if is_parameter else '&'}{name};"
+        raise XmlError(
+            parser.CurrentLineNumber,
+            f"the entity {kind} is declared, and entities are not supported: write its value where it is used",
+        )
+
+    def attribute(tag: str, name: str, _type: str, default: str | None, _required: bool) -> None:
+        if default is not None:
+            raise XmlError(
+                parser.CurrentLineNumber,
+                f"a default is declared for the attribute '{name}' of <{tag}>, which is not supported: "
+                "write its value where it is used",
+            )
+
+    parser.EntityDeclHandler, parser.AttlistDeclHandler = entity, attribute
+    return parser
+
+
+def parse_xml(text: str | bytes) -> XmlElement:
+    """Return the root of an XML text. Raise XmlSyntaxError, XmlError."""
+    parser = new_parser()
+    stack: list[XmlElement] = []
+    texts: list[list[str]] = []
+    roots: list[XmlElement] = []
+    left = _MAX_ELEMENTS
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal left
+        line = parser.CurrentLineNumber
+        left -= 1
+        _check(line, len(stack), left)
+        element = XmlElement(tag, attributes, line)
+        (stack[-1].children if stack else roots).append(element)
+        stack.append(element)
+        texts.append([])
+
+    def end(_: str) -> None:
+        stack.pop().text = "".join(texts.pop())
+
+    def data(part: str) -> None:
+        texts[-1].append(part)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = data
+    _parse(parser, text)
+    return roots[0]
+
+
+def check_xml(text: str | bytes) -> None:
+    """Raise XmlError for what :func:`parse_xml` refuses: call it before a library parses the text.
+
+    What is not XML is left to the library, whose own error its callers expect. It fails at the same place.
+    """
+    parser = new_parser()
+    level, left = 0, _MAX_ELEMENTS
+
+    def start(*_: object) -> None:
+        nonlocal level, left
+        left -= 1
+        _check(parser.CurrentLineNumber, level, left)
+        level += 1
+
+    def end(_: str) -> None:
+        nonlocal level
+        level -= 1
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    with suppress(XmlSyntaxError):
+        _parse(parser, text)
+
+
+def _check(line: int, level: int, left: int) -> None:
+    if level >= MAX_LEVELS:
+        raise XmlError(line, f"tags are nested deeper than {MAX_LEVELS} levels")
+    if left < 0:
+        raise XmlError(line, f"there are more than {_MAX_ELEMENTS} tags")
+
+
+def _parse(parser: expat.XMLParserType, text: str | bytes) -> None:
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        why = f"{expat.ErrorString(error.code)} (column {error.offset})"
+        raise XmlSyntaxError(error.lineno, why) from None
+    except (LookupError, ValueError) as error:
+        # An encoding that is unknown, or a text with a lone surrogate.
+        raise XmlSyntaxError(0, str(error)) from None

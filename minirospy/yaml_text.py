@@ -1,0 +1,154 @@
+"""YAML text -> values, by PyYAML's safe loaders, refusing what takes minutes, fills the memory or crashes Python. Pure.
+
+A short text may be nested without end, unfold by its aliases, or be one number that takes hours: `1:59:59:...` has base 60.
+Everything that is refused, and everything else that PyYAML raises, is a yaml.YAMLError. PyYAML is imported at the first call.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import yaml
+
+    Loader = type[yaml.SafeLoader] | type[yaml.BaseLoader]
+
+__all__ = ["check_yaml", "fast_loader", "guarded", "load", "load_all", "one_line", "safe_load"]
+
+_MAX_LEVELS = 200  # lists and dictionaries inside each other; PyYAML recurses several times for each
+_MAX_VALUES = 1_000_000  # values of a text with its aliases unfolded
+_MAX_NUMBER = (
+    1_000  # characters; to read a number takes the square of its length, and a double has 309 digits at most
+)
+_INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
+_NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
+
+
+def safe_load(text: str) -> object:
+    """Return the value of a text, as yaml.safe_load does. Raise yaml.YAMLError."""
+    import yaml
+
+    return load(text, yaml.SafeLoader)
+
+
+def load(text: str, loader: Loader) -> Any:
+    """Return the value of a text, by a class that derives from PyYAML's safe loaders. Raise yaml.YAMLError."""
+    import yaml
+
+    try:
+        check_yaml(text)
+        return yaml.load(text, Loader=guarded(loader))  # type: ignore[arg-type]
+    except _RAISED as error:
+        raise yaml.YAMLError(_reason(error)) from error
+
+
+def load_all(text: str, loader: Loader) -> Iterator[Any]:
+    """Yield the values of the documents of a text, likewise. Raise yaml.YAMLError."""
+    import yaml
+
+    try:
+        check_yaml(text)
+        documents = yaml.load_all(text, Loader=guarded(loader))  # type: ignore[arg-type]
+    except _RAISED as error:
+        raise yaml.YAMLError(_reason(error)) from error
+    while True:
+        try:
+            document = next(documents)
+        except StopIteration:
+            return
+        except _RAISED as error:
+            raise yaml.YAMLError(_reason(error)) from error
+        yield document
+
+
+def fast_loader() -> type[yaml.SafeLoader]:
+    """Return PyYAML's compiled safe loader, or, if it has none, the other one, which takes ten times as long."""
+    import yaml
+
+    fastest: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    return fastest
+
+
+@lru_cache(maxsize=32)
+def guarded(loader: Loader) -> Loader:
+    """Return a loader that refuses long numbers. What is added to ``loader`` later is known to it, too."""
+    import yaml
+
+    class Guarded(loader):  # type: ignore[valid-type,misc]
+        def construct_scalar(self, node: yaml.ScalarNode) -> Any:
+            value = super().construct_scalar(node)
+            if len(value) > _MAX_NUMBER and node.tag in _NUMBERS:
+                why = f"a number of more than {_MAX_NUMBER} characters"
+                raise yaml.constructor.ConstructorError(None, None, why, node.start_mark)
+            return value
+
+    return Guarded
+
+
+def check_yaml(text: str) -> None:
+    """Raise ValueError if a YAML text is nested too deeply, or unfolds to too much by its aliases.
+
+    Libraries of YAML read both: the first one may crash Python, what the second one gives is small only as long as
+    nobody sends or prints it. Raise yaml.YAMLError if it is not YAML.
+    """
+    # How deep it can be at most: by its brackets, and by what its lines start with. Nearly every text ends here.
+    indent = max(map(len, _INDENT.findall(text)), default=0)
+    has_aliases = "*" in text and "&" in text
+    if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:
+        return
+    import yaml
+
+    counts = [0]
+    """How many values each open collection has so far; the document's own first."""
+    anchors: list[str | None] = []
+    sizes: dict[str, int | None] = {}
+    """Anchor -> the values in what it names; None while that is open."""
+    for event in yaml.parse(text, Loader=fast_loader()):
+        match event:
+            case yaml.AliasEvent(anchor=name):
+                size = sizes.get(str(name), 1)
+                if size is None:
+                    raise ValueError(f"the alias *{name} is inside of what it names")
+                counts[-1] += size
+            case yaml.ScalarEvent(anchor=name):
+                counts[-1] += 1
+                if name:
+                    sizes[name] = 1
+            case yaml.CollectionStartEvent(anchor=name):
+                counts.append(1)
+                anchors.append(name)
+                if name:
+                    sizes[name] = None
+            case yaml.CollectionEndEvent():
+                size, name = counts.pop(), anchors.pop()
+                counts[-1] += size
+                if name:
+                    sizes[name] = size
+        if len(counts) > _MAX_LEVELS:
+            raise ValueError(f"it is nested deeper than {_MAX_LEVELS} levels")
+        if has_aliases and counts[-1] > _MAX_VALUES:
+            raise ValueError(f"its aliases unfold to more than {_MAX_VALUES} values")
+
+
+def one_line(error: Exception) -> str:
+    """Return a YAML library's complaint on one line."""
+    problem = " ".join(str(getattr(error, "problem", None) or error).split())
+    mark = getattr(error, "problem_mark", None)
+    return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
+
+
+_RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
+"""What check_yaml raises, and PyYAML: for a date that is none, or for a tag such as !!bool on other text."""
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ArithmeticError):
+        return "a number is too large"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, ValueError) and str(error):
+        return str(error)
+    return "a tag (!!) does not fit its value"
