@@ -453,7 +453,7 @@ class Mutants:
         for name in self._trees:
             importlib.import_module(f"minirospy.{name}")
         for each in gc.get_objects():
-            if isinstance(each, FunctionType) and each.__code__.co_filename in self._files:
+            if type(each) is FunctionType and each.__code__.co_filename in self._files:
                 code = each.__code__
                 found[self._files[code.co_filename]][code.co_firstlineno, code.co_name].append(each)
         return found

@@ -174,7 +174,7 @@ def test_closed_client_is_not_chosen() -> None:
     gone, other = Holder(account), Holder(account)
     gone.share.set(50)
     account.close(gone.share)
-    gone.share.large = 99
+    gone.share.large = 200
     other.share.set(101)
     assert (gone.sheds, other.sheds) == (0, 1)
 
@@ -203,5 +203,8 @@ def test_shedding_does_not_choose_again_within_itself() -> None:
     first.set(70)
     assert order == ["first starts", "first ends"] * 2
     assert not account._holders
-    account.hold((bytes(LARGE_PIECE),) * 2)
+    piece = bytes(LARGE_PIECE)
+    account.hold((piece, piece))
     assert list(account._holders.values()) == [2]
+    account.release((piece, piece))
+    assert not account._holders
