@@ -32,7 +32,7 @@ help:
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and the bridge, random files to the readers, ten minutes each"
-	@echo "make mutants  put small faults into graph/, wire/ and the journal; list those that no test notices"
+	@echo "make mutants  put small faults into graph/, wire/, the journal and access; list those that no test notices"
 	@echo "make site     write the documentation as a site to build/site"
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"

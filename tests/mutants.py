@@ -1,4 +1,4 @@
-"""Mutation testing: small faults put into the pure rooms and the journal, and whether a test notices each one.
+"""Mutation testing: small faults put into pure rooms, the journal and access, and whether a test notices each one.
 
     make mutants                                  # all rooms
     python tests/mutants.py journal --show        # one, with the source of every survivor

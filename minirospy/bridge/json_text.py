@@ -54,7 +54,10 @@ def width_of(text: str) -> int:
     """Return the bytes that each character of a text takes in memory: 1, 2 or 4."""
     if text.isascii():
         return 1
-    # A copy in UTF-8 that Python keeps with a text makes this too large at most.
+    if len(text) == 1:
+        # Python 3.12 and later keep a copy in UTF-8 with these.
+        return 1 if text <= "\xff" else 2 if text <= "\uffff" else 4
+    # Such a copy of another text makes this too large at most.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 

@@ -167,6 +167,7 @@ def test_account_is_the_sum_of_what_waits(steps: list[tuple[int, str, int]]) -> 
 def test_limits_are_those_that_are_documented() -> None:
     assert Account().limit == 160_000_000
     assert LARGE_PIECE == 32_768
+    assert Share(Account(), "a", lambda: None).is_owner is False
 
 
 def test_closed_client_is_not_chosen() -> None:

@@ -25,6 +25,8 @@ def test_code_is_used_once_within_a_minute() -> None:
     kept = Codes(lambda: now)
     first, second = kept.new("token-1"), kept.new("token-2")
     assert first != second
+    # 128 bits in base64.
+    assert len(first) == 22
     assert (kept.token_of(first), kept.token_of(first), kept.token_of("x")) == ("token-1", "token-1", "")
     assert (kept.redeem("x"), kept.redeem(first), kept.redeem(first)) == ("", "token-1", "")
     now = 59.9
@@ -85,7 +87,7 @@ def test_code_is_exchanged_by_this_user_alone(
         monkeypatch.setattr(codes, "owner_of", lambda end, other_end, owner=owner: owner)
         status, text = exchanged(served.port, code, half_closes=half_closes)
         assert (status, text.count("\n")) == (403, 1)
-        assert "user who started" in text
+        assert text == "this code is for the user who started the dashboard, on this machine\n"
     monkeypatch.undo()
     # A refused try has not used the code up.
     assert exchanged(served.port, code, half_closes=half_closes) == (200, "token-1")

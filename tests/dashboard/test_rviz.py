@@ -171,7 +171,7 @@ def test_number_that_json_has_not_is_text(number: str) -> None:
 
 def test_operations_that_wait_are_limited() -> None:
     sent: list[str] = []
-    client = cast("WebClient", SimpleNamespace(send_text=sent.append))
+    client = cast("WebClient", SimpleNamespace(send_text=sent.append, holds=lambda _: None))
 
     async def work() -> None:
         door = RvizDoor()
@@ -229,7 +229,7 @@ def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> N
     configs = [{"Visualization Manager": {"Displays": [str(number)] * 10_000}} for number in range(4)]
     file = tmp_path / "my.rviz"
     sent: list[str] = []
-    client = cast("WebClient", SimpleNamespace(send_text=sent.append, is_owner=True))
+    client = cast("WebClient", SimpleNamespace(send_text=sent.append, holds=lambda _: None, is_owner=True))
 
     async def work() -> None:
         door = RvizDoor(file)
@@ -245,7 +245,7 @@ def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> N
 
 def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
     file = tmp_path / "my.rviz"
-    client = cast("WebClient", SimpleNamespace(send_text=lambda _: None, is_owner=True))
+    client = cast("WebClient", SimpleNamespace(send_text=lambda _: None, holds=lambda _: None, is_owner=True))
 
     async def work() -> None:
         door = RvizDoor(file)

@@ -136,3 +136,43 @@ def test_size_that_only_pillow_knows_is_limited_too(monkeypatch: pytest.MonkeyPa
     assert decode(data, max_pixels=600).shape == (30, 20, 3)
     with pytest.raises(ValueError, match="20x30 pixels is too large"):
         decode(data, max_pixels=599)
+
+
+FRAMES = [0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD, 0xCE, 0xCF]
+
+
+@pytest.mark.parametrize("marker", range(0xC0, 0xD0))
+def test_size_of_a_jpeg_is_behind_each_of_its_frame_markers(marker: int) -> None:
+    frame = bytes((0xFF, marker)) + b"\0\x11\x08\0\x09\0\x08" + bytes(10)
+    last = b"\xff\xc0\0\x11\x08\0\x07\0\x06" + bytes(10)
+    # The other markers of this range are tables, which are passed over by their length.
+    assert size_of(b"\xff\xd8" + frame + last) == ((8, 9) if marker in FRAMES else (6, 7))
+
+
+@pytest.mark.parametrize(
+    "plain", [b"\xff\x01", b"\xff", b"\xff\xff\xff", *(bytes((0xFF, each)) for each in range(0xD0, 0xD9))]
+)
+def test_markers_without_a_length_are_passed_over(plain: bytes) -> None:
+    assert size_of(b"\xff\xd8" + plain + b"\xff\xc0\0\x11\x08\0\x09\0\x08") == (8, 9)
+
+
+@pytest.mark.parametrize("marker", [0x02, 0xD9, 0xDA, 0xE0, 0xFE])
+def test_markers_with_a_length_are_passed_over_by_it(marker: int) -> None:
+    head = b"\xff\xd8" + bytes((0xFF, marker)) + b"\0\x05abc"
+    assert size_of(head + b"\xff\xc0\0\x11\x08\0\x09\0\x08") == (8, 9)
+
+
+@pytest.mark.parametrize("count", [9_999, 10_000])
+def test_markers_before_the_size_are_limited(count: int) -> None:
+    data = b"\xff\xd8" + b"\xff\x01" * count + b"\xff\xc0\0\x11\x08\0\x09\0\x08"
+    assert size_of(data) == ((8, 9) if count < 10_000 else None)
+
+
+def test_shortest_heads_have_a_size() -> None:
+    extended = b"RIFF\0\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0" + b"\x04\0\0" + b"\x09\0\0"
+    assert len(extended) == 30
+    assert size_of(extended) == (5, 10)
+    assert size_of(extended[:-1]) is None
+    # The entries of a TIFF need not be in front.
+    entries = struct.pack("<HHHIIHHII", 2, 256, 4, 1, 70_000, 257, 4, 1, 5)
+    assert size_of(b"II*\0" + struct.pack("<I", 100) + bytes(92) + entries) == (70_000, 5)
