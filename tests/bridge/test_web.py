@@ -552,11 +552,13 @@ EMPTY_FRAMES = {
 }
 
 
-def connected(limits: Limits, seconds_of_frame: float) -> tuple[Turns, Connection, Mock]:
+def connected(
+    limits: Limits, seconds_of_frame: float, grant: Grant = Grant.READ
+) -> tuple[Turns, Connection, Mock]:
     """Return a loop, a connection after its handshake, and its pipe; each frame takes some seconds of the loop's clock."""
     loop, pipe = Turns(), Mock(is_full=False, unsent=0, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
-    site.check.return_value = Grant.READ
+    site.check.return_value = grant
     site.admit.return_value = None
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"
@@ -607,6 +609,17 @@ def test_frames_of_any_kind_count_toward_the_rate(kind: str) -> None:
     connection._go_on()
     assert loop.frames == 10_000
     pipe.resume.assert_called()
+
+
+@pytest.mark.parametrize(("grant", "weight"), [(Grant.READ, 1.0), (Grant.WRITE, 4.0), (Grant.OWN, 64.0)])
+def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
+    grant: Grant, weight: float
+) -> None:
+    _, connection, _ = connected(Limits(), 0.0, grant)
+    assert connection._turn.weight == weight
+    connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
+    connection.received(bytes(100))
+    assert connection.is_open is (grant is not Grant.READ)
 
 
 def test_client_that_reads_at_once_is_sent_to_in_turns() -> None:

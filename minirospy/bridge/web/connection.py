@@ -11,7 +11,7 @@ import asyncio
 import http
 import logging
 import time
-from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -20,8 +20,6 @@ from websockets.exceptions import NegotiationError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 from websockets.protocol import State
-from websockets.server import ServerProtocol
-from websockets.streams import StreamReader
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
 from minirospy.bridge.json_text import size_in_memory
@@ -40,6 +38,7 @@ from minirospy.bridge.web.client import (
     response_head,
 )
 from minirospy.bridge.web.files import FileAnswer, FileSender
+from minirospy.bridge.web.frames import FrameByFrame
 from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.escape import escaped
@@ -101,7 +100,7 @@ class Connection:
         self._site = site
         self._pipe = pipe
         self._loop = loop
-        self._protocol = _FrameByFrame(
+        self._protocol = FrameByFrame(
             select_subprotocol=lambda _, offered: self._select(offered),
             max_size=site.limits.message,
             logger=_QUIET,
@@ -596,61 +595,6 @@ class Connection:
     def _abort(self) -> None:
         self._is_closing = True
         self._pipe.close(flush=False)
-
-
-class _FrameByFrame(ServerProtocol):
-    """The library's protocol, which parses all that has come in one call, made to stop after each frame."""
-
-    reader: _GatedReader
-
-    def feed(self, data: bytes) -> None:
-        """Add bytes that were received."""
-        self.reader.feed_data(data)
-
-    def next_request(self) -> Request | None:
-        """Return the request, once it has come whole; else None, and ``handshake_exc`` is set if it is not one."""
-        next(self.parser)
-        events = self.events_received()
-        return events[0] if events and isinstance(events[0], Request) else None
-
-    def next_frame(self) -> Frame | None:
-        """Return the next frame that has come whole, None if there is none."""
-        self.reader.is_open = True
-        next(self.parser)
-        event = self.events.pop() if self.events else None
-        return event if isinstance(event, Frame) else None
-
-    def limit(self, size: int) -> None:
-        """Refuse larger messages from now on."""
-        # The name of the attribute depends on the library's release.
-        for name in ("max_message_size", "max_size"):
-            if hasattr(self, name):
-                setattr(self, name, size)
-
-    def parse(self) -> Generator[None]:
-        """See the library's: called once, before anything is read."""
-        self.reader = _GatedReader()
-        yield from super().parse()
-
-    def recv_frame(self, frame: Frame) -> None:
-        """Take over a frame, and stop; pings are answered by the connection."""
-        if frame.opcode is Opcode.PING:
-            self.events.append(frame)
-        else:
-            super().recv_frame(frame)
-        self.reader.is_open = False
-
-
-class _GatedReader(StreamReader):
-    """Stops the parser before each frame while it is not open."""
-
-    is_open = False
-
-    def at_eof(self) -> Generator[None, None, bool]:
-        """See the library's: called by the parser before each frame. The end of the stream is the pipe's."""
-        while not (self.is_open and self.buffer):
-            yield
-        return False
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
