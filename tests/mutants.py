@@ -69,6 +69,35 @@ ROOMS = {
         ],
         ["roscore"],
     ),
+    "clients": Room(
+        [
+            "bridge/access.py",
+            "bridge/foxglove/parsing.py",
+            "bridge/json_text.py",
+            "bridge/rosbridge/protocol.py",
+            "bridge/tokens.py",
+            "bridge/web/account.py",
+            "bridge/web/admission.py",
+            "bridge/web/queue.py",
+            "bridge/web/rate.py",
+            "dashboard/codes.py",
+            "images/sizes.py",
+        ],
+        [
+            "tests/bridge/test_access.py",
+            "tests/bridge/test_account.py",
+            "tests/bridge/test_admission.py",
+            "tests/bridge/test_connection_rate.py",
+            "tests/bridge/test_foxglove_protocol.py",
+            "tests/bridge/test_json_text.py",
+            "tests/bridge/test_rosbridge_protocol.py",
+            "tests/bridge/test_send_queue.py",
+            "tests/bridge/test_served_files.py",
+            "tests/bridge/test_tokens.py",
+            "tests/dashboard/test_codes.py",
+            "tests/images/test_sizes.py",
+        ],
+    ),
 }
 
 _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
@@ -424,7 +453,7 @@ class Mutants:
         for name in self._trees:
             importlib.import_module(f"minirospy.{name}")
         for each in gc.get_objects():
-            if isinstance(each, FunctionType) and each.__code__.co_filename in self._files:
+            if type(each) is FunctionType and each.__code__.co_filename in self._files:
                 code = each.__code__
                 found[self._files[code.co_filename]][code.co_firstlineno, code.co_name].append(each)
         return found

@@ -32,8 +32,8 @@ _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
 
 
-_LONG_TEXT = 100
-"""Characters from which the size of a text shows the width of its characters."""
+_HEAD_SIZE = sys.getsizeof("\u0100") - 2 * 2
+"""Bytes of a str that is not ASCII, without its characters and the one behind them."""
 
 _BEYOND_LATIN = re.compile(rb"[\xc4-\xff]")
 _BEYOND_BMP = re.compile(rb"[\xf0-\xff]")
@@ -54,13 +54,9 @@ def width_of(text: str) -> int:
     """Return the bytes that each character of a text takes in memory: 1, 2 or 4."""
     if text.isascii():
         return 1
-    if len(text) >= _LONG_TEXT:
-        # Without the head of a str; a cached copy in UTF-8 makes it too large at most.
-        found = round((sys.getsizeof(text) - 76) / len(text))
-    else:
-        highest = ord(max(text))
-        found = 4 if highest > 0xFFFF else 2 if highest > 0xFF else 1
-    return 1 if found <= 1 else 2 if found == 2 else 4
+    # A copy in UTF-8 that Python keeps with a text makes this too large at most.
+    found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
+    return found if found <= 2 else 4
 
 
 def is_quick_text(text: str) -> bool:

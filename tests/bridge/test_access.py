@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.bridge.access import Access, Credentials, Grant, NameFilter, Refusal
+from minirospy.bridge.access import (
+    Access,
+    Credentials,
+    Grant,
+    NameFilter,
+    Refusal,
+    header_items,
+    is_loopback,
+    is_token,
+    new_token,
+    without_token,
+)
 from minirospy.errors import BridgeError
 
 WRITE, READ = "write-token-0001", "read-token-00001"
@@ -30,7 +41,15 @@ def request(
         "http://127.0.0.1:8080",
         "http://[::1]:8080",
         "https://app.foxglove.dev",
+        "https://studio.foxglove.dev",
+        "https://lichtblick-suite.github.io",
         "file://",
+        "lichtblick://x",
+        "foxglove://x",
+        "app://x",
+        "vscode-webview://x",
+        "HTTP://LOCALHOST:1",
+        "http://page.localhost",
     ],
 )
 def test_loopback_accepts_programs_front_ends_and_own_pages(origin: str | None) -> None:
@@ -45,6 +64,9 @@ def test_loopback_accepts_programs_front_ends_and_own_pages(origin: str | None) 
         "",
         "http://localhost.evil.example",
         "https://app.foxglove.dev.evil.example",
+        "ftp://localhost",
+        "http://",
+        "lichtblickx://",
     ],
 )
 def test_pages_of_foreign_sites_are_refused(origin: str) -> None:
@@ -52,6 +74,75 @@ def test_pages_of_foreign_sites_are_refused(origin: str) -> None:
     assert isinstance(refusal, Refusal)
     assert refusal.status == 403
     assert "--origin" in refusal.text
+
+
+@pytest.mark.parametrize("scheme", ["http", "https"])
+def test_page_of_the_server_itself_is_accepted(scheme: str) -> None:
+    access = Access(hosts=("robot",))
+    assert access.check(request("Robot:1", origin=f"{scheme}://robot:1")) is Grant.WRITE
+    assert isinstance(access.check(request("robot:1", origin=f"{scheme}://robot:2")), Refusal)
+    assert access.check(request("page.localhost:1", origin=f"{scheme}://page.localhost:1")) is Grant.WRITE
+
+
+def test_refusals_name_the_reason_in_one_line() -> None:
+    assert Access().check(request(origin="https://" + "x" * 200)) == Refusal(
+        403, f"pages of 'https://{'x' * 92}' may not connect: start the bridge with --origin PATTERN"
+    )
+    assert Access().check(request("y" * 200)) == Refusal(
+        403,
+        f"Host '{'y' * 100}' is not a name of this server: use its address, or start the bridge with --host-name NAME",
+    )
+    assert GUARDED.check(request()) == Refusal(
+        401, "a token is required: the bridge prints it when it starts"
+    )
+    assert GUARDED.check(request(bearer="wrong-token-000")) == Refusal(
+        401, "this token is wrong: the bridge prints the right one when it starts"
+    )
+
+
+@pytest.mark.parametrize("tokens", [{"read_token": READ}, {"write_token": WRITE}])
+def test_token_that_is_not_required_may_be_absent_but_not_wrong(tokens: dict[str, str]) -> None:
+    access = Access(**tokens)
+    assert access.check(request()) is Grant.WRITE
+    assert isinstance(access.check(request(bearer="wrong-token-000")), Refusal)
+    required = Access(**tokens, requires_token=True)
+    assert isinstance(required.check(request()), Refusal)
+    assert Access().check(request(bearer="any-token-00000")) is Grant.WRITE
+
+
+def test_query_has_fifty_fields_at_most() -> None:
+    fields = "&".join(f"a{number}=1" for number in range(49))
+    assert GUARDED.check(request(target=f"/?{fields}&token={WRITE}")) is Grant.OWN
+    with pytest.raises(ValueError, match="Max number of fields"):
+        GUARDED.check(request(target=f"/?{fields}&b=1&token={WRITE}"))
+
+
+def test_loopback_is_known_by_name_and_address() -> None:
+    for host in ("localhost", "page.localhost", "127.0.0.1", "127.9.9.9", "::1"):
+        assert is_loopback(host) is True
+    for host in ("", "robot", "localhost.evil.example", "192.168.1.5", "::2", "0.0.0.0"):
+        assert is_loopback(host) is False
+
+
+def test_tokens_are_random_and_have_their_form() -> None:
+    made = {new_token() for _ in range(100)}
+    assert len(made) == 100
+    # 128 bits in base64.
+    assert {len(each) for each in made} == {22}
+    for token in (*made, "a" * 8, "_-" * 100):
+        assert is_token(token) is True
+    for wrong in ("", "a" * 7, "a" * 201, "with blanks", "ümlauts-xx", None, 12345678, b"a" * 8):
+        assert is_token(wrong) is False
+
+
+def test_paths_for_logs_have_no_query() -> None:
+    assert without_token("/a%20b?token=secret#x") == "/a b"
+    assert len(without_token("/" + "a" * 300)) == 200
+
+
+def test_list_in_a_header_has_its_items() -> None:
+    assert header_items({"x": "a, b ,,c"}, "x") == ["a", "b", "c"]
+    assert header_items({}, "x") == []
 
 
 def test_configured_origins_are_accepted() -> None:
@@ -119,7 +210,8 @@ def test_name_filter_allows_and_denies_by_globs() -> None:
     names = NameFilter.of(["/camera/*", "/tf*"], ["*/compressed"])
     allowed = [name for name in ("/camera/a/raw", "/camera/compressed", "/tf_static", "/odom") if names(name)]
     assert allowed == ["/camera/a/raw", "/tf_static"]
-    assert NameFilter.of()("/anything")
+    assert NameFilter.of()("/anything") is True
+    assert names("/odom") is names("/camera/compressed") is False
 
 
 def test_whitelists_are_expressions_for_the_whole_name() -> None:

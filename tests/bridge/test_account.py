@@ -162,3 +162,49 @@ def test_account_is_the_sum_of_what_waits(steps: list[tuple[int, str, int]]) -> 
         assert account.total == sum({id(piece): len(piece) for piece in waiting}.values())
         assert sum(each.large for each in queues) == sum(map(len, waiting))
         assert [share.large for share in shares] == [each.large for each in queues]
+
+
+def test_limits_are_those_that_are_documented() -> None:
+    assert Account().limit == 160_000_000
+    assert LARGE_PIECE == 32_768
+
+
+def test_closed_client_is_not_chosen() -> None:
+    account = Account(limit=100)
+    gone, other = Holder(account), Holder(account)
+    gone.share.set(50)
+    account.close(gone.share)
+    gone.share.large = 200
+    other.share.set(101)
+    assert (gone.sheds, other.sheds) == (0, 1)
+
+
+def test_shedding_does_not_choose_again_within_itself() -> None:
+    account = Account(limit=100)
+    order: list[str] = []
+    first, second = (account.open("a", lambda: None) for _ in range(2))
+
+    def shed_first() -> None:
+        order.append("first starts")
+        # An answer to the client, such as the reason, counts while the account is over its limit.
+        first.set(first.size + 1)
+        order.append("first ends")
+        first.set(0)
+
+    def shed_second() -> None:
+        order.append("second")
+        second.set(0)
+
+    first.shed, second.shed = shed_first, shed_second
+    second.set(60)
+    first.set(70)
+    assert order == ["first starts", "first ends"]
+    assert account.total == 60
+    first.set(70)
+    assert order == ["first starts", "first ends"] * 2
+    assert not account._holders
+    piece = bytes(LARGE_PIECE)
+    account.hold((piece, piece))
+    assert list(account._holders.values()) == [2]
+    account.release((piece, piece))
+    assert not account._holders

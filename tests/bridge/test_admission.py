@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import pytest
 
 from minirospy.bridge.access import Grant
-from minirospy.bridge.web.admission import IDLE_SECONDS, MAX_SILENT, SILENT_SECONDS, Rank, displaced, rank_of
+from minirospy.bridge.web.admission import (
+    FEW,
+    IDLE_SECONDS,
+    MAX_SILENT,
+    SILENT_SECONDS,
+    Rank,
+    displaced,
+    rank_of,
+)
 
 NOW = 1000.0
 
@@ -110,3 +118,19 @@ def test_owner_takes_the_place_of_any_stranger() -> None:
     assert choose([other, owner], rank=Rank.OWN) is other
     assert choose([Seat("a", Rank.SILENT, 0.0), owner], rank=Rank.OWN) == Seat("a", Rank.SILENT, 0.0)
     assert choose([owner], rank=Rank.OWN) is None
+
+
+def test_limits_are_those_that_are_documented() -> None:
+    assert (SILENT_SECONDS, MAX_SILENT, IDLE_SECONDS, FEW) == (5.0, 16, 30.0, 8)
+
+
+def test_client_is_idle_after_exactly_that_time() -> None:
+    idle = Seat("a", Rank.WRITE, IDLE_SECONDS)
+    others = [Seat(f"b{number}", Rank.WRITE, 0.0) for number in range(20)]
+    assert choose([*others, idle]) is idle
+
+
+def test_silent_connection_is_not_taken_for_an_idle_client() -> None:
+    silent = [Seat("a", Rank.SILENT, SILENT_SECONDS - 1) for _ in range(9)]
+    others = [Seat(f"b{number}", Rank.WRITE, 0.0) for number in range(7)]
+    assert choose([*silent, *others]) is None

@@ -270,25 +270,6 @@ def test_node_beyond_loopback_takes_the_users_tokens(monkeypatch: pytest.MonkeyP
     assert (given.access.read_token, given.access.write_token) == ("look-only-token", "")
 
 
-def test_tokens_are_kept_private_and_renewed(tmp_path: Path) -> None:
-    first = kept_tokens(tmp_path)
-    assert kept_tokens(tmp_path) == first
-    (file,) = tmp_path.iterdir()
-    if sys.platform != "win32":
-        assert file.stat().st_mode & 0o077 == 0
-        # Others may have read it, or it may be theirs.
-        file.chmod(0o644)
-        assert read_tokens(tmp_path) is None
-        first = kept_tokens(tmp_path)
-        assert file.stat().st_mode & 0o077 == 0
-    assert kept_tokens(tmp_path, renews=True) != first
-    for text in ("nonsense", "[]", "{}", '{"write": "", "read": ""}', '{"write": null, "read": "abcdefgh"}'):
-        file.write_text(text)
-        file.chmod(0o600)
-        assert read_tokens(tmp_path) is None
-    assert kept_tokens(tmp_path) == read_tokens(tmp_path)
-
-
 @pytest.mark.parametrize("words", [("--token", "right-token-000"), ()])
 def test_links_with_a_token_do_not_name_localhost(
     words: tuple[str, ...], start: Start, monkeypatch: pytest.MonkeyPatch

@@ -218,3 +218,30 @@ def test_a_master_that_registers_nothing_is_one_line(
     assert [record.getMessage().partition(" with ")[0] for record in found] in (
         [[f"unable to register publication [/robot1/t{number}]"] for number in range(30)]
     )
+
+
+def test_tokens_that_are_oversized_or_malformed_are_left_out_in_one_line(
+    fleet: Fleet, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot, control = fleet.place(), fleet.place()
+    importer = control_room(fleet, control)
+    publisher(fleet, robot, "/chat", String)
+    head = f"{ROOT}/topic/liar/{LIAR.gateway}"
+    with stranger(fleet) as session:
+        keys = [
+            f"{head}/%{'x' * 50_000}/std_msgs%String/{String._md5sum}/p",
+            f"{head}/%x/{'y' * 50_000}%String/{String._md5sum}/p",
+            f"{head}/%x/std_msgs%String/{'0' * 50_000}/p",
+            f"{head}/%x/std_msgs%String/{String._md5sum}/{'p' * 50_000}",
+            f"{ROOT}/robot/{'r' * 50_000}/{LIAR.gateway}/1/{LIAR.host}",
+            f"{ROOT}/robot/liar/{LIAR.gateway}/{'1' * 50_000}/{LIAR.host}",
+            f"{ROOT}/robot/liar" + "/x" * 2_000,
+            f"{ROOT}/robot",
+        ]
+        kept = [fleet.call(lambda key=key: session.declare_token(key)) for key in keys]
+        robot.gateway("robot1")
+        fleet.until_shown(control, "/robot1/chat")
+        fleet.until(lambda: importer.contents.refused >= len(keys) - 1)
+        assert kept
+    assert list(importer.robots) == ["robot1"]
+    assert len(lines(caplog, "what a gateway announces is not shown")) == 1

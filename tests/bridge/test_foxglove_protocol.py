@@ -204,6 +204,20 @@ REFUSED_TEXTS = [
         '{"op": "setParameters", "parameters": [{"name": "/a", "value": "%", "type": "byte_array"}]}',
         "the value of '/a' is not of type byte_array",
     ),
+    (
+        '{"op": "setParameters", "parameters": [{"name": "/a", "value": "x", "type": "float64"}]}',
+        "the value of '/a' is not of type float64",
+    ),
+    (
+        '{"op": "setParameters", "parameters": [{"name": "/a", "value": ["x"], "type": "float64_array"}]}',
+        "the value of '/a' is not of type float64_array",
+    ),
+    (
+        '{"op": "advertise", "channels": [{"id": 1, "topic": "foo", "encoding": "ros1"}]}',
+        "'schemaName' is not a string",
+    ),
+    ('{"op": "unadvertise", "channelIds": [-1]}', "'channelIds' is not a number from 0 to 4294967295"),
+    ('{"op": "unadvertise", "channelIds": [4294967296]}', "'channelIds' is not a number from 0 to"),
     ('{"op": "fetchAsset", "uri": "x"}', "'requestId' is not a number"),
 ]
 
@@ -217,6 +231,8 @@ REFUSED_BINARIES = [
     (struct.pack("<BBfBQI", 3, 7, 1.0, 0, 0, 0), "unknown playback command 7"),
     (struct.pack("<BBfBQI", 3, 0, float("nan"), 0, 0, 0), "a playback speed of nan"),
     (struct.pack("<BBfBQI", 3, 0, -1.0, 0, 0, 0), "a playback speed of -1.0"),
+    (struct.pack("<BBfBQI", 3, 0, 0.0, 0, 0, 0), "a playback speed of 0.0"),
+    (struct.pack("<BBfBQI", 3, 0, float("inf"), 0, 0, 0), "a playback speed of inf"),
 ]
 
 
@@ -324,3 +340,31 @@ def test_any_json_is_parsed_or_refused(op: str, fields: dict[str, object]) -> No
         parsing.parse_text(json.dumps({**fields, "op": op}))
     except BridgeProtocolError as error:
         assert str(error).startswith(op)  # noqa: PT017 one of the two outcomes
+
+
+def test_numbers_texts_and_schemas_are_those_of_the_message() -> None:
+    parameters = [
+        {"name": "/a", "value": 3, "type": "float64"},
+        {"name": "/b", "value": [1, 2], "type": "float64_array"},
+    ]
+    found = parsing.parse_text(json.dumps({"op": "setParameters", "parameters": parameters}))
+    assert isinstance(found, SetParameters)
+    values = [each.value for each in found.parameters]
+    assert values == [3.0, [1.0, 2.0]]
+    assert isinstance(values[0], float)
+    assert all(isinstance(each, float) for each in values[1])  # type: ignore[attr-defined]
+
+    channel = {"id": 0, "topic": "/a", "encoding": "ros1", "schemaName": "a/B", "schema": "int8 x"}
+    advertised = parsing.parse_text(json.dumps({"op": "advertise", "channels": [channel]}))
+    assert isinstance(advertised, ClientAdvertise)
+    assert advertised.channels[0].schema == Schema("a/B", "int8 x")
+
+
+@pytest.mark.parametrize("count", [100_000, 100_001])
+def test_entries_of_an_array_are_limited(count: int) -> None:
+    text = json.dumps({"op": "unadvertise", "channelIds": [(1 << 32) - 1] * count})
+    if count == 100_000:
+        assert parsing.parse_text(text) == ClientUnadvertise(((1 << 32) - 1,) * count)
+        return
+    with pytest.raises(BridgeProtocolError, match="'channelIds' has 100001 entries, 100000 are allowed"):
+        parsing.parse_text(text)

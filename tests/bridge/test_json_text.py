@@ -150,3 +150,29 @@ def test_one_wide_character_makes_a_text_four_times_as_large() -> None:
     data += WIDE.encode()
     assert size_in_memory(data) == size_in_memory(bytearray(data)) == 4 * 100_001
     assert sys.getsizeof(data.decode()) > 400_000
+
+
+@pytest.mark.parametrize(
+    ("mark", "most", "what"),
+    [(",", 8_000_000, "values"), ("[", 1_000_000, "values"), ("{", 1_000_000, "values")],
+)
+def test_values_lists_and_objects_are_limited(mark: str, most: int, what: str) -> None:
+    """Marks within strings count, too: such a text is quickly parsed."""
+    text = f'"{mark * most}"'
+    assert load_json(text) == mark * most
+    with pytest.raises(ValueError, match=f"more than {most} {what}"):
+        load_json(f'"{mark * (most + 1)}"')
+
+
+def test_lists_and_objects_count_together() -> None:
+    text = '"' + "[" * 600_000 + "{" * 400_000
+    assert load_json(f'{text}"')
+    with pytest.raises(ValueError, match="more than 1000000 values"):
+        load_json(f'{text}{{"')
+
+
+def test_short_texts_and_bytes_are_only_parsed() -> None:
+    assert load_json('{"a": [1, 2.5, null]}') == {"a": [1, 2.5, None]}
+    assert load_json(b"[]") == []
+    with pytest.raises(ValueError, match="Expecting value"):
+        load_json("")

@@ -191,6 +191,15 @@ def test_server_messages_are_those_of_the_document() -> None:
             "set_level: Invalid status level loud; must be one of info, warning",
         ),
         ({"op": ["x"]}, "Unknown operation: ['x']"),
+        ({"op": "fragment", "id": "f", "data": "x", "num": -1, "total": 2}, "received invalid fragment!"),
+        ({"op": "fragment", "id": "f", "data": 3, "num": 0, "total": 2}, "received invalid fragment!"),
+        ({"op": "fragment", "data": "x", "num": 0, "total": 2}, "received invalid fragment!"),
+        ({"op": "fragment", "id": "f", "data": "x", "num": True, "total": 2}, "received invalid fragment!"),
+        ({"op": "fragment", "id": "f", "data": "x", "num": 0, "total": 2.0}, "received invalid fragment!"),
+        (
+            {"op": "png", "data": png.encode(json.dumps({"op": "png", "data": png.encode("{}")}))},
+            "png: a PNG in a PNG",
+        ),
         ({"op": "subscribe", "topic": "/x", "id": "i" * 1001}, "an id has 1000 characters at most"),
     ],
 )
@@ -497,6 +506,53 @@ def test_one_wide_character_in_fragments_does_not_make_a_message_four_times_as_l
     joined = waiting.add(protocol.Fragment("i", "x" * 8_000_000, 1, 2), 0.0)
     assert joined
     assert len(joined) == 16_000_000
+
+
+def test_operations_without_op_show_the_message() -> None:
+    allowed = list(protocol.OPERATIONS)
+    assert refused(topic="/x") == (
+        "Received a message without an op.  All messages require 'op' field with value one of: "
+        f"{allowed}.  Original message was: {{'topic': '/x'}}"
+    )
+    assert refused(receiver="/x") == (
+        "Received a rosbridge v1.0 message.  Please refer to rosbridge.org for the correct format of rosbridge "
+        "v2.0 messages.  Original message was: {'receiver': '/x'}"
+    )
+    assert refused(op="x" * 300) == f"Unknown operation: {'x' * 200}.  Allowed operations: {allowed}"
+
+
+def test_malformed_messages_are_shown() -> None:
+    for data, shown in (("x" * 300, "x" * 200), ("3", "3"), (b"\x81\x01", "[1]")):
+        with pytest.raises(OperationError) as caught:
+            protocol.decode(data)
+        assert str(caught.value) == f"Unable to deserialize message from client: {shown}"
+    with pytest.raises(OperationError, match=r"client: 2 bytes of CBOR \(.+\)$"):
+        protocol.decode(b"\xa1\x61")
+
+
+def test_messages_are_encoded_as_the_client_wants() -> None:
+    fields = {"op": "status", "n": [1, 2]}
+    text = '{"op":"status","n":[1,2]}'
+    assert protocol.encode(fields) == protocol.encode(fields, "none") == text
+    for compression in ("cbor", "cbor-raw"):
+        assert cbor2.loads(protocol.encode(fields, compression)) == fields  # type: ignore[arg-type]
+    packed = protocol.encode(fields, "png")
+    assert isinstance(packed, str)
+    assert packed == json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+    with pytest.raises(ValueError, match="Out of range float"):
+        protocol.encode({"n": math.nan})
+
+
+def test_smallest_fragments_and_ids_of_calls() -> None:
+    found = protocol.parse({"op": "subscribe", "topic": "/x", "fragment_size": 1})
+    assert isinstance(found, Subscribe)
+    assert found.fragment_size == 1
+    call = protocol.parse({"op": "call_service", "service": "/a#old", "id": "new"})
+    assert isinstance(call, protocol.CallService)
+    assert (call.id, call.service) == ("new", "/a")
+    assert protocol.parse({"op": "call_service", "service": "/a"}).id is None
+    assert protocol.fragments("12345", 5, "i") == ["12345"]
+    assert len(protocol.fragments("123456", 5, "i")) == 2
 
 
 def test_fragments_of_one_character_are_not_a_message_for_each() -> None:

@@ -7,7 +7,8 @@ import tracemalloc
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.bridge.web.queue import MOST_ANSWERS, SendQueue
+from minirospy.bridge.web.account import LARGE_PIECE, Account
+from minirospy.bridge.web.queue import DEFAULT_LIMIT, ENTRY_BYTES, MOST_ANSWERS, SendQueue
 
 LIMIT = 1_000_000
 """Bytes of a queue that a test fills."""
@@ -139,3 +140,31 @@ def test_cleared_queue_holds_nothing() -> None:
     queue.put("a", (b"12",))
     assert queue.pop() == (b"12",)
     assert queue.pop() is None
+
+
+def test_limits_are_those_that_are_documented() -> None:
+    assert (DEFAULT_LIMIT, MOST_ANSWERS, ENTRY_BYTES) == (10_000_000, 64_000_000, 350)
+
+
+def test_messages_may_fill_the_bound_exactly() -> None:
+    queue = SendQueue(limit=10, entry_bytes=2)
+    queue.put("a", (b"123",))
+    queue.put("b", (b"456",))
+    assert (queue.size, queue.dropped) == (10, 0)
+    queue.put("b", (b"789",))
+    assert (queue.size, queue.dropped) == (10, 1)
+    assert drained(queue) == [b"123", b"789"]
+
+
+def test_piece_is_large_from_exactly_that_size() -> None:
+    account = Account()
+    queue = SendQueue(entry_bytes=0, share=account.open("a", lambda: None))
+    queue.put("a", (bytes(LARGE_PIECE),))
+    queue.put_answer((bytes(LARGE_PIECE),))
+    assert (queue.large, account.total) == (2 * LARGE_PIECE, 2 * LARGE_PIECE)
+    queue.put("a", (bytes(LARGE_PIECE),), newest_only=True)
+    assert account.total == 2 * LARGE_PIECE
+    assert queue.pop() == (bytes(LARGE_PIECE),)
+    assert (queue.large, account.total) == (LARGE_PIECE, LARGE_PIECE)
+    queue.pop()
+    assert (queue.large, account.total) == (0, 0)

@@ -483,7 +483,6 @@ class RosbridgeSession:
         size = self._operation_size
         self._calls += 1
         self._calls_size += size
-        self.count()
 
         def ended(_: object) -> None:
             self._calls -= 1
@@ -491,6 +490,8 @@ class RosbridgeSession:
             self.count()
 
         self._spawn(self._call(event, is_large=self._is_large)).add_done_callback(ended)
+        # Last: if this is too much, it ends the client, and with it the call.
+        self.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:
         try:

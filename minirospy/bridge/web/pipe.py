@@ -24,7 +24,7 @@ _MOST_PIECES = 128
 
 
 class Endpoints(NamedTuple):
-    """The peer's port, and the address and port of this end; empty if the connection has ended."""
+    """The peer's port, and the address and port of this end; empty if it has ended, or is not one of TCP."""
 
     peer_port: int = 0
     address: str = ""
@@ -185,6 +185,8 @@ class PlainPipe:
 
 
 def _endpoints(sock: socket.socket) -> Endpoints:
+    if sock.family not in (socket.AF_INET, socket.AF_INET6):
+        return Endpoints()
     try:
         return Endpoints(sock.getpeername()[1], *sock.getsockname()[:2])
     except OSError:  # it has disconnected

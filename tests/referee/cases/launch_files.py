@@ -127,7 +127,8 @@ BODIES = [
 ]  # fmt: skip
 TEXTS = [
     "<launch>", "<lunch/>", "", "<launch><node", '<?xml version="1.0" encoding="ISO-8859-1"?><launch/>',
-    '<?xml version="1.0"?><!DOCTYPE launch [<!ENTITY a "entity">]><launch><param name="p" value="&a;"/></launch>',
+    '<?xml version="1.0"?><!DOCTYPE launch><launch><param name="p" value="&lt;a&#98;"/></launch>',
+    '<!DOCTYPE launch SYSTEM "no.dtd" [<!ELEMENT launch ANY>]><launch><param name="p" value="a"/></launch>',
     '<launch deprecated="old"><!-- c --><![CDATA[ x ]]>text</launch>',
 ]  # fmt: skip
 
