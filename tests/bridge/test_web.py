@@ -622,6 +622,48 @@ def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
     assert connection.is_open is (grant is not Grant.READ)
 
 
+def test_work_for_a_client_is_done_in_its_turn_and_bounded() -> None:
+    loop, connection, pipe = connected(Limits(queue=1000, messages_a_second=5), 0.0)
+    done: list[int] = []
+
+    def work(number: int) -> None:
+        done.append(number)
+        loop.now += 0.01
+
+    # The first one is done immediately, which uses up what may start so.
+    for number in range(8):
+        connection.in_turn(partial(work, number), 300)
+    assert done == [0]
+    assert connection.queue.dropped == 4
+    loop.iterate()
+    assert done == [0, 5]
+    # Also while the client has sent all that it may, and before what it has sent.
+    connection.received(EMPTY_FRAMES["pongs"])
+    for _ in range(3):
+        loop.iterate()
+    assert done == [0, 5, 6, 7]
+    loop.iterate()
+    assert loop.frames == 5
+    connection.in_turn(partial(work, 9), 300)
+    for _ in range(3):
+        loop.iterate()
+    assert done[-1] == 9
+    assert loop.frames == 5
+    pipe.close.assert_not_called()
+
+
+def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture) -> None:
+    loop, connection, _ = connected(Limits(), 0.0)
+
+    def fail() -> None:
+        raise ValueError("a fault")
+
+    connection.in_turn(fail, 1)
+    loop.iterate()
+    assert not connection.is_open
+    assert "a fault" in caplog.text
+
+
 def test_client_that_reads_at_once_is_sent_to_in_turns() -> None:
     loop, connection, pipe = connected(Limits(), 0.0)
     sent = 0

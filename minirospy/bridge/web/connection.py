@@ -11,6 +11,7 @@ import asyncio
 import http
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -66,6 +67,7 @@ _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
 _PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
 _PONG = 0x8A
+_MAX_JOBS = 1000  # of a client, each of which keeps a message that is not encoded yet
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 """Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
 
@@ -114,6 +116,10 @@ class Connection:
         # Its session works on what came before,
         self._worked_on = 0
         # a message of so many bytes.
+        self._jobs: deque[tuple[Callable[[], None], int]] = deque()
+        # Work for the client that is not about what it sent, and the bytes that each keeps.
+        self._jobs_size = 0
+        self._is_in_turn = False
         self._opcode = Opcode.BINARY
         self._is_scheduled = False
         self._is_closing = False
@@ -184,6 +190,7 @@ class Connection:
         self.session = self.exchange = None
         # The connection is part of reference cycles: what waited is freed now, not when they are collected.
         self.queue.clear()
+        self._jobs.clear()
         if self._file:
             self._file.close()
         self._wrote()
@@ -254,6 +261,21 @@ class Connection:
         if not self._is_over and not self._is_held_back:
             self._site.turns.start(self._turn)
 
+    def in_turn(self, work: Callable[[], None], size: int) -> None:
+        """Do some work for the client in its turn, immediately if that is now; ``size``: bytes that it keeps until then.
+
+        The oldest work is dropped where more waits than may be sent.
+        """
+        if self._is_in_turn:
+            work()
+            return
+        self._jobs.append((work, size))
+        self._jobs_size += size
+        while len(self._jobs) > 1 and (self._jobs_size > self._limits.queue or len(self._jobs) > _MAX_JOBS):
+            self._jobs_size -= self._jobs.popleft()[1]
+            self.queue.dropped += 1
+        self._site.turns.start(self._turn)
+
     def session_holds(self, count: int) -> None:
         """Count what the session keeps of the client."""
         self._held = count
@@ -278,6 +300,27 @@ class Connection:
     # --- within
 
     def _work(self, end: float) -> bool:
+        """Work for the client up to a time; return whether more is left."""
+        self._is_in_turn = True
+        try:
+            return self._do_jobs(end) or self._handle_frames(end)
+        finally:
+            self._is_in_turn = False
+
+    def _do_jobs(self, end: float) -> bool:
+        while self._jobs and not self._is_closing:
+            work, size = self._jobs.popleft()
+            self._jobs_size -= size
+            try:
+                work()
+            except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
+                _log.exception("a message for %s could not be sent", self.peer)
+                self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
+            if self._loop.time() >= end and not self._is_closing:
+                return bool(self._jobs or self._protocol.reader.buffer)
+        return False
+
+    def _handle_frames(self, end: float) -> bool:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
@@ -285,7 +328,7 @@ class Connection:
         now, most = time_of(), self._limits.messages_a_second
         if now - self._second >= 1.0:
             self._second, self._in_second = now, 0
-        while self.client and not self._is_closing and not self._is_paused:
+        while self.client and not (self._is_closing or self._is_paused or self._is_held_back):
             if self._in_second >= most:
                 self._hold_back(self._second + 1.0 - now)
                 break
