@@ -85,6 +85,7 @@ def attacks() -> dict[str, Attack]:
         + b'{"id":1,"channelId":999},' * 2500
         + b'{"id":1,"channelId":9}]}'
     )
+    tiny = b'{"op":"subscribe","topic":"/big","type":"std_msgs/String","fragment_size":1}'
     big_json = b"[" + b"[]," * 330_000 + b"0" + b",1" * 5_700_000 + b"]"
     return {
         "empty continuations": Attack(
@@ -104,6 +105,7 @@ def attacks() -> dict[str, Attack]:
         "CBOR of 250 kB": Attack("rosbridge", b"", frame(2, small_cbor)),
         "CBOR of 990 kB": Attack("rosbridge", b"", frame(2, cbor)),
         "rosbridge fragments": Attack("rosbridge", b"", _fragment()),
+        "tiny fragments": Attack("rosbridge", frame(1, tiny), b""),
         "half frames": Attack("page", b"\x81\xff" + struct.pack("!Q", 60_000_000) + MASK, bytes(1000)),
         "HTTP": Attack("page", b"", b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", is_http=True),
     }
@@ -163,10 +165,12 @@ def _send_all(attack: Attack, socks: list[socket.socket], end: float) -> None:
     while time.monotonic() < end and rests:
         for key, mask in selector.select(0.1):
             sock: Any = key.fileobj
+            if not rests[sock]:
+                selector.modify(sock, selectors.EVENT_READ)
             try:
                 if mask & selectors.EVENT_READ and not sock.recv(1 << 16):
                     raise OSError
-                if mask & selectors.EVENT_WRITE:
+                if mask & selectors.EVENT_WRITE and rests[sock]:
                     rest = rests[sock]
                     sent = sock.send(rest)
                     rests[sock] = rest[sent:] if sent < len(rest) else memoryview(attack.again)
@@ -214,9 +218,21 @@ async def serve() -> None:
             prefer_the_loop()
         listeners = dashboard.bridge.listeners
         ports = {"page": listeners["foxglove"].port, "rosbridge": listeners["rosbridge"].port}
+        publishing = asyncio.ensure_future(_publish_big(node))
         print(json.dumps({"ports": ports, "uri": node._node.uri}), flush=True)
         await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+        publishing.cancel()
         await dashboard.close()
+
+
+async def _publish_big(node: Any) -> None:
+    """Publish texts of 100 kB at 10 Hz, which clients may subscribe to."""
+    from std_msgs.msg import String
+
+    publisher = await node.advertise("/big", String, queue_size=10)
+    while True:
+        await publisher.publish(String("a" * 100_000))
+        await asyncio.sleep(0.1)
 
 
 # --- those that are measured

@@ -552,11 +552,13 @@ EMPTY_FRAMES = {
 }
 
 
-def connected(limits: Limits, seconds_of_frame: float) -> tuple[Turns, Connection, Mock]:
+def connected(
+    limits: Limits, seconds_of_frame: float, grant: Grant = Grant.READ
+) -> tuple[Turns, Connection, Mock]:
     """Return a loop, a connection after its handshake, and its pipe; each frame takes some seconds of the loop's clock."""
     loop, pipe = Turns(), Mock(is_full=False, unsent=0, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
-    site.check.return_value = Grant.READ
+    site.check.return_value = grant
     site.admit.return_value = None
     door = Mock()
     door.select.return_value = "foxglove.sdk.v1"
@@ -607,6 +609,59 @@ def test_frames_of_any_kind_count_toward_the_rate(kind: str) -> None:
     connection._go_on()
     assert loop.frames == 10_000
     pipe.resume.assert_called()
+
+
+@pytest.mark.parametrize(("grant", "weight"), [(Grant.READ, 1.0), (Grant.WRITE, 4.0), (Grant.OWN, 64.0)])
+def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
+    grant: Grant, weight: float
+) -> None:
+    _, connection, _ = connected(Limits(), 0.0, grant)
+    assert connection._turn.weight == weight
+    connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
+    connection.received(bytes(100))
+    assert connection.is_open is (grant is not Grant.READ)
+
+
+def test_work_for_a_client_is_done_in_its_turn_and_bounded() -> None:
+    loop, connection, pipe = connected(Limits(queue=1000, messages_a_second=5), 0.0)
+    done: list[int] = []
+
+    def work(number: int) -> None:
+        done.append(number)
+        loop.now += 0.01
+
+    # The first one is done immediately, which uses up what may start so.
+    for number in range(8):
+        connection.in_turn(partial(work, number), 300)
+    assert done == [0]
+    assert connection.queue.dropped == 4
+    loop.iterate()
+    assert done == [0, 5]
+    # Also while the client has sent all that it may, and before what it has sent.
+    connection.received(EMPTY_FRAMES["pongs"])
+    for _ in range(3):
+        loop.iterate()
+    assert done == [0, 5, 6, 7]
+    loop.iterate()
+    assert loop.frames == 5
+    connection.in_turn(partial(work, 9), 300)
+    for _ in range(3):
+        loop.iterate()
+    assert done[-1] == 9
+    assert loop.frames == 5
+    pipe.close.assert_not_called()
+
+
+def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture) -> None:
+    loop, connection, _ = connected(Limits(), 0.0)
+
+    def fail() -> None:
+        raise ValueError("a fault")
+
+    connection.in_turn(fail, 1)
+    loop.iterate()
+    assert not connection.is_open
+    assert "a fault" in caplog.text
 
 
 def test_client_that_reads_at_once_is_sent_to_in_turns() -> None:

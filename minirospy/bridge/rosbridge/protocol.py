@@ -51,7 +51,7 @@ Id = str | int | float | None
 Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
-_MOST_FRAGMENTS = 10_000
+_MOST_FRAGMENTS = 2_000
 """Of a message to a client: it may want fragments of one character, each of which is a message."""
 
 _LONGEST_ID = 1000

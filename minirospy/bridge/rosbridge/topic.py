@@ -34,6 +34,7 @@ class ClientTopic:
         self._pacer: Pacer[Arrival] = Pacer(session.room, lambda arrival: len(arrival.body))
         self._timer: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
+        self._is_closed = False
 
     @property
     def is_wanted(self) -> bool:
@@ -63,6 +64,7 @@ class ClientTopic:
 
     def close(self) -> None:
         """Unsubscribe."""
+        self._is_closed = True
         self._door.graph.unsubscribe(self._topic, self._arrived)
         self._door.forget_topic(self.name)
         self._session.client.discard(self.name)
@@ -96,6 +98,12 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
+        # Encoding a large message, and cutting it into fragments, takes milliseconds for each client.
+        self._session.client.in_turn(lambda: self._send_now(arrival), len(arrival.body))
+
+    def _send_now(self, arrival: Arrival) -> None:
+        if not self._subscriptions or self._is_closed:
+            return
         assert self._merged
         compression = self._merged.compression
         try:

@@ -11,7 +11,8 @@ import asyncio
 import http
 import logging
 import time
-from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -20,8 +21,6 @@ from websockets.exceptions import NegotiationError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 from websockets.protocol import State
-from websockets.server import ServerProtocol
-from websockets.streams import StreamReader
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
 from minirospy.bridge.json_text import size_in_memory
@@ -40,6 +39,7 @@ from minirospy.bridge.web.client import (
     response_head,
 )
 from minirospy.bridge.web.files import FileAnswer, FileSender
+from minirospy.bridge.web.frames import FrameByFrame
 from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.escape import escaped
@@ -67,6 +67,7 @@ _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
 _PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
 _PONG = 0x8A
+_MAX_JOBS = 1000  # of a client, each of which keeps a message that is not encoded yet
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 """Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
 
@@ -101,7 +102,7 @@ class Connection:
         self._site = site
         self._pipe = pipe
         self._loop = loop
-        self._protocol = _FrameByFrame(
+        self._protocol = FrameByFrame(
             select_subprotocol=lambda _, offered: self._select(offered),
             max_size=site.limits.message,
             logger=_QUIET,
@@ -115,6 +116,10 @@ class Connection:
         # Its session works on what came before,
         self._worked_on = 0
         # a message of so many bytes.
+        self._jobs: deque[tuple[Callable[[], None], int]] = deque()
+        # Work for the client that is not about what it sent, and the bytes that each keeps.
+        self._jobs_size = 0
+        self._is_in_turn = False
         self._opcode = Opcode.BINARY
         self._is_scheduled = False
         self._is_closing = False
@@ -185,6 +190,7 @@ class Connection:
         self.session = self.exchange = None
         # The connection is part of reference cycles: what waited is freed now, not when they are collected.
         self.queue.clear()
+        self._jobs.clear()
         if self._file:
             self._file.close()
         self._wrote()
@@ -255,6 +261,21 @@ class Connection:
         if not self._is_over and not self._is_held_back:
             self._site.turns.start(self._turn)
 
+    def in_turn(self, work: Callable[[], None], size: int) -> None:
+        """Do some work for the client in its turn, immediately if that is now; ``size``: bytes that it keeps until then.
+
+        The oldest work is dropped where more waits than may be sent.
+        """
+        if self._is_in_turn:
+            work()
+            return
+        self._jobs.append((work, size))
+        self._jobs_size += size
+        while len(self._jobs) > 1 and (self._jobs_size > self._limits.queue or len(self._jobs) > _MAX_JOBS):
+            self._jobs_size -= self._jobs.popleft()[1]
+            self.queue.dropped += 1
+        self._site.turns.start(self._turn)
+
     def session_holds(self, count: int) -> None:
         """Count what the session keeps of the client."""
         self._held = count
@@ -279,6 +300,27 @@ class Connection:
     # --- within
 
     def _work(self, end: float) -> bool:
+        """Work for the client up to a time; return whether more is left."""
+        self._is_in_turn = True
+        try:
+            return self._do_jobs(end) or self._handle_frames(end)
+        finally:
+            self._is_in_turn = False
+
+    def _do_jobs(self, end: float) -> bool:
+        while self._jobs and not self._is_closing:
+            work, size = self._jobs.popleft()
+            self._jobs_size -= size
+            try:
+                work()
+            except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
+                _log.exception("a message for %s could not be sent", self.peer)
+                self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
+            if self._loop.time() >= end and not self._is_closing:
+                return bool(self._jobs or self._protocol.reader.buffer)
+        return False
+
+    def _handle_frames(self, end: float) -> bool:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
@@ -286,7 +328,7 @@ class Connection:
         now, most = time_of(), self._limits.messages_a_second
         if now - self._second >= 1.0:
             self._second, self._in_second = now, 0
-        while self.client and not self._is_closing and not self._is_paused:
+        while self.client and not (self._is_closing or self._is_paused or self._is_held_back):
             if self._in_second >= most:
                 self._hold_back(self._second + 1.0 - now)
                 break
@@ -596,61 +638,6 @@ class Connection:
     def _abort(self) -> None:
         self._is_closing = True
         self._pipe.close(flush=False)
-
-
-class _FrameByFrame(ServerProtocol):
-    """The library's protocol, which parses all that has come in one call, made to stop after each frame."""
-
-    reader: _GatedReader
-
-    def feed(self, data: bytes) -> None:
-        """Add bytes that were received."""
-        self.reader.feed_data(data)
-
-    def next_request(self) -> Request | None:
-        """Return the request, once it has come whole; else None, and ``handshake_exc`` is set if it is not one."""
-        next(self.parser)
-        events = self.events_received()
-        return events[0] if events and isinstance(events[0], Request) else None
-
-    def next_frame(self) -> Frame | None:
-        """Return the next frame that has come whole, None if there is none."""
-        self.reader.is_open = True
-        next(self.parser)
-        event = self.events.pop() if self.events else None
-        return event if isinstance(event, Frame) else None
-
-    def limit(self, size: int) -> None:
-        """Refuse larger messages from now on."""
-        # The name of the attribute depends on the library's release.
-        for name in ("max_message_size", "max_size"):
-            if hasattr(self, name):
-                setattr(self, name, size)
-
-    def parse(self) -> Generator[None]:
-        """See the library's: called once, before anything is read."""
-        self.reader = _GatedReader()
-        yield from super().parse()
-
-    def recv_frame(self, frame: Frame) -> None:
-        """Take over a frame, and stop; pings are answered by the connection."""
-        if frame.opcode is Opcode.PING:
-            self.events.append(frame)
-        else:
-            super().recv_frame(frame)
-        self.reader.is_open = False
-
-
-class _GatedReader(StreamReader):
-    """Stops the parser before each frame while it is not open."""
-
-    is_open = False
-
-    def at_eof(self) -> Generator[None, None, bool]:
-        """See the library's: called by the parser before each frame. The end of the stream is the pipe's."""
-        while not (self.is_open and self.buffer):
-            yield
-        return False
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
