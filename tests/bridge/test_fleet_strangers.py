@@ -11,6 +11,8 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from minirospy.bridge.fleet.definitions import MAX_QUERIES_OF_GATEWAY, Definitions
+from minirospy.bridge.fleet.imported_topic import MAX_REGISTERING, ImportedTopic, Shared
+from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inquiry import fleet_status
 from minirospy.bridge.fleet.keys import (
     ROOT,
@@ -21,12 +23,16 @@ from minirospy.bridge.fleet.keys import (
     topic_key,
 )
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
+from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.errors import MasterUnreachableError
 from minirospy.idl.load import class_from_text
+from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.fleet import Fleet
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 from tests.bridge.test_fleet_hostile import stub
 from tests.bridge.test_fleet_names import control_room, lines, stranger
+from tests.manual_loop import ManualLoop, run_manually
+from tests.waiting import until
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
@@ -245,3 +251,58 @@ def test_tokens_that_are_oversized_or_malformed_are_left_out_in_one_line(
         assert kept
     assert list(importer.robots) == ["robot1"]
     assert len(lines(caplog, "what a gateway announces is not shown")) == 1
+
+
+def test_topics_are_registered_so_many_at_a_time() -> None:
+    async def check() -> None:
+        loop = asyncio.get_running_loop()
+        registrations: list[asyncio.Future[None]] = []
+
+        def advertise(*_: object, **__: object) -> Any:
+            registrations.append(loop.create_future())
+            return stub(_registration=registrations[-1], subscribers=())
+
+        async def interface(*_: object) -> Any:
+            return InterfaceType("std_msgs/String", String._md5sum)
+
+        shared: Any = Shared(
+            stub(name="/control", advertise=advertise),
+            *[stub(interface=interface)] * 9,
+        )
+        token = TopicToken("robot1", "0" * 16, "/t", "std_msgs/String", String._md5sum, True, False)
+        topics = [
+            ImportedTopic(shared, token._replace(topic=f"/t{n}"), lambda: None)
+            for n in range(3 * MAX_REGISTERING)
+        ]
+        tasks = [asyncio.ensure_future(topic._open()) for topic in topics]
+        await until(lambda: len(registrations) >= MAX_REGISTERING)
+        for _ in range(10):
+            await asyncio.sleep(0)
+        assert len(registrations) == MAX_REGISTERING
+        registrations[0].set_result(None)
+        await until(lambda: len(registrations) == MAX_REGISTERING + 1)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(asyncio.wait_for(check(), 60.0))
+
+
+def test_looks_pause_after_a_long_one_whatever_comes() -> None:
+    spawned: list[Any] = []
+
+    async def scene(loop: ManualLoop) -> None:
+        made = Importer(
+            stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), spawned.append, lambda: 0
+        )
+        made._not_before = loop.time() + 4.0
+        made._changed(claim_key(LIAR), True)
+        await loop.advance(3.9)
+        made._changed(claim_key(LIAR._replace(name="other")), True)
+        assert not spawned
+        await loop.advance(0.2)
+        assert len(spawned) == 1
+
+    run_manually(scene)
+    for work in spawned:
+        work.close()

@@ -48,6 +48,9 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MOST_MESSAGE = 256 << 20
 _MOST_OFFERS = 10
+MAX_REGISTERING = (
+    50  # topics that are registered at a time: each is a call of the master, on a connection of its own
+)
 
 
 @dataclass
@@ -65,6 +68,7 @@ class Shared:
     clock: Callable[[], int]
     left_out: RateLimitedLogger
     """Logs topics that cannot be shown."""
+    registering: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(MAX_REGISTERING))
     statics: dict[str, StaticTransforms] = field(default_factory=dict)
 
 
@@ -163,25 +167,35 @@ class ImportedTopic:
         shared, token = self._shared, self.token
         if token.is_published:
             interface = await shared.definitions.interface(token.type, token.md5sum, token.gateway)
+        async with shared.registering:
             if self._is_closed:
                 return
-            try:
-                self._publisher = shared.node.advertise(
-                    self.name,
-                    raw_class(interface),
-                    queue_size=_QUEUE,
-                    latch=token.is_latched,
-                    on_change=self._links_changed,
-                )
-            except ValueError as error:
-                shared.left_out.warning("%s is not shown: %s", self.name, error)
-                return
-            if token.is_latched and token.type in TF_TYPES:
-                made = StaticTransforms()
-                self._statics = shared.statics.setdefault(self.name, made) if self._is_global else made
-            self._links_changed()
-        elif token.is_subscribed:
-            self._subscribe()
+            if token.is_published:
+                self._advertise(interface)
+            elif token.is_subscribed:
+                self._subscribe()
+            # So many at a time: the master answers a thousand robots' eight thousand calls one by one.
+            handle = self._publisher or self._subscription
+            if handle is not None:
+                await asyncio.wait([handle._registration])
+
+    def _advertise(self, interface: InterfaceType) -> None:
+        shared, token = self._shared, self.token
+        try:
+            self._publisher = shared.node.advertise(
+                self.name,
+                raw_class(interface),
+                queue_size=_QUEUE,
+                latch=token.is_latched,
+                on_change=self._links_changed,
+            )
+        except ValueError as error:
+            shared.left_out.warning("%s is not shown: %s", self.name, error)
+            return
+        if token.is_latched and token.type in TF_TYPES:
+            made = StaticTransforms()
+            self._statics = shared.statics.setdefault(self.name, made) if self._is_global else made
+        self._links_changed()
 
     # --- from the robot
 

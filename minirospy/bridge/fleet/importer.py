@@ -99,6 +99,8 @@ class Importer:
         self._spawn = spawn
         self._clock = clock
         self._reconciling: asyncio.TimerHandle | None = None
+        self._not_before = 0.0
+        """When the next look may be, in seconds of the loop's clock."""
         self._is_reconciling = False
         self._is_full = False
         self._left_out = RateLimitedLogger(_log)
@@ -172,12 +174,13 @@ class Importer:
         if self._is_closed:
             return
         loop = asyncio.get_running_loop()
+        when = max(loop.time() + seconds, self._not_before)
         pending = self._reconciling
         if pending is not None:
-            if pending.when() <= loop.time() + seconds:
+            if pending.when() <= when:
                 return
             pending.cancel()
-        self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+        self._reconciling = loop.call_at(when, lambda: self._spawn(self._reconcile()))
 
     # --- the operator's choices
 
@@ -207,14 +210,17 @@ class Importer:
             await self._show(self.contents.robots(self._presence.lost))
         finally:
             self._is_reconciling = False
+        seconds = time.monotonic() - started
+        if seconds > _SETTLE_SECONDS:
+            # While a thousand robots come, the loop has other work, too.
+            self._not_before = asyncio.get_running_loop().time() + 2 * seconds
+            if self._reconciling is not None:
+                self._reconciling.cancel()
+                self._reconciling = None
+                self._soon(0.0)
         pause = self.contents.holders.pause({refused.claim.name for refused in self.contents.waiting})
         if pause is not None:
             self._soon(max(pause, _SETTLE_SECONDS))
-        if time.monotonic() - started > _SETTLE_SECONDS and self._reconciling is not None:
-            # While a thousand robots come, the loop has other work, too.
-            self._reconciling.cancel()
-            self._reconciling = None
-            self._soon(2 * (time.monotonic() - started))
 
     async def _show(self, robots: dict[str, Robot]) -> None:
         gone, left, joined = [], [], []
