@@ -21,7 +21,7 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 8_000_000
+_MAX_VALUES = 5_000_000  # of numbers: objects and text of them are some 300 MB
 _MAX_COLLECTIONS = 1_000_000
 MAX_QUICK_CHARACTERS = 64 * 1024  # of any text that is parsed immediately: 2 ms at most
 MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters of a text that has few values, such as an image in base64
