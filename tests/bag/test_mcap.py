@@ -418,3 +418,10 @@ def test_a_summary_that_names_a_chunk_twice_is_damaged() -> None:
     repair.apply()
     with pytest.raises(McapUnindexedError, match="its summary names a chunk twice"):
         McapReader(stream)
+
+
+def test_no_connections_have_no_messages() -> None:
+    reader = McapReader(made())
+    assert not list(reader.messages([]))
+    assert reader.index([]) == []
+    assert len(list(reader.messages())) == 5

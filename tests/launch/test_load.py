@@ -428,3 +428,9 @@ def test_command_without_end_is_stopped(packages: Packages, command: str) -> Non
 def test_file_without_end_is_refused(packages: Packages, tag: str) -> None:
     with pytest.raises(LaunchError, match=r"\[/dev/zero\]: it has more than \d+ bytes"):
         load(packages, tag)
+
+
+def test_yaml_with_a_control_character_is_one_line(packages: Packages) -> None:
+    with pytest.raises(LaunchError) as raised:
+        load(packages, '<param name="p" type="yaml" value="a: &#127;"/>')
+    assert "\n" not in str(raised.value)
