@@ -14,8 +14,8 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
 # What needs no process of its own, and the first messages and calls between nodes: under a minute on two cores.
 CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
   tests/runtime/master/test_master.py tests/runtime/node/test_topics.py tests/runtime/node/test_services.py \
-  tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
-  tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
+  tests/test_architecture.py tests/test_layers.py tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py \
+  tests/base/test_environment.py tests/base/test_escape.py tests/base/test_private_files.py tests/test_scanner.py
 
 .PHONY: demo check test interop ros2 ros2-core windows pythons lint guard bench fuzz mutants site release clean help
 
@@ -54,8 +54,8 @@ interop: $(STAMP)
 	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck or grammar" tests/workspace
 
 # The environment is kept in build/windows; tests that need no Unix run in there, too.
-WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/test_child_lifetime.py tests/test_signal_dispatch.py \
-  tests/test_names.py tests/test_times.py tests/test_clock.py tests/test_environment.py tests/test_open_files.py tests/gpio \
+WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/base/test_child_lifetime.py tests/base/test_signal_dispatch.py \
+  tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py tests/base/test_environment.py tests/base/test_open_files.py tests/gpio \
   tests/runtime/node/test_topics.py
 windows: $(STAMP)
 	@sh tests/windows/install_wine.sh

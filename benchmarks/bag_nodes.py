@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 from minirospy.bag.reader import open_bag
 from minirospy.bag.writer import BagWriter
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication

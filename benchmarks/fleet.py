@@ -101,9 +101,9 @@ async def robots(endpoint, first, count):
 async def control(endpoint, expected):
     """Show the fleet; print how long it takes, and, at each line of the standard input, how long until all is shown again."""
     from minirospy import Node
+    from minirospy.base.errors import MasterUnreachableError
     from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
     from minirospy.bridge.fleet.network import NetworkOptions
-    from minirospy.errors import MasterUnreachableError
     from minirospy.runtime.master.master import Master
 
     master = Master()

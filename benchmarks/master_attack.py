@@ -124,7 +124,7 @@ def run_nodes(port: int, count: int) -> None:
 
 def _run_round(port: int, uris: list[str]) -> tuple[float, bool]:
     """Return the seconds of the slowest node, and whether all of their calls were answered."""
-    from minirospy.errors import MinirospyError
+    from minirospy.base.errors import MinirospyError
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     worst, answered = 0.0, True

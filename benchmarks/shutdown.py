@@ -27,7 +27,7 @@ from pathlib import Path
 
 import psutil
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 TESTED = "/tested"
@@ -166,7 +166,7 @@ def round_of_launch(
 @contextmanager
 def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[MasterProxy]:
     """Run a master, ours or rosmaster."""
-    from minirospy.environment import split_uri
+    from minirospy.base.environment import split_uri
 
     port = str(split_uri(environ["ROS_MASTER_URI"], "http")[1])
     command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", port]

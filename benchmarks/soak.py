@@ -26,7 +26,7 @@ from typing import NamedTuple
 import psutil
 from master import Dummy
 
-from minirospy.errors import RpcError
+from minirospy.base.errors import RpcError
 from minirospy.runtime.rpc.client import RpcClient
 
 NAMES = 500

@@ -14,19 +14,19 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.environment import Environment
-from minirospy.errors import DeserializationError, ServiceException
-from minirospy.escape import escaped
+from minirospy.base.environment import Environment
+from minirospy.base.errors import DeserializationError, ServiceException
+from minirospy.base.escape import escaped
+from minirospy.base.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
+from minirospy.base.ros1_imports import prefer_ros1
+from minirospy.base.steps import Steps
 from minirospy.idl.protocols import Message, ServiceClass
-from minirospy.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
-from minirospy.ros1_imports import prefer_ros1
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
 from minirospy.runtime.node.topics import InTurns, Publication
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.steps import Steps
 from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType

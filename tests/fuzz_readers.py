@@ -50,7 +50,7 @@ class Reader(NamedTuple):
 def bag_readers() -> dict[str, Reader]:
     """Return the readers of files of messages."""
     from minirospy.bag.mcap_writer import McapWriter
-    from minirospy.errors import BagError
+    from minirospy.base.errors import BagError
     from tests.bag.bags import Given, make_bag
     from tests.bag.test_reader12 import MESSAGES, make_bag12
 
@@ -103,7 +103,7 @@ def _read_all(stream: io.BytesIO) -> None:
 
 
 def _bag_error() -> type[Exception]:
-    from minirospy.errors import BagError
+    from minirospy.base.errors import BagError
 
     return BagError
 
@@ -182,19 +182,19 @@ def xml_readers() -> dict[str, Reader]:
     """Return the readers of XML."""
     from xml.etree import ElementTree
 
+    from minirospy.base.environment import Environment
+    from minirospy.base.errors import LaunchError, ManifestError, UrdfError
+    from minirospy.base.xml_text import XmlError, parse_xml
     from minirospy.compat.roslib.manifest import ManifestException
     from minirospy.compat.roslib.manifest import parse as parse_old
     from minirospy.compat.urdf_parser_py.urdf import URDF
     from minirospy.compat.urdf_parser_py.xml_reflection import core
-    from minirospy.environment import Environment
-    from minirospy.errors import LaunchError, ManifestError, UrdfError
     from minirospy.launch.load import load_text
     from minirospy.testing import junit
     from minirospy.urdf.describe import dot_graph, tree_lines
     from minirospy.urdf.read import parse_robot
     from minirospy.workspace.manifest import parse_manifest
     from minirospy.workspace.packages import Packages
-    from minirospy.xml_text import XmlError, parse_xml
 
     packages = Packages(Environment.read({}))
     core.on_error = lambda _: None
@@ -271,10 +271,11 @@ def yaml_readers() -> dict[str, Reader]:
     """Return the readers of YAML."""
     import yaml
 
+    from minirospy.base.errors import BridgeError, MinirospyError, RvizFileError, ValueTextError
+    from minirospy.base.yaml_text import safe_load
     from minirospy.bridge.ros2.rules import parse_rules
     from minirospy.compat.camera_calibration_parsers.texts import CalibrationError, parse_yaml
     from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
-    from minirospy.errors import BridgeError, MinirospyError, RvizFileError, ValueTextError
     from minirospy.introspect.configurations import parameter_values
     from minirospy.introspect.values import (
         check_parameter,
@@ -285,7 +286,6 @@ def yaml_readers() -> dict[str, Reader]:
     )
     from minirospy.launch.substitution import convert
     from minirospy.maps.grid import MapError, read_settings
-    from minirospy.yaml_text import safe_load
 
     def text(read: Callable[[str], object]) -> Callable[[bytes], object]:
         return lambda data: read(data.decode("utf-8", "replace"))

@@ -62,10 +62,10 @@ ROOMS = {
     ),
     "wire": Room(["wire/*.py"], ["tests/wire"]),
     "journal": Room(
-        ["runtime/master/journal.py", "private_files.py"],
+        ["runtime/master/journal.py", "base/private_files.py"],
         [
             "tests/runtime/master/test_journal.py",
-            "tests/test_private_files.py",
+            "tests/base/test_private_files.py",
         ],
         ["roscore"],
     ),

@@ -23,7 +23,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 import minirospy
 from minirospy import Node
 from minirospy.aio.raw import RawService, raw_class
-from minirospy.errors import (
+from minirospy.base.errors import (
     MasterUnreachableError,
     ROSException,
     ROSInitException,
@@ -33,8 +33,8 @@ from minirospy.errors import (
     RpcRefused,
     ServiceException,
 )
+from minirospy.base.times import Duration, Time
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
-from minirospy.times import Duration, Time
 from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import until
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.errors import MinirospyError
 from minirospy.cli.catkin.make import catkin_make
-from minirospy.errors import MinirospyError
 from minirospy.launch.files import find_files
 from minirospy.launch.load import load_files
 from minirospy.workspace.packages import Packages

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy import installation
-from minirospy.installation import install_command
+from minirospy.base import installation
+from minirospy.base.installation import install_command
 
 ROOT = Path(__file__).parents[1]
 

@@ -14,7 +14,7 @@ import asyncio, os, signal, sys, threading, time
 def interrupt(function):
     "Press Ctrl-C while the cell waits in this function of minirospy: spin() takes no interrupt that comes before."
     names = set()
-    while not (names & {"threading.wait", "minirospy.clock.wait"} and function in names):
+    while not (names & {"threading.wait", "minirospy.base.clock.wait"} and function in names):
         time.sleep(0.01)
         frame, names = sys._current_frames()[threading.main_thread().ident], set()
         while frame:
@@ -54,7 +54,7 @@ async def kernel():
             print((await others.wait_for_message("/async", String, timeout=30)).data)
     while not got:
         await asyncio.sleep(0.01)
-    cell("rospy.spin()", interrupted="minirospy.clock.wait_for_event")
+    cell("rospy.spin()", interrupted="minirospy.base.clock.wait_for_event")
     cell("rospy.is_shutdown(), got")
     await asyncio.sleep(0.01)
     print("the kernel goes on")

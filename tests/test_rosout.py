@@ -13,11 +13,11 @@ import pytest
 from rosgraph_msgs.msg import Log
 
 from minirospy import rosout
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
+from minirospy.base.steps import Steps, finish
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport.readers import watch_frames_in_turns
-from minirospy.steps import Steps, finish
 from minirospy.wire.framing import serialize_frame
 
 

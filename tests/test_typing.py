@@ -42,7 +42,7 @@ def test_types_of_a_user_program(tmp_path: Path) -> None:
     assert done.stdout.splitlines() == [
         'node.py:7: note: Revealed type is "list[float]"',
         'node.py:8: note: Revealed type is "str"',
-        'node.py:9: note: Revealed type is "minirospy.times.Time"',
+        'node.py:9: note: Revealed type is "minirospy.base.times.Time"',
         'node.py:10: note: Revealed type is "bytes"',
         'node.py:11: note: Revealed type is "bool"',
         'node.py:12: error: "LaserScan" has no attribute "rangs"; maybe "ranges"?  [attr-defined]',

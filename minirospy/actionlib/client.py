@@ -11,11 +11,11 @@ from typing import TypeVar
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 
 from minirospy import client as rospy
-from minirospy import times
 from minirospy.actionlib.machine import ClientGoalHandle, FeedbackCallback, GoalManager, TransitionCallback
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
+from minirospy.base import times
 from minirospy.client.connection import Connection
 from minirospy.client.session import current_session
 from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message

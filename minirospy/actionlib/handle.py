@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, cast
 from actionlib_msgs.msg import GoalID, GoalStatus
 
 from minirospy import client as rospy
-from minirospy import times
 from minirospy.actionlib.goal_id import GoalIDGenerator
 from minirospy.actionlib.statuses import status_bytes
+from minirospy.base import times
 from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent
 
 if TYPE_CHECKING:

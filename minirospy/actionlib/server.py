@@ -13,7 +13,6 @@ from typing import TypeVar
 from actionlib_msgs.msg import GoalID, GoalStatus
 
 from minirospy import client as rospy
-from minirospy import times
 from minirospy.actionlib.goal_id import GoalIDGenerator
 from minirospy.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
 from minirospy.actionlib.spec import (
@@ -24,7 +23,8 @@ from minirospy.actionlib.spec import (
     action_types,
 )
 from minirospy.actionlib.statuses import StatusList
-from minirospy.clock import SignalSafeEvent
+from minirospy.base import times
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
 from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.runtime.transport.limits import naming_thread_limit

@@ -12,11 +12,11 @@ from typing import Any
 from actionlib_msgs.msg import GoalStatus
 
 from minirospy import client as rospy
-from minirospy import times
 from minirospy.actionlib.client import ActionClient
 from minirospy.actionlib.machine import ClientGoalHandle
 from minirospy.actionlib.states import CommState, SimpleGoalState
 from minirospy.actionlib.waiting import Waiting
+from minirospy.base import times
 from minirospy.graph.goals import SIMPLE_STEPS, SimpleStep, visible_state
 from minirospy.idl.protocols import Action, Message
 

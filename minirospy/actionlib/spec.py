@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 
 __all__ = [

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 
 from minirospy import client as rospy
-from minirospy import times
-from minirospy.clock import SignalSafeEvent, wait_for_event
+from minirospy.base import times
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Waiting"]
 

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Generator
 from types import TracebackType
 from typing import TypeVar
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     MasterUnreachableError,
     ROSSerializationException,
     RpcError,

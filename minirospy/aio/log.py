@@ -9,8 +9,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from minirospy.aio.topics import Publisher
-from minirospy.errors import ROSSerializationException
-from minirospy.log_levels import SEVERITIES, ros_level
+from minirospy.base.errors import ROSSerializationException
+from minirospy.base.log_levels import SEVERITIES, ros_level
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log

@@ -12,15 +12,15 @@ from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from types import TracebackType
 from typing import Any, TypeVar
 
-from minirospy import names
 from minirospy.aio.log import RosoutHandler, TerminalHandler
 from minirospy.aio.parameters import ParameterWatch
 from minirospy.aio.raw import ANY_CLASS, RawSubscription, raw_class
 from minirospy.aio.services import Service, ServiceClass, ServiceProxy
 from minirospy.aio.time import Rate, SimulatedTime
 from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription
-from minirospy.environment import Environment
-from minirospy.errors import (
+from minirospy.base import names
+from minirospy.base.environment import Environment
+from minirospy.base.errors import (
     MasterUnreachableError,
     ROSInitException,
     ROSInterruptException,
@@ -30,17 +30,17 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
+from minirospy.base.ros1_imports import prefer_ros1
+from minirospy.base.times import Duration, Time
+from minirospy.base.yaml_text import one_line, safe_load
 from minirospy.idl.protocols import Message
-from minirospy.ros1_imports import prefer_ros1
 from minirospy.runtime.node.node import Node as RuntimeNode
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.times import Duration, Time
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
-from minirospy.yaml_text import one_line, safe_load
 
 __all__ = ["Node"]
 

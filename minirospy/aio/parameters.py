@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from minirospy.errors import MasterUnreachableError, RpcError
+from minirospy.base.errors import MasterUnreachableError, RpcError
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, cast
 
 from minirospy.aio.handle import Handle, registered
-from minirospy.errors import (
+from minirospy.base.errors import (
     CallFailed,
     HandshakeRefused,
     MasterUnreachableError,

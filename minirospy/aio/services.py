@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from minirospy.aio.handle import Handle, registered, serialized
-from minirospy.errors import (
+from minirospy.base.errors import (
     CallFailed,
     HandshakeRefused,
     MasterUnreachableError,

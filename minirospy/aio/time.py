@@ -8,10 +8,7 @@ import itertools
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING
 
-from minirospy.errors import (
-    ROSInterruptException,
-    ROSTimeMovedBackwardsException,
-)
+from minirospy.base.errors import ROSInterruptException, ROSTimeMovedBackwardsException
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -11,12 +11,7 @@ from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from minirospy.aio.handle import Handle, pieces_of, registered
-from minirospy.errors import (
-    MasterUnreachableError,
-    ROSException,
-    ROSInterruptException,
-    RpcError,
-)
+from minirospy.base.errors import MasterUnreachableError, ROSException, ROSInterruptException, RpcError
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.protocols import Message, is_stamped
 from minirospy.runtime.node.topics import Publication

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple, Protocol
 from minirospy.bag import compression, encoding, records
 from minirospy.bag.index import read_entries
 from minirospy.bag.records import Chunk, ChunkInfo, Connection
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future

@@ -12,8 +12,8 @@ from io import BytesIO
 from types import ModuleType
 from typing import TypeVar
 
-from minirospy.errors import BagCompressionError, BagFormatError
-from minirospy.installation import install_command
+from minirospy.base.errors import BagCompressionError, BagFormatError
+from minirospy.base.installation import install_command
 
 __all__ = [
     "BZ2",

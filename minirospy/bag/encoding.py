@@ -22,7 +22,7 @@ from minirospy.bag.records import (
     ChunkInfo,
     Connection,
 )
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 __all__ = [
     "encode_bag_header",

@@ -14,7 +14,7 @@ from typing import BinaryIO, NamedTuple
 
 from minirospy.bag import records
 from minirospy.bag.records import Record
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 __all__ = ["ConnectionIndex", "Entry", "merge_entries", "read_entries"]
 

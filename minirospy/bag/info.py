@@ -16,7 +16,7 @@ from typing import NamedTuple
 from minirospy.bag import compression
 from minirospy.bag.base import BagReader
 from minirospy.bag.records import Connection
-from minirospy.yaml_text import safe_load
+from minirospy.base.yaml_text import safe_load
 
 __all__ = [
     "Stored",

@@ -20,7 +20,7 @@ from minirospy.bag.mcap_repair import MAGIC, chunk_data, mcap_faults
 from minirospy.bag.mcap_writer import check_mcap
 from minirospy.bag.reader import open_bag
 from minirospy.bag.records import Chunk, ChunkInfo, Connection, Fields
-from minirospy.errors import BagFormatError, McapUnindexedError
+from minirospy.base.errors import BagFormatError, McapUnindexedError
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema

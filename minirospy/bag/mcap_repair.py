@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.bag import compression
-from minirospy.errors import BagCompressionError, BagFormatError
+from minirospy.base.errors import BagCompressionError, BagFormatError
 
 if TYPE_CHECKING:
     from mcap.records import (

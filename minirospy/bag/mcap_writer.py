@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, BinaryIO, cast
 
 from minirospy.bag.writer import Buffer
-from minirospy.errors import BagCompressionError, BagError, BagFormatError
-from minirospy.installation import install_command
+from minirospy.base.errors import BagCompressionError, BagError, BagFormatError
+from minirospy.base.installation import install_command
 
 if TYPE_CHECKING:
     from mcap.writer import Writer

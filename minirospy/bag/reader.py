@@ -21,7 +21,7 @@ from minirospy.bag.chunks import THREADS, ChunkStream, Found, StoredChunk, scan,
 from minirospy.bag.index import ConnectionIndex, read_entries
 from minirospy.bag.reader12 import open_bag12
 from minirospy.bag.records import ChunkInfo, Connection
-from minirospy.errors import BagFormatError, BagUnindexedError, BagVersionError
+from minirospy.base.errors import BagFormatError, BagUnindexedError, BagVersionError
 
 __all__ = ["ChunkedReader", "open_bag"]
 

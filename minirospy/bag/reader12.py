@@ -15,7 +15,7 @@ from minirospy.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.bag.chunks import size_of
 from minirospy.bag.index import ConnectionIndex, Entry, merge_entries
 from minirospy.bag.records import ChunkInfo, Connection, Record
-from minirospy.errors import BagFormatError, BagUnindexedError
+from minirospy.base.errors import BagFormatError, BagUnindexedError
 
 __all__ = ["Reader12", "open_bag12", "unindexed_bag12"]
 

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
-from minirospy.errors import BagEncryptedError, BagFormatError, NoBagError
+from minirospy.base.errors import BagEncryptedError, BagFormatError, NoBagError
 
 __all__ = [
     "BAG_HEADER_SIZE",

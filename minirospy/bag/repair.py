@@ -16,7 +16,7 @@ from minirospy.bag.chunks import Found, StoredChunk, scan_into, size_of
 from minirospy.bag.index import read_entries
 from minirospy.bag.records import BagHeader, Chunk, ChunkInfo, Connection, Record
 from minirospy.bag.resync import is_record, next_chunk
-from minirospy.errors import BagCompressionError, BagFormatError
+from minirospy.base.errors import BagCompressionError, BagFormatError
 
 __all__ = ["Repair"]
 

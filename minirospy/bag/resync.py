@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import BinaryIO
 
 from minirospy.bag import compression, records
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 __all__ = ["is_record", "next_chunk"]
 

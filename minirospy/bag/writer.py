@@ -33,7 +33,7 @@ from minirospy.bag.records import (
     Connection,
     to_nanoseconds,
 )
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

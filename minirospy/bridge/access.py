@@ -18,7 +18,7 @@ from enum import Enum
 from typing import NamedTuple
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 __all__ = [
     "TOKEN_PROTOCOL",

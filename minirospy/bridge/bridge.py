@@ -12,6 +12,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minirospy.aio.node import Node
+from minirospy.base.closing import close_all
+from minirospy.base.environment import DISTRO
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import Access
 from minirospy.bridge.foxglove.assets import ALLOWED, Assets
 from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
@@ -24,9 +27,6 @@ from minirospy.bridge.web.account import Account
 from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
-from minirospy.closing import close_all
-from minirospy.environment import DISTRO
-from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import fetch
 from minirospy.workspace.packages import Packages
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.topics import Publisher
+from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import ServiceInfo, TypeTexts, described
-from minirospy.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch
 from minirospy.wire.framing import Frame

@@ -7,11 +7,11 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from minirospy.aio.node import Node
+from minirospy.base.environment import Environment
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import Access, is_loopback
 from minirospy.bridge.addresses import host_names
 from minirospy.bridge.tokens import Tokens, kept_tokens
-from minirospy.environment import Environment
-from minirospy.errors import BridgeError
 
 __all__ = ["access_of", "address_of", "globs", "number", "private_parameters", "texts", "value"]
 

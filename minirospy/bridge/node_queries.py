@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable, Collection
 from functools import partial
 from typing import Generic, TypeVar
 
+from minirospy.base.errors import MinirospyError, ServiceException
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import MinirospyError, ServiceException
 
 __all__ = ["AT_ONCE", "NodeQueries"]
 

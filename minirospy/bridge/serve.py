@@ -11,12 +11,12 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.node import Node
-from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
-from minirospy.escape import escaped
-from minirospy.installation import install_command
+from minirospy.base.errors import BridgeError, MinirospyError, ROSInterruptException
+from minirospy.base.escape import escaped
+from minirospy.base.installation import install_command
+from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.signal_dispatch import interrupt_signals
 
 if TYPE_CHECKING:
     from minirospy.bridge.bridge import Bridge

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 __all__ = ["StopGuard"]
 

@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.base.errors import BridgeError
+from minirospy.base.private_files import open_file
 from minirospy.bridge.access import is_token, new_token
-from minirospy.errors import BridgeError
-from minirospy.private_files import open_file
 
 __all__ = ["Tokens", "kept_tokens", "read_tokens"]
 

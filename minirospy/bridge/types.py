@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from minirospy.errors import MinirospyError, NotFoundError, RpcError, WireError
+from minirospy.base.errors import MinirospyError, NotFoundError, RpcError, WireError
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.wire.header import Header

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from minirospy.errors import BridgeError
-from minirospy.escape import escaped, has_controls
-from minirospy.installation import install_command
+from minirospy.base.errors import BridgeError
+from minirospy.base.escape import escaped, has_controls
+from minirospy.base.installation import install_command
 
 __all__ = [
     "DEFAULT_ENDPOINT", "DEFAULT_PORT", "Bytes", "Config", "Declared", "EndpointError",

@@ -9,15 +9,15 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import UsageError
+from minirospy.base.escape import own_output
+from minirospy.base.keyboard import Keys
 from minirospy.cli.command import run, warn
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import UsageError
-from minirospy.escape import own_output
 from minirospy.gpio.board import Board, BoardState
 from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Position, Pull
 from minirospy.gpio.place import Place
-from minirospy.keyboard import Keys
 from minirospy.scanner import FIELDS, Circle
 
 if TYPE_CHECKING:

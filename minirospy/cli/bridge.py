@@ -267,8 +267,8 @@ def _given_token(option: str, given: str | None, variable: str) -> str:
 
 
 def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
+    from minirospy.base.environment import Environment
     from minirospy.bridge.tokens import Tokens, kept_tokens
-    from minirospy.environment import Environment
 
     if write or read:
         return Tokens(write, read)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 __all__ = ["show_status"]
 
@@ -82,8 +82,8 @@ def _url(scheme: str, door: _Json) -> str:
 
 
 def _token(given: str) -> _Token:
+    from minirospy.base.environment import Environment
     from minirospy.bridge.tokens import read_tokens
-    from minirospy.environment import Environment
 
     if given:
         return _Token(given, is_kept=False)

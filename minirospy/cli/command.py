@@ -23,8 +23,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.cli.parser import CommandLineError
-from minirospy.errors import (
+from minirospy.base.errors import (
     MasterUnreachableError,
     MessageException,
     MinirospyError,
@@ -34,14 +33,15 @@ from minirospy.errors import (
     ServiceException,
     UsageError,
 )
-from minirospy.escape import SafeTerminal, escaped
-from minirospy.ros1_imports import prefer_ros1
-from minirospy.suggestions import did_you_mean
+from minirospy.base.escape import SafeTerminal, escaped
+from minirospy.base.ros1_imports import prefer_ros1
+from minirospy.base.suggestions import did_you_mean
+from minirospy.cli.parser import CommandLineError
 
 if TYPE_CHECKING:
+    from minirospy.base.names import Arguments
     from minirospy.introspect.graph import Graph
     from minirospy.introspect.streams import ToolNode
-    from minirospy.names import Arguments
 
 __all__ = [
     "INTERRUPTED",
@@ -180,7 +180,7 @@ def _heed_break() -> None:
     import signal
     import threading
 
-    from minirospy.signal_dispatch import interrupt_signals
+    from minirospy.base.signal_dispatch import interrupt_signals
 
     if threading.current_thread() is threading.main_thread():
         for number in interrupt_signals()[1:]:
@@ -267,7 +267,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
     """
     import signal
 
-    from minirospy.environment import Environment
+    from minirospy.base.environment import Environment
     from minirospy.introspect.streams import ToolNode
 
     special = arguments.special if arguments else {}

@@ -208,8 +208,8 @@ def _dashboard(
     read_only: bool,
     arguments: Sequence[str] = (),
 ) -> int:
+    from minirospy.base.suggestions import did_you_mean
     from minirospy.dashboard.views import LAYOUTS, VIEWS
-    from minirospy.suggestions import did_you_mean
 
     if view and layout:
         raise Misuse(f"'{view}' and --layout {layout} are two views: give one")
@@ -243,7 +243,7 @@ def _image(topic: str) -> tuple[str, Fields]:
 
 
 def _bags(bagfiles: Sequence[str]) -> tuple[str, Fields]:
-    from minirospy.errors import NotFoundError
+    from minirospy.base.errors import NotFoundError
 
     for name in bagfiles:
         if not Path(name).is_file():
@@ -301,15 +301,15 @@ def _serve(
         raise Misuse(f"--port {port} is not between 0 and 65535")
     require_libraries()
 
+    from minirospy.base.environment import Environment
+    from minirospy.base.errors import BridgeError
+    from minirospy.base.names import anonymous_name
     from minirospy.bridge.access import Access, is_loopback
     from minirospy.bridge.addresses import host_names
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.bridge.serve import run
     from minirospy.dashboard.bag_folder import BagFolder
     from minirospy.dashboard.dashboard import PORT, Dashboard
-    from minirospy.environment import Environment
-    from minirospy.errors import BridgeError
-    from minirospy.names import anonymous_name
 
     # Bags of the command line may be anywhere.
     given = fields.get("file", ()) if view == "bag" else ()
@@ -384,9 +384,9 @@ def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
 
     On loopback, too, the page needs the token to start programs and to open files: other users of the machine reach it.
     """
+    from minirospy.base.errors import BridgeError
     from minirospy.bridge.access import new_token
     from minirospy.bridge.tokens import Tokens, kept_tokens
-    from minirospy.errors import BridgeError
 
     try:
         return kept_tokens(home)

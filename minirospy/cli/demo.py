@@ -15,11 +15,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.child_lifetime import guard_children
+from minirospy.base.child_lifetime import guard_children
+from minirospy.base.errors import MinirospyError
+from minirospy.base.escape import own_output
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import MinirospyError
-from minirospy.escape import own_output
 from minirospy.gpio.board import Board
 
 if TYPE_CHECKING:

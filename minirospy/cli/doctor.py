@@ -13,10 +13,10 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
-from minirospy.signal_dispatch import interrupt_signals
 
 __all__ = ["DOCTOR", "ROSWTF", "main", "roswtf"]
 
@@ -121,7 +121,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
     """Yield whether a launch file loads, and whether the programs that it starts are there."""
-    from minirospy.errors import MinirospyError
+    from minirospy.base.errors import MinirospyError
     from minirospy.launch.command import node_command
     from minirospy.launch.load import load_files
     from minirospy.workspace.packages import Packages

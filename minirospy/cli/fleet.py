@@ -307,9 +307,9 @@ def _param(robot: str, parameter: str, connect: Sequence[str], config: str, scou
 
 
 def _takeover(robot: str, machine: str, any: bool) -> int:
+    from minirospy.base.errors import NotFoundError
     from minirospy.bridge.fleet.importer import MACHINES
     from minirospy.bridge.fleet.keys import is_machine, is_robot_name
-    from minirospy.errors import NotFoundError
     from minirospy.introspect import parameters
     from minirospy.introspect.graph import Graph
 
@@ -336,6 +336,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
     """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
+    from minirospy.base.environment import Environment
     from minirospy.bridge.fleet.network import (
         EndpointError,
         NetworkOptions,
@@ -343,7 +344,6 @@ def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts:
         require_zenoh,
         to_endpoint,
     )
-    from minirospy.environment import Environment
 
     require_zenoh(has_many_links=bool(listen or config))
     try:

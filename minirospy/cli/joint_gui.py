@@ -39,8 +39,8 @@ def _uses_page(words: Sequence[str]) -> bool:
 
 
 def _has_libraries() -> bool:
+    from minirospy.base.errors import BridgeError
     from minirospy.bridge.serve import require_libraries
-    from minirospy.errors import BridgeError
 
     try:
         require_libraries()

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Sequence
 
 import minirospy
+from minirospy.base.errors import UsageError
+from minirospy.base.suggestions import did_you_mean
 from minirospy.cli.command import run
 from minirospy.cli.registry import COMMANDS, find_verb
-from minirospy.errors import UsageError
-from minirospy.suggestions import did_you_mean
 
 __all__ = ["main"]
 

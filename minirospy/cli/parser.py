@@ -14,9 +14,9 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from minirospy import names
-from minirospy.errors import UsageError
-from minirospy.suggestions import did_you_mean
+from minirospy.base import names
+from minirospy.base.errors import UsageError
+from minirospy.base.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from re import Pattern

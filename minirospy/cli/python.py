@@ -9,9 +9,9 @@ import os
 import sys
 from collections.abc import Sequence
 
+from minirospy.base.environment import export_local
 from minirospy.cli.command import run
 from minirospy.cli.ros.rosrun import become
-from minirospy.environment import export_local
 
 __all__ = ["main"]
 

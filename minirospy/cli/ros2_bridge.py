@@ -110,12 +110,12 @@ def _ros2_bridge(
     import asyncio
     import os
 
+    from minirospy.base.errors import BridgeError
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
     from minirospy.bridge.ros2.links import BRIDGE_PREFIX, parse_domain
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
     from minirospy.bridge.serve import run
-    from minirospy.errors import BridgeError
     from minirospy.idl.load import Catalogue
     from minirospy.workspace.packages import Packages
 
@@ -161,6 +161,7 @@ def _rclpy() -> Callable[[str], Ros2Side]:
 def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callable[[str], Ros2Side]:
     import os
 
+    from minirospy.base.environment import Environment
     from minirospy.bridge.ros2.definitions import Definitions
     from minirospy.bridge.ros2.zenoh_side import ZenohSide
     from minirospy.bridge.zenoh_library import (
@@ -170,7 +171,6 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
         require_zenoh,
         to_endpoint,
     )
-    from minirospy.environment import Environment
 
     require_zenoh("ros2-bridge --zenoh")
     variable = "ZENOH_SESSION_CONFIG_URI"

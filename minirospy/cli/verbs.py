@@ -12,11 +12,11 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import NamedTuple
 
+from minirospy.base.errors import MinirospyError, UsageError
+from minirospy.base.names import parse_arguments
+from minirospy.base.suggestions import did_you_mean
 from minirospy.cli.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
 from minirospy.cli.parser import CommandLineError, Misuse, Parser
-from minirospy.errors import MinirospyError, UsageError
-from minirospy.names import parse_arguments
-from minirospy.suggestions import did_you_mean
 
 __all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
 

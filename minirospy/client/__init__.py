@@ -9,7 +9,20 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
-from minirospy import names
+from minirospy.base import names
+from minirospy.base.errors import (
+    ROSException,
+    ROSInitException,
+    ROSInternalException,
+    ROSInterruptException,
+    ROSSerializationException,
+    ROSTimeMovedBackwardsException,
+    ServiceException,
+    TransportException,
+    TransportInitError,
+    TransportTerminated,
+)
+from minirospy.base.ros1_imports import prefer_ros1
 from minirospy.client.identity import private_parameters
 from minirospy.client.log import (
     DEBUG,
@@ -60,20 +73,7 @@ from minirospy.client.topics import (
     get_published_topics,
     wait_for_message,
 )
-from minirospy.errors import (
-    ROSException,
-    ROSInitException,
-    ROSInternalException,
-    ROSInterruptException,
-    ROSSerializationException,
-    ROSTimeMovedBackwardsException,
-    ServiceException,
-    TransportException,
-    TransportInitError,
-    TransportTerminated,
-)
 from minirospy.idl.message import Message
-from minirospy.ros1_imports import prefer_ros1
 
 __all__ = [
     "DEBUG",

@@ -11,11 +11,11 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 
-from minirospy import names
-from minirospy.environment import Environment
-from minirospy.errors import ROSInitException, RpcError, UsageError
+from minirospy.base import names
+from minirospy.base.environment import Environment
+from minirospy.base.errors import ROSInitException, RpcError, UsageError
+from minirospy.base.yaml_text import safe_load
 from minirospy.wire.xmlrpc import serialize_call
-from minirospy.yaml_text import safe_load
 
 __all__ = ["Identity", "private_parameters", "warn_of_illegal_name"]
 

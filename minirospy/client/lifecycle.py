@@ -11,10 +11,10 @@ import threading
 import traceback
 from collections.abc import Callable
 
-from minirospy import errors
+from minirospy.base import errors
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.client.deferral import Deferral, is_main_thread
 from minirospy.client.shutdown import Awareness, Phase, ShutdownMachine, ThreadState
-from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Lifecycle", "ROSInterruptException"]
 

@@ -13,16 +13,9 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from minirospy import times
+from minirospy.base import times
+from minirospy.base.log_levels import DEBUG, ERROR, FATAL, INFO, SEVERITIES, WARN
 from minirospy.client.session import current_session
-from minirospy.log_levels import (
-    DEBUG,
-    ERROR,
-    FATAL,
-    INFO,
-    SEVERITIES,
-    WARN,
-)
 
 if TYPE_CHECKING:
     from typing import TypedDict

@@ -15,9 +15,9 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
+from minirospy.base.clock import SimulatedClock
+from minirospy.base.log_levels import SEVERITIES, ros_level
 from minirospy.client.session import current_session
-from minirospy.clock import SimulatedClock
-from minirospy.log_levels import SEVERITIES, ros_level
 
 __all__ = ["DeferringHandler", "RosOutHandler", "RosStreamHandler"]
 

@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from minirospy.base.log_levels import DEBUG, PYTHON_LEVELS, logger_levels, set_logger_level
+from minirospy.base.yaml_text import safe_load
 from minirospy.client.log_handlers import DeferringHandler, RosOutHandler, RosStreamHandler
-from minirospy.log_levels import DEBUG, PYTHON_LEVELS, logger_levels, set_logger_level
-from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from roscpp.srv import SetLoggerLevelRequest

@@ -8,9 +8,9 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 
+from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.graph.parameter_cache import NOT_SET
 
 if TYPE_CHECKING:

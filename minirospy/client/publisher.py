@@ -11,6 +11,13 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.errors import (
+    ROSException,
+    ROSSerializationException,
+    SerializationError,
+    SerializationOverflowError,
+)
 from minirospy.client.connection import Connection, connection_to_subscriber
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import (
@@ -19,13 +26,6 @@ from minirospy.client.topic import (
     Topic,
     register_with_master,
     unregister_from_master,
-)
-from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import (
-    ROSException,
-    ROSSerializationException,
-    SerializationError,
-    SerializationOverflowError,
 )
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.protocols import Message

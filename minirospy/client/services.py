@@ -12,11 +12,8 @@ from collections.abc import Callable, Mapping
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.session import Session, current_session
-from minirospy.client.topic import unregister_from_master
-from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import (
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.errors import (
     CallFailed,
     DeserializationError,
     HandshakeRefused,
@@ -28,9 +25,12 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
+from minirospy.base.times import Duration
+from minirospy.client.identity import warn_of_illegal_name
+from minirospy.client.session import Session, current_session
+from minirospy.client.topic import unregister_from_master
 from minirospy.idl.message import args_kwds_to_message, number_header
 from minirospy.idl.service import to_response
-from minirospy.times import Duration
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 

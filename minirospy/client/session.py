@@ -12,11 +12,11 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.base.clock import Clock, WallClock, wait_for_event
+from minirospy.base.errors import ROSInitException
 from minirospy.client.identity import Identity
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.signals import SignalWatchdog
-from minirospy.clock import Clock, WallClock, wait_for_event
-from minirospy.errors import ROSInitException
 from minirospy.graph.parameter_cache import ParameterCache
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 

@@ -16,10 +16,10 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
+from minirospy.base.signal_dispatch import dispatching_signal
 from minirospy.client.exit_messages import report_waiting
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.shutdown import Action, Phase
-from minirospy.signal_dispatch import dispatching_signal
 
 __all__ = ["SignalWatchdog"]
 

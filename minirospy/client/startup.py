@@ -14,15 +14,15 @@ import sys
 import warnings
 from collections.abc import Mapping, Sequence
 
-from minirospy import names
+from minirospy.base import names
+from minirospy.base.clock import SimulatedClock, wait_for_event
+from minirospy.base.environment import wrong_address
+from minirospy.base.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 from minirospy.client import log_setup
 from minirospy.client.exit_messages import suppress_tracebacks
 from minirospy.client.identity import private_parameters
 from minirospy.client.session import Session, current_session, replace_session_in_fork
 from minirospy.client.subscriber import Subscriber
-from minirospy.clock import SimulatedClock, wait_for_event
-from minirospy.environment import wrong_address
-from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 
 __all__ = ["init_node", "start_clock"]
 

@@ -10,11 +10,11 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
-from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import Frame

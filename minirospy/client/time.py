@@ -9,11 +9,11 @@ import threading
 import time
 from collections.abc import Callable
 
-from minirospy import errors, times
+from minirospy.base import errors, times
+from minirospy.base.clock import SignalSafeEvent, SimulatedClock
+from minirospy.base.errors import ROSInitException
 from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.session import current_session
-from minirospy.clock import SignalSafeEvent, SimulatedClock
-from minirospy.errors import ROSInitException
 from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = [

@@ -9,10 +9,10 @@ import logging
 from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar
 
+from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.client.connection import Connection
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.idl import protocols
 from minirospy.idl.message import Message
 from minirospy.wire.tcpros import ANY

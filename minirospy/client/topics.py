@@ -5,11 +5,11 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 
 from __future__ import annotations
 
+from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.client.publisher import Publisher, SubscribeListener
 from minirospy.client.session import current_session
 from minirospy.client.subscriber import Subscriber, wait_for_message
 from minirospy.client.topic import AnyMsg, Topic
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError
 
 __all__ = [
     "AnyMsg",

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
-from minirospy import names
+from minirospy.base import names
 
 __all__ = [
     "GLOBALNS", "PRIV_NAME", "REMAP", "SEP", "canonicalize_name", "get_ros_namespace", "is_global", "is_private",

@@ -20,6 +20,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
+from minirospy.base.errors import BagError, MinirospyError, UsageError
 from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.bag_player import GraphStage, OpenBag
 from minirospy.dashboard.json_session import (
@@ -32,7 +33,6 @@ from minirospy.dashboard.json_session import (
     texts_of,
 )
 from minirospy.dashboard.recording import Recording
-from minirospy.errors import BagError, MinirospyError, UsageError
 
 if TYPE_CHECKING:
     from minirospy.bridge.graph import SharedGraph

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import BagError, UsageError
+from minirospy.base.errors import BagError, UsageError
 
 __all__ = ["BagFolder", "FoundBag"]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from minirospy.bag.base import StoredMessage
 from minirospy.bag.records import Connection
 from minirospy.bag.timeline import Timeline
-from minirospy.errors import BagError, BagUnindexedError, BridgeError, MinirospyError
+from minirospy.base.errors import BagError, BagUnindexedError, BridgeError, MinirospyError
 from minirospy.recording.player import Player, PlayerState
 from minirospy.recording.schedule import PlayOptions
 from minirospy.recording.sources import Bags, open_reader

@@ -15,8 +15,8 @@ from concurrent.futures import Future
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
+from minirospy.base.errors import BoardError
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number
-from minirospy.errors import BoardError
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import BUTTONS, LEDS, PINS, Function
 from minirospy.gpio.place import Place

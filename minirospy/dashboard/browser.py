@@ -16,7 +16,7 @@ import webbrowser
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from minirospy.private_files import create_file
+from minirospy.base.private_files import create_file
 
 __all__ = ["LinkFile", "has_screen", "link_page", "open_link"]
 

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Protocol
 
+from minirospy.base.errors import BridgeError, ROSException
 from minirospy.bridge.stop_guard import StopGuard
-from minirospy.errors import BridgeError, ROSException
 from minirospy.introspect.graph import why_illegal
 from minirospy.wire.tcpros import InterfaceType
 

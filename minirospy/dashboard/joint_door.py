@@ -17,9 +17,9 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
+from minirospy.base.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
-from minirospy.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.introspect.graph import why_illegal
 from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
 from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints

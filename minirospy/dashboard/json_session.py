@@ -19,8 +19,8 @@ from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
+from minirospy.base.errors import MinirospyError
 from minirospy.bridge.tasks import PAUSE_SECONDS, Faults
-from minirospy.errors import MinirospyError
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient

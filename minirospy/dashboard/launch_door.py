@@ -15,11 +15,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession
 from minirospy.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.dashboard.launch_run import LaunchRun
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError, UsageError
 from minirospy.launch.arg_docs import resolved_arg_docs
 from minirospy.workspace.packages import Packages
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError, UsageError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.launch.load import LaunchSource, load_sources
 from minirospy.launch.options import RunOptions
 from minirospy.launch.output import Output

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import minirospy
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
+from minirospy.base.names import is_legal_name
 from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
-from minirospy.names import is_legal_name
 
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 

@@ -18,10 +18,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+from minirospy.base.errors import BridgeError, RvizFileError
+from minirospy.base.private_files import create_file
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
 from minirospy.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
-from minirospy.errors import BridgeError, RvizFileError
-from minirospy.private_files import create_file
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient

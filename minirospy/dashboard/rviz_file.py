@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from minirospy.errors import RvizFileError
+from minirospy.base.errors import RvizFileError
 
 if TYPE_CHECKING:
     from yaml.events import Event

@@ -17,10 +17,10 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import installed_type
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of, texts_of
-from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.graph import Graph, why_illegal
 from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote, urlencode
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 
 __all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields", "view_of_plugin"]
 

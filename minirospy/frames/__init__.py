@@ -4,7 +4,7 @@ The way of a transform: broadcasters `sendTransform` -> topic /tf ==> listener `
 `minirospy.tf2`, which answers `lookup_transform`. What `import tf2_ros` and `import tf2_py` re-export.
 """
 
-from minirospy.ros1_imports import prefer_ros1
+from minirospy.base.ros1_imports import prefer_ros1
 
 # Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
 prefer_ros1()

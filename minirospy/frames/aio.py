@@ -22,9 +22,10 @@ from typing import Literal, TypeVar
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from minirospy import Node, times
+from minirospy import Node
 from minirospy.aio import Publisher, Subscription
-from minirospy.errors import (
+from minirospy.base import times
+from minirospy.base.errors import (
     DeserializationError,
     InvalidArgumentException,
     ROSInterruptException,

@@ -8,8 +8,8 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.srv import FrameGraph, FrameGraphRequest, FrameGraphResponse
 
 from minirospy import client as rospy
+from minirospy.base.errors import TransformException
 from minirospy.client.session import current_session
-from minirospy.errors import TransformException
 from minirospy.frames.core import BufferCore
 from minirospy.frames.interface import NO_WAIT, BufferInterface
 from minirospy.frames.messages import Moment, nanoseconds

@@ -6,9 +6,10 @@ from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import LookupTransformAction, LookupTransformGoal, LookupTransformResult, TF2Error
 
-from minirospy import actionlib, times
+from minirospy import actionlib
 from minirospy import client as rospy
-from minirospy.errors import (
+from minirospy.base import times
+from minirospy.base.errors import (
     ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from geometry_msgs.msg import TransformStamped
 
+from minirospy.base.errors import InvalidArgumentException
 from minirospy.client.time import Time
-from minirospy.errors import InvalidArgumentException
 from minirospy.frames.messages import Moment, nanoseconds, transform_stamped
 from minirospy.tf2.buffer import DEFAULT_CACHE_TIME, TransformBuffer
 from minirospy.tf2.insertion import Refusal, RefusalLog

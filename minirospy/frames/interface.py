@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypeVar, overload
 from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
 
-from minirospy import times
+from minirospy.base import times
 from minirospy.client.time import Duration
 from minirospy.frames.messages import Moment
 

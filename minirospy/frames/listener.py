@@ -10,7 +10,7 @@ from typing import Protocol
 from geometry_msgs.msg import TransformStamped
 
 from minirospy import client as rospy
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 from minirospy.frames.core import BufferCore
 from minirospy.frames.messages import LazyTFMessage
 

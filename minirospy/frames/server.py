@@ -6,10 +6,11 @@ import threading
 
 from tf2_msgs.msg import LookupTransformAction, LookupTransformGoal, LookupTransformResult, TF2Error
 
-from minirospy import actionlib, times
+from minirospy import actionlib
 from minirospy import client as rospy
-from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import (
+from minirospy.base import times
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.errors import (
     ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.client.session import current_session
 from minirospy.client.time import ROSTimeMovedBackwardsException
-from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.frames.core import BufferCore
 from minirospy.frames.messages import Moment, nanoseconds
 

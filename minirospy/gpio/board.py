@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
 
-from minirospy.errors import BoardError
+from minirospy.base.errors import BoardError
 from minirospy.gpio.link import Edge, Link
 from minirospy.gpio.model import PINS, BoardModel, Force, Function, Pin, Position, Press, Release, Setup
 from minirospy.gpio.place import Place

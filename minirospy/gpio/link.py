@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy import private_files
-from minirospy.child_lifetime import start_outside_of_job
-from minirospy.errors import BoardError
+from minirospy.base import private_files
+from minirospy.base.child_lifetime import start_outside_of_job
+from minirospy.base.errors import BoardError
 from minirospy.gpio.model import Function, Operation, Pin, Position, Setup, Write
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import (

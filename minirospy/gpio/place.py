@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from minirospy.errors import BoardError
+from minirospy.base.errors import BoardError
 
 __all__ = ["Place"]
 

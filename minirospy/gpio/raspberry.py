@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 
 __all__ = ["model_name", "warn_of_missing_library"]
 

@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy import private_files
+from minirospy.base import private_files
 from minirospy.gpio.model import BoardModel, Operation, OperationError
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import (

@@ -6,7 +6,7 @@ import contextlib
 import threading
 from typing import Protocol
 
-from minirospy.errors import BoardError
+from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
-from minirospy import names
-from minirospy.errors import MinirospyError, RpcFault
-from minirospy.escape import has_controls
-from minirospy.steps import Steps
+from minirospy.base import names
+from minirospy.base.errors import MinirospyError, RpcFault
+from minirospy.base.escape import has_controls
+from minirospy.base.steps import Steps
 
 __all__ = [
     "ERROR",

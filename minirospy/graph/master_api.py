@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import islice
 
-from minirospy.escape import escaped
+from minirospy.base.escape import escaped
+from minirospy.base.steps import ALONE, SHORT_ITEMS, Steps, finish, is_small
 from minirospy.graph.calls import (
     ERROR,
     FAILURE,
@@ -35,7 +36,6 @@ from minirospy.graph.calls import (
 )
 from minirospy.graph.parameters import ParametersFullError, ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry, RegistryFullError
-from minirospy.steps import ALONE, SHORT_ITEMS, Steps, finish, is_small
 
 __all__ = ["PARAMETERS", "MasterApi", "Notice", "key_of_node", "nothing"]
 

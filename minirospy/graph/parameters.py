@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
+from minirospy.base.names import namespace_of
+from minirospy.base.steps import SMALL_ITEMS, Steps, finish, is_small
 from minirospy.graph.shares import Excess, Shares, holder_of
-from minirospy.names import namespace_of
-from minirospy.steps import SMALL_ITEMS, Steps, finish, is_small
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 

@@ -5,7 +5,7 @@ Pure. Sizes are those of CPython on 64 bits: a name that is registered is in up 
 
 from __future__ import annotations
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.graph.shares import Excess, Shares
 
 __all__ = [

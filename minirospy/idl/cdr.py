@@ -19,7 +19,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import NamedTuple, Union, cast
 
-from minirospy.errors import DefinitionError, DeserializationError
+from minirospy.base.errors import DefinitionError, DeserializationError
 from minirospy.idl.source import Source
 
 __all__ = [

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from minirospy.errors import DefinitionError
+from minirospy.base.errors import DefinitionError
 from minirospy.idl.spec import MessageSpec, ServiceSpec
 from minirospy.idl.validate import MOST_LEVELS
 

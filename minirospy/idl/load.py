@@ -21,7 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from minirospy.errors import DefinitionError, NotFoundError
+from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
 from minirospy.idl.validate import MOST_TEXT, check_type_name, check_types, is_type_name
 

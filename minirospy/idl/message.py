@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple, TextIO, TypeVar, cast
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     DeserializationError,
     MessageException,
     SerializationError,
     SerializationOverflowError,
 )
+from minirospy.base.times import Duration, Time, TVal
 from minirospy.idl.protocols import is_message, is_stamped
-from minirospy.times import Duration, Time, TVal
 
 if TYPE_CHECKING:
     from minirospy.idl import protocols

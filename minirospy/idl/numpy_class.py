@@ -9,11 +9,11 @@ from functools import lru_cache
 from types import ModuleType
 from typing import TypeVar
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
+from minirospy.base.installation import install_command
 from minirospy.idl.arrays import arrays_from_bytes
 from minirospy.idl.message import Message as BaseMessage
 from minirospy.idl.protocols import Buffer, Message, Writer
-from minirospy.installation import install_command
 
 __all__ = ["NumpyMissingError", "numpy_class"]
 

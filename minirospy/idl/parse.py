@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from minirospy.errors import DefinitionError
-from minirospy.escape import escaped
+from minirospy.base.errors import DefinitionError
+from minirospy.base.escape import escaped
 from minirospy.idl.spec import (
     PRIMITIVES,
     ActionSpec,

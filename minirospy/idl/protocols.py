@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol, TypeAlias, TypeGuard
 
-from minirospy.times import Time
+from minirospy.base.times import Time
 
 __all__ = [
     "Action",

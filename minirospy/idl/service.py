@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from minirospy.errors import ServiceException
+from minirospy.base.errors import ServiceException
 from minirospy.idl.protocols import Message
 
 __all__ = ["to_response"]

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 
-from minirospy.errors import DefinitionError
+from minirospy.base.errors import DefinitionError
 from minirospy.idl.source import python_name
 from minirospy.idl.spec import PRIMITIVES, MessageSpec
 

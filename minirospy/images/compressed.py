@@ -5,8 +5,8 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from minirospy.base.installation import install_command
 from minirospy.images.sizes import size_of
-from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     from minirospy.images.encodings import Pixels

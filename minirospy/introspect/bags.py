@@ -21,8 +21,8 @@ from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import Connection, read_version
 from minirospy.bag.repair import Repair
 from minirospy.bag.writer import BagWriter, Continued
-from minirospy.errors import BagError, BagFormatError, DefinitionError, UsageError, ValueTextError
-from minirospy.times import Time
+from minirospy.base.errors import BagError, BagFormatError, DefinitionError, UsageError, ValueTextError
+from minirospy.base.times import Time
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from minirospy.errors import MinirospyError
-from minirospy.yaml_text import fast_loader, load_all
+from minirospy.base.errors import MinirospyError
+from minirospy.base.yaml_text import fast_loader, load_all
 
 __all__ = ["configuration_documents", "parameter_values"]
 

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, cast
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
+from minirospy.base.times import Time
 from minirospy.idl.protocols import is_message, is_stamped
 from minirospy.introspect.fields import field_type, field_value, parse_path
 from minirospy.introspect.messages import MessageClasses, fill, serialize, words_of
 from minirospy.introspect.plot import plot_header, plot_row
-from minirospy.times import Time
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message

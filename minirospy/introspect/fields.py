@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import NotFoundError, UsageError
+from minirospy.base.errors import NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message

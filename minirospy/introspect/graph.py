@@ -7,9 +7,9 @@ import os
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy import names
-from minirospy.environment import master_and_namespace
-from minirospy.errors import NotFoundError, RpcRefused
+from minirospy.base import names
+from minirospy.base.environment import master_and_namespace
+from minirospy.base.errors import NotFoundError, RpcRefused
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:

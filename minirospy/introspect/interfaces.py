@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from enum import Enum
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.idl.digest import Lookup, message_md5, service_md5
 from minirospy.idl.load import Catalogue
 from minirospy.idl.spec import MessageSpec, ServiceSpec

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
-from minirospy.errors import MinirospyError, NotFoundError
+from minirospy.base.errors import MinirospyError, NotFoundError
 from minirospy.introspect.nodes import find_node
 from minirospy.introspect.services import call_service, fill_request
 

@@ -9,7 +9,7 @@ import itertools
 from io import BytesIO
 from typing import TYPE_CHECKING, TypeVar
 
-from minirospy.errors import MessageException, NotFoundError
+from minirospy.base.errors import MessageException, NotFoundError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -88,8 +88,8 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 def words_of(nanoseconds: int) -> dict[str, object]:
     """Return the words that represent a value: ``now`` is the time, ``auto`` a stamped header."""
+    from minirospy.base.times import Time
     from minirospy.idl.load import get_message_class
-    from minirospy.times import Time
 
     now = Time(*divmod(nanoseconds, 10**9))
     header = get_message_class("std_msgs/Header")

@@ -17,7 +17,7 @@ _PLUGIN_TAGS = (
 
 def plugin_rule_files() -> Iterator[tuple[Path, str]]:
     """Yield the rule files that packages export, and their names."""
-    from minirospy.errors import ManifestError
+    from minirospy.base.errors import ManifestError
     from minirospy.workspace.manifest import read_manifest
     from minirospy.workspace.packages import Packages
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
-from minirospy.errors import DefinitionError
+from minirospy.base.errors import DefinitionError
 from minirospy.idl.spec import PRIMITIVES, FieldType
 
 if TYPE_CHECKING:

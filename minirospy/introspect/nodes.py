@@ -10,7 +10,7 @@ import socket
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     SUSPENDED,
     NodeUnreachableError,
     NotFoundError,

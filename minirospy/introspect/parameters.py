@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import NotFoundError, RpcRefused, ValueTextError
+from minirospy.base.errors import NotFoundError, RpcRefused, ValueTextError
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import check_parameter, format_value, parse_documents
 

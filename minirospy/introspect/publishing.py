@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from minirospy.errors import NotFoundError, ROSTimeMovedBackwardsException, UsageError
+from minirospy.base.errors import NotFoundError, ROSTimeMovedBackwardsException, UsageError
 from minirospy.introspect.values import message_values, parse_arguments, parse_documents, parse_lines
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     SUSPENDED,
     CallFailed,
     HandshakeRefused,

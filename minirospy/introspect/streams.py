@@ -13,8 +13,8 @@ import threading
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
-from minirospy.errors import MessageException, MinirospyError, RpcRefused
+from minirospy.base.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
+from minirospy.base.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.idl.protocols import is_stamped
 from minirospy.introspect.messages import MessageClasses, serialize
 from minirospy.introspect.topics import TopicField, find_topic
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import TracebackType
 
-    from minirospy.environment import Environment
+    from minirospy.base.environment import Environment
     from minirospy.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from minirospy.environment import is_own_host
+from minirospy.base.environment import is_own_host
 from minirospy.introspect.doctor.graph import Answers, NodeAnswer, ask_nodes, differing_types, node_trouble
 from minirospy.introspect.doctor.reach import MasterPlace, host_port, look_up
 from minirospy.introspect.graph import Graph

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.introspect.graph import Graph, NodeAddress, in_namespace, node_host, unknown_topic
 
 if TYPE_CHECKING:

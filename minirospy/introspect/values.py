@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
-from minirospy import yaml_text
-from minirospy.errors import ValueTextError
-from minirospy.yaml_text import one_line
+from minirospy.base import yaml_text
+from minirospy.base.errors import ValueTextError
+from minirospy.base.yaml_text import one_line
 
 if TYPE_CHECKING:
     import yaml

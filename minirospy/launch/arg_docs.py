@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
-from minirospy.errors import LaunchError
+from minirospy.base.errors import LaunchError
 from minirospy.launch.document import Tag, parse_document
 from minirospy.launch.files import read_launch_file
 from minirospy.launch.spec import ArgDoc

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.errors import LaunchError
+from minirospy.base.errors import LaunchError
 from minirospy.launch.command import node_command
 from minirospy.launch.load import LaunchSource, Problems, load_sources
 from minirospy.launch.spec import LaunchSpec

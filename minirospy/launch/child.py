@@ -9,8 +9,8 @@ import contextlib
 import os
 import threading
 
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError, RpcError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError, RpcError
 from minirospy.launch.load import load_text
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process

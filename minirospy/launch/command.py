@@ -7,8 +7,8 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment, export_local
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment, export_local
+from minirospy.base.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import NotExecutableError, Packages, with_prefix
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import LaunchError
+from minirospy.base.errors import LaunchError
 from minirospy.launch.arg_docs import describe_args
 from minirospy.launch.load import LaunchSource, Problems, load_sources
 from minirospy.workspace.manifest import Kind, read_manifest

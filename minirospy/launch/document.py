@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
-from minirospy.errors import LaunchError, NotFoundError
+from minirospy.base.errors import LaunchError, NotFoundError
+from minirospy.base.suggestions import nearest
+from minirospy.base.xml_text import XmlElement as Element
+from minirospy.base.xml_text import XmlError, XmlSyntaxError, parse_xml
 from minirospy.launch.substitution import Substitution, SubstitutionError
-from minirospy.suggestions import nearest
-from minirospy.xml_text import XmlElement as Element
-from minirospy.xml_text import XmlError, XmlSyntaxError, parse_xml
 
 __all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError
-from minirospy.suggestions import nearest
+from minirospy.base.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.base.suggestions import nearest
 from minirospy.workspace.packages import Packages, package_name
 
 __all__ = [

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from minirospy.escape import own_output
+from minirospy.base.escape import own_output
 
 if TYPE_CHECKING:
     from types import TracebackType

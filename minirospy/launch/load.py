@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy import names
-from minirospy.errors import LaunchError
+from minirospy.base import names
+from minirospy.base.errors import LaunchError
+from minirospy.base.suggestions import nearest
 from minirospy.launch.document import Tag, parse_document
 from minirospy.launch.files import hidden_hint, near_files, read_bytes, read_launch_file
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
 from minirospy.launch.substitution import Substitution
-from minirospy.suggestions import nearest
 from minirospy.workspace.packages import Packages
 
 __all__ = [

@@ -10,8 +10,8 @@ import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from minirospy.environment import DISTRO, ROS_VERSION, Environment, run_folder
-from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
+from minirospy.base.environment import DISTRO, ROS_VERSION, Environment, run_folder
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, start_process
 from minirospy.launch.spec import LaunchSpec

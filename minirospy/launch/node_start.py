@@ -6,8 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
 from minirospy.launch.command import node_command, node_environment, node_folder
 from minirospy.launch.master import LaunchMaster
 from minirospy.launch.options import RunOptions

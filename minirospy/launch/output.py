@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
-from minirospy import private_files
+from minirospy.base import private_files
 
 __all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
 

@@ -15,8 +15,8 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy import names
-from minirospy.errors import ValueTextError
+from minirospy.base import names
+from minirospy.base.errors import ValueTextError
 from minirospy.introspect.parameters import flatten
 from minirospy.introspect.values import check_parameter, parse_value
 from minirospy.launch.document import Tag

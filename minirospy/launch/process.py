@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TypedDict
 
-from minirospy import private_files
-from minirospy.child_lifetime import guard_children, start_outside_of_job
-from minirospy.errors import MinirospyError
+from minirospy.base import private_files
+from minirospy.base.child_lifetime import guard_children, start_outside_of_job
+from minirospy.base.errors import MinirospyError
 from minirospy.launch import guardian
 from minirospy.launch.spec import NodeSpec
 
@@ -77,7 +77,7 @@ class _Group(TypedDict, total=False):
 class Guardian:
     """Is notified of each process that starts and ends; where this process is killed, it ends those that are left.
 
-    On Windows the system ends them (`minirospy.child_lifetime`). There a guardian only unregisters nodes, from a master that
+    On Windows the system ends them (`minirospy.base.child_lifetime`). There a guardian only unregisters nodes, from a master that
     this launch has not started, and else no process is started for it.
     """
 

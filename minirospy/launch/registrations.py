@@ -12,7 +12,7 @@ import threading
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from minirospy.errors import MasterUnreachableError, RpcError
+from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import forget_node, has_exited
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState

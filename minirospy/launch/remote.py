@@ -18,8 +18,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, cast
 
-from minirospy.environment import Environment
-from minirospy.errors import LaunchError, MinirospyError, RpcError, RpcFault
+from minirospy.base.environment import Environment
+from minirospy.base.errors import LaunchError, MinirospyError, RpcError, RpcFault
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, Timeouts, end_processes, start_process
 from minirospy.launch.spec import MachineSpec, NodeSpec

@@ -16,8 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.environment import Environment, is_own_host
-from minirospy.errors import LaunchError, MinirospyError
+from minirospy.base.environment import Environment, is_own_host
+from minirospy.base.errors import LaunchError, MinirospyError
 from minirospy.launch.command import node_command, node_program
 from minirospy.launch.master import CORE_PARAMETERS, LaunchMaster
 from minirospy.launch.node_start import NodeStarter

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from minirospy.errors import LaunchError
-from minirospy.names import anonymous_name
+from minirospy.base.errors import LaunchError
+from minirospy.base.names import anonymous_name
 
 __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand", "TestSpec"]
 

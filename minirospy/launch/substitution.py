@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from minirospy import names
+from minirospy.base import names
 from minirospy.workspace.packages import Packages
 
 __all__ = ["Substitution", "SubstitutionError", "convert"]
@@ -185,7 +185,7 @@ def convert(text: str, type_: str) -> object:
     if kind == "yaml":
         import yaml
 
-        from minirospy.yaml_text import fast_loader, load
+        from minirospy.base.yaml_text import fast_loader, load
 
         try:
             loaded: object = load(text, fast_loader())

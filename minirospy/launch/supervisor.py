@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, Timeouts, end_processes
 from minirospy.launch.spec import NodeSpec

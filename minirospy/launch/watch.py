@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.launch.command import node_program
 from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import Packages

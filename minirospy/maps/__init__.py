@@ -1,6 +1,6 @@
 """Maps: image files -> OccupancyGrid -> image files. Source: http://wiki.ros.org/map_server."""
 
-from minirospy.ros1_imports import prefer_ros1
+from minirospy.base.ros1_imports import prefer_ros1
 
 # Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
 prefer_ros1()

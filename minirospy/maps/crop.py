@@ -14,10 +14,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
+from minirospy.base.yaml_text import load, one_line
 from minirospy.maps.grid import UNKNOWN_GREY, MapError, read_settings
 from minirospy.maps.images import read_image
-from minirospy.yaml_text import load, one_line
 
 __all__ = ["crop", "main"]
 

@@ -14,9 +14,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
+from minirospy.base.yaml_text import load
 from minirospy.maps.images import Pixels
-from minirospy.yaml_text import load
 
 __all__ = [
     "FREE_GREY",

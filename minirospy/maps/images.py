@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from minirospy.errors import MinirospyError
-from minirospy.installation import install_command
+from minirospy.base.errors import MinirospyError
+from minirospy.base.installation import install_command
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from nav_msgs.msg import OccupancyGrid
 
 from minirospy import client as rospy
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 from minirospy.maps.grid import MapError, pgm_of_grid, yaml_of_map, yaw_of_quaternion
 
 __all__ = ["SaverOptions", "main", "parse_options", "save_map"]

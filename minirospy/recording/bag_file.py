@@ -9,9 +9,9 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import BinaryIO, Protocol, cast
 
-from minirospy import private_files
 from minirospy.bag.writer import BagWriter, Buffer
-from minirospy.errors import BagFormatError
+from minirospy.base import private_files
+from minirospy.base.errors import BagFormatError
 from minirospy.recording.disk import DiskThread, QueuedFile
 from minirospy.recording.options import RecordOptions
 

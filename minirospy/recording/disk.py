@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from minirospy.private_files import open_file
+from minirospy.base.private_files import open_file
 
 __all__ = ["DiskThread", "QueuedFile"]
 

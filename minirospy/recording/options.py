@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 
 __all__ = ["MEGABYTE", "RecordOptions", "parse_duration", "parse_size", "topic_filter"]
 

@@ -6,7 +6,7 @@ import contextlib
 import sys
 import time
 
-from minirospy.clock import SignalSafeEvent
+from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 

@@ -20,9 +20,9 @@ from functools import partial
 from pathlib import Path
 
 from minirospy import client
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.errors import BagFormatError, MasterUnreachableError, RpcError
 from minirospy.client.session import current_session
-from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import BagFormatError, MasterUnreachableError, RpcError
 from minirospy.idl.protocols import Message
 from minirospy.recording.bag_file import BagFile
 from minirospy.recording.disk import DiskThread

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from minirospy.bag.base import BagReader, StoredMessage
 from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.records import Connection
-from minirospy.errors import BagError, BagUnindexedError, NotFoundError
+from minirospy.base.errors import BagError, BagUnindexedError, NotFoundError
 
 __all__ = ["Bags", "ReadAhead", "Selection", "open_reader"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError, UrdfError
+from minirospy.base.errors import MinirospyError, UrdfError
 from minirospy.urdf.model import Robot
 from minirospy.urdf.read import parse_robot
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from minirospy import client as rospy
-from minirospy.escape import escaped, own_output
-from minirospy.keyboard import Keys
+from minirospy.base.escape import escaped, own_output
+from minirospy.base.keyboard import Keys
 from minirospy.robots.joint_publisher import JointPublisher, run_node
 from minirospy.robots.sliders import HINT, Row, Sliders
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from minirospy.errors import MinirospyError, UrdfError
+from minirospy.base.errors import MinirospyError, UrdfError
 from minirospy.urdf.elements import Element, parse_xml
 from minirospy.urdf.values import NotANumberError, as_float
 

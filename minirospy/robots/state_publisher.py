@@ -16,9 +16,9 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from minirospy import client as rospy
+from minirospy.base.times import Time
 from minirospy.robots.description import DescriptionError, robot_of_parameter
 from minirospy.robots.frames import LinkPose, RobotFrames, prefixed
-from minirospy.times import Time
 from minirospy.urdf.model import JointType, Robot
 
 __all__ = ["StatePublisher", "main"]

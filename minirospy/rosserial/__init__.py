@@ -1,6 +1,6 @@
 """Microcontrollers as nodes, over a serial line or TCP. Source: http://wiki.ros.org/rosserial, http://wiki.ros.org/rosserial_python."""
 
-from minirospy.ros1_imports import prefer_ros1
+from minirospy.base.ros1_imports import prefer_ros1
 
 # Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
 prefer_ros1()

@@ -18,7 +18,7 @@ from rosserial_msgs.srv import RequestParamRequest, RequestParamResponse
 from std_msgs.msg import Time
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.rosserial.endpoints import (
     EndpointError,
     Publisher,

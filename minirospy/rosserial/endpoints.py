@@ -11,7 +11,7 @@ from typing import Any
 from rosserial_msgs.msg import TopicInfo
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.idl.load import get_message_class, get_service_class
 from minirospy.idl.protocols import Message
 

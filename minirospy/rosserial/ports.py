@@ -7,8 +7,8 @@ import socket
 import time
 from typing import Any, Protocol, runtime_checkable
 
-from minirospy.errors import MinirospyError
-from minirospy.installation import install_command
+from minirospy.base.errors import MinirospyError
+from minirospy.base.installation import install_command
 
 __all__ = ["File", "FilePort", "Port", "PortError", "SerialPort", "SocketPort"]
 

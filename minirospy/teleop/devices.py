@@ -18,8 +18,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from minirospy.errors import MinirospyError
-from minirospy.installation import install_command
+from minirospy.base.errors import MinirospyError
+from minirospy.base.installation import install_command
 from minirospy.teleop.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, LARGEST, Event
 from minirospy.teleop.rumble import Rumble, RumbleError, event_device
 

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 
 __all__ = ["Rumble", "RumbleError", "event_device", "pack_effect", "pack_event"]
 

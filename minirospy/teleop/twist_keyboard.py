@@ -14,8 +14,8 @@ from typing import NamedTuple
 from geometry_msgs.msg import Twist, TwistStamped
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
-from minirospy.keyboard import LOOK_SECONDS, Keys
+from minirospy.base.errors import MinirospyError
+from minirospy.base.keyboard import LOOK_SECONDS, Keys
 
 __all__ = ["HELP", "Direction", "KeyTeleop", "main"]
 

@@ -13,10 +13,10 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from minirospy.child_lifetime import guard_children
-from minirospy.clock import SignalSafeEvent
-from minirospy.errors import MinirospyError
-from minirospy.signal_dispatch import interrupt_signals
+from minirospy.base.child_lifetime import guard_children
+from minirospy.base.clock import SignalSafeEvent
+from minirospy.base.errors import MinirospyError
+from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
 from minirospy.testing.unit import XML_OUTPUT_FLAG
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import ClassVar
 from xml.etree import ElementTree
 
-from minirospy import private_files
-from minirospy.xml_text import XmlError, check_xml
+from minirospy.base import private_files
+from minirospy.base.xml_text import XmlError, check_xml
 
 __all__ = [
     "Result",

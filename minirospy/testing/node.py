@@ -9,7 +9,7 @@ import unittest
 import warnings
 from collections.abc import Sequence
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 from minirospy.testing import unit
 

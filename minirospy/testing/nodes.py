@@ -13,7 +13,7 @@ from collections.abc import Callable, Container
 from typing import Any, TypeAlias
 
 from minirospy import client as rospy
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.services import service_type
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState

@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from minirospy.environment import Environment
-from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.launch.runner import Launcher, RunOptions
 from minirospy.launch.spec import LaunchSpec, TestSpec
 from minirospy.runtime.master.master import Master

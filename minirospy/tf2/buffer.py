@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,

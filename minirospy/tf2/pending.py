@@ -13,7 +13,7 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 from minirospy.tf2.rotation import Quaternion, Vector
 
 __all__ = ["Arrival", "Layout", "Layouts", "TransformSample", "read_transforms", "without_slash"]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from topic_tools.srv import MuxAdd, MuxDelete, MuxList, MuxSelect
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 
 __all__ = ["main"]
 

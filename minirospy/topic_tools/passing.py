@@ -7,9 +7,9 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 
 from minirospy import client as rospy
+from minirospy.base.errors import ROSInterruptException
+from minirospy.base.names import is_legal_name
 from minirospy.client.topics import AnyMsg, SubscribeListener
-from minirospy.errors import ROSInterruptException
-from minirospy.names import is_legal_name
 
 __all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
 

@@ -10,9 +10,9 @@ import threading
 from collections.abc import Sequence
 
 from minirospy import client as rospy
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.client.topics import AnyMsg
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.topic_tools.passing import Input, Output, base_name, flag, run_node
 

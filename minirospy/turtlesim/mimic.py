@@ -11,7 +11,7 @@ from geometry_msgs.msg import Twist
 from turtlesim.msg import Pose
 
 from minirospy import client as rospy
-from minirospy.names import join
+from minirospy.base.names import join
 
 __all__ = ["main"]
 

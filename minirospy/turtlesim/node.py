@@ -36,7 +36,7 @@ from turtlesim.srv import (
 )
 
 from minirospy import client as rospy
-from minirospy.names import join
+from minirospy.base.names import join
 from minirospy.turtlesim.canvas import Color
 from minirospy.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Velocity, World, WorldError
 

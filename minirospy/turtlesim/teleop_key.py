@@ -10,7 +10,7 @@ import sys
 from geometry_msgs.msg import Twist
 
 from minirospy import client as rospy
-from minirospy.keyboard import Keys
+from minirospy.base.keyboard import Keys
 
 __all__ = ["DIRECTIONS", "main"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from minirospy.escape import escaped, own_output
+from minirospy.base.escape import escaped, own_output
 from minirospy.turtlesim.canvas import PIXELS, Canvas, Color
 from minirospy.turtlesim.world import SIZE, Pose, World
 

@@ -10,8 +10,8 @@ import math
 import struct
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError
-from minirospy.names import is_legal_name
+from minirospy.base.errors import MinirospyError
+from minirospy.base.names import is_legal_name
 from minirospy.turtlesim.canvas import PIXELS, Canvas, Color
 
 __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from minirospy.errors import UrdfError
+from minirospy.base.errors import UrdfError
 from minirospy.urdf.model import Problem, Robot
 from minirospy.urdf.poses import quaternion_from_rpy, rpy_from_quaternion
 

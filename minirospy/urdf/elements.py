@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from minirospy.errors import UrdfError
-from minirospy.xml_text import XmlElement as Element
-from minirospy.xml_text import XmlError, XmlSyntaxError
-from minirospy.xml_text import parse_xml as _parse
+from minirospy.base.errors import UrdfError
+from minirospy.base.xml_text import XmlElement as Element
+from minirospy.base.xml_text import XmlError, XmlSyntaxError
+from minirospy.base.xml_text import parse_xml as _parse
 
 __all__ = ["Element", "parse_xml"]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from minirospy.errors import UrdfError
+from minirospy.base.errors import UrdfError
 from minirospy.urdf.elements import Element, parse_xml
 from minirospy.urdf.joints import read_joint
 from minirospy.urdf.links import ElementError, read_link, read_material

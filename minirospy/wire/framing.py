@@ -15,7 +15,7 @@ import struct
 from collections.abc import Iterator
 from typing import Any, NamedTuple, SupportsIndex, overload
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 
 __all__ = [
     "CHUNK",

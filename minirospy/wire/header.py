@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 
 __all__ = ["MAX_HEADER", "Header", "parse_header", "serialize_header"]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator
 from functools import lru_cache
 from typing import NamedTuple
 
-from minirospy.errors import RpcProtocolError
+from minirospy.base.errors import RpcProtocolError
 
 __all__ = [
     "MAX_BODY",

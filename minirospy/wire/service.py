@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.wire.framing import MAX_FRAME
 
 __all__ = [

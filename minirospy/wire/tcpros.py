@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from minirospy.errors import HandshakeRefused, WireError
-from minirospy.escape import escaped, has_controls
+from minirospy.base.errors import HandshakeRefused, WireError
+from minirospy.base.escape import escaped, has_controls
 from minirospy.wire.header import Header
 
 __all__ = [

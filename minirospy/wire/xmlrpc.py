@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.steps import Steps
+from minirospy.base.errors import RpcFault, RpcProtocolError
+from minirospy.base.steps import Steps
 from minirospy.wire.xmlrpc_plain import read_plain
 from minirospy.wire.xmlrpc_reader import DateTime, Reader, read_document
 from minirospy.wire.xmlrpc_writer import Output, escape, write, write_in_steps

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from io import BytesIO
 from typing import Any, NamedTuple
 
-from minirospy.errors import RpcProtocolError
+from minirospy.base.errors import RpcProtocolError
 
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 

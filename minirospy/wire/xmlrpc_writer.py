@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from minirospy.errors import RpcProtocolError
-from minirospy.steps import ALONE, Need, Steps
+from minirospy.base.errors import RpcProtocolError
+from minirospy.base.steps import ALONE, Need, Steps
 from minirospy.wire.xmlrpc_reader import MAX_DEPTH, DateTime
 
 __all__ = ["Output", "escape", "write", "write_in_steps"]

@@ -14,10 +14,10 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from minirospy.errors import BuildError, DefinitionError, NotFoundError
+from minirospy.base.errors import BuildError, DefinitionError, NotFoundError
+from minirospy.base.suggestions import did_you_mean
 from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
 from minirospy.idl.spec import MessageSpec
-from minirospy.suggestions import did_you_mean
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import naming_warning

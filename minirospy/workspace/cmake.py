@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 
 __all__ = ["Statement", "Word", "keyword_arguments", "parse_cmake"]
 

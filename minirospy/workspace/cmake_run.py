@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.cmake import Statement, Word, keyword_arguments, parse_cmake
 
 __all__ = ["Command", "run_cmake"]

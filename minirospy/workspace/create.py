@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 
 __all__ = ["NewPackage", "create_package"]
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.errors import ManifestError, MinirospyError, NotFoundError
+from minirospy.base.errors import ManifestError, MinirospyError, NotFoundError
 from minirospy.workspace.packages import Packages
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ It is consulted where a package, a program or a module is not found: what a work
 
 from __future__ import annotations
 
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 
 __all__ = ["IMPORTED", "SUBMODULES", "advice"]
 

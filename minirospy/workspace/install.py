@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Install, Plan
 from minirospy.workspace.python_setup import read_python_setup

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.parsers import expat
 
-from minirospy.errors import ManifestError
-from minirospy.xml_text import MAX_LEVELS, XmlError, new_parser
+from minirospy.base.errors import ManifestError
+from minirospy.base.xml_text import MAX_LEVELS, XmlError, new_parser
 
 __all__ = [
     "PACKAGE_NAME",

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.packages import built_in_roots
 from minirospy.workspace.plan import DIST_PACKAGES, Plan
 

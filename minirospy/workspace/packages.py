@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
-from minirospy.errors import MinirospyError, NotFoundError
+from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.base.errors import MinirospyError, NotFoundError
 
 __all__ = [
     "CrawlTime",

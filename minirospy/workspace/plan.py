@@ -16,8 +16,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import BuildError, ManifestError
-from minirospy.suggestions import did_you_mean
+from minirospy.base.errors import BuildError, ManifestError
+from minirospy.base.suggestions import did_you_mean
 from minirospy.workspace.cmake import keyword_arguments
 from minirospy.workspace.cmake_run import Command, run_cmake
 from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest, read_manifest

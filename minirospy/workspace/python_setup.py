@@ -19,7 +19,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.manifest import VARIABLES, read_manifest
 
 __all__ = ["PythonSetup", "read_python_setup"]

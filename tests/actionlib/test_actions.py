@@ -149,9 +149,9 @@ print(max(sizes))
 
     def test_timeouts_run_on_simulated_time(self) -> None:
         said = run("""
-import minirospy.clock
+import minirospy.base.clock
 from minirospy.client.session import current_session
-clock = current_session().clock = minirospy.clock.SimulatedClock(10**9)
+clock = current_session().clock = minirospy.base.clock.SimulatedClock(10**9)
 client.send_goal(TestGoal(3))
 answers = []
 waiting = threading.Thread(target=lambda: answers.append(client.wait_for_result(rospy.Duration(100))))

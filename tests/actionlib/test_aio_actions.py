@@ -17,7 +17,7 @@ from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError, ServerGoal
 from minirospy.actionlib.aio import server as server_module
 from minirospy.actionlib.spec import ActionException
-from minirospy.errors import ROSException, ROSInterruptException
+from minirospy.base.errors import ROSException, ROSInterruptException
 from minirospy.graph.goals import GoalState
 from tests.waiting import until
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from minirospy.base.errors import MessageException
 from minirospy.cli.ros.axclient import progress
 from minirospy.cli.ros.form import ask_for, fields
-from minirospy.errors import MessageException
 from minirospy.workspace.packages import Packages
 
 SERVER = """

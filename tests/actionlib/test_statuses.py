@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.actionlib.statuses import StatusList, find_status, status_bytes
-from minirospy.errors import MessageException
+from minirospy.base.errors import MessageException
 
 texts = st.text(st.characters(exclude_categories=("Cs",)), max_size=20)
 statuses = st.builds(

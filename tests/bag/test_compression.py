@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.bag.compression import BZ2, COMPRESSIONS, LZ4, check_compression, compress, decompress
-from minirospy.errors import BagCompressionError, BagFormatError
-from minirospy.installation import install_command
+from minirospy.base.errors import BagCompressionError, BagFormatError
+from minirospy.base.installation import install_command
 
 LARGE = os.urandom(700_000) + b"ros " * 700_000
 
@@ -127,7 +127,7 @@ def test_much_data_is_in_memory_once(name: str, announced: int, tmp_path: Path) 
     program = f"""
 import resource, sys
 from minirospy.bag.compression import decompress
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 data = open(sys.argv[1], "rb").read()
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:

@@ -21,7 +21,7 @@ from minirospy.bag.reader import ChunkedReader, open_bag
 from minirospy.bag.records import MAGIC, BagHeader, parse_records
 from minirospy.bag.repair import Repair
 from minirospy.bag.writer import BagWriter, Continued
-from minirospy.errors import BagError, BagFormatError, BagUnindexedError
+from minirospy.base.errors import BagError, BagFormatError, BagUnindexedError
 from tests.bag.bags import Given, connection, make_bag
 
 Found = tuple[int, int, bytes]

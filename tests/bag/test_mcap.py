@@ -26,8 +26,14 @@ from minirospy.bag.mcap_reader import McapReader, open_bag_or_mcap
 from minirospy.bag.mcap_repair import McapRepair
 from minirospy.bag.mcap_writer import McapWriter
 from minirospy.bag.writer import BagWriter, Buffer
-from minirospy.errors import BagCompressionError, BagError, BagUnindexedError, McapUnindexedError, UsageError
-from minirospy.installation import install_command
+from minirospy.base.errors import (
+    BagCompressionError,
+    BagError,
+    BagUnindexedError,
+    McapUnindexedError,
+    UsageError,
+)
+from minirospy.base.installation import install_command
 from minirospy.introspect.bag_convert import convert
 
 HEADER = {

@@ -18,7 +18,7 @@ from minirospy.bag.base import BagReader, StoredMessage
 from minirospy.bag.compression import COMPRESSIONS
 from minirospy.bag.reader import ChunkedReader, open_bag
 from minirospy.bag.records import MAGIC
-from minirospy.errors import BagFormatError, BagUnindexedError, BagVersionError
+from minirospy.base.errors import BagFormatError, BagUnindexedError, BagVersionError
 from tests.bag.bags import Given, connection, make_bag
 
 messages = st.builds(

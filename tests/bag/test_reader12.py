@@ -11,7 +11,7 @@ import pytest
 from minirospy.bag.encoding import encode_fields
 from minirospy.bag.reader import open_bag
 from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.errors import BagError, BagFormatError, BagUnindexedError
+from minirospy.base.errors import BagError, BagFormatError, BagUnindexedError
 from tests.bag.bags import STRING, STRING_MD5
 
 MESSAGES = [("/a", 30, b"3"), ("/b", 10, b"1"), ("/a", 20, b"2")]

@@ -39,7 +39,7 @@ from minirospy.bag.records import (
     read_record,
     read_version,
 )
-from minirospy.errors import BagEncryptedError, BagFormatError
+from minirospy.base.errors import BagEncryptedError, BagFormatError
 
 CHATTER = {
     "topic": b"/chatter",

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from minirospy.bag import records
 from minirospy.bag.compression import BZ2, COMPRESSIONS, NONE, decompress
 from minirospy.bag.writer import BagWriter, Buffer, Continued
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 
 SECOND = 10**9
 MESSAGES = 40

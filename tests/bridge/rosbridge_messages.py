@@ -25,7 +25,7 @@ from std_msgs.msg import (
 from std_msgs.msg import Duration as DurationMessage
 from tf2_msgs.msg import TFMessage
 
-from minirospy.times import Duration, Time
+from minirospy.base.times import Duration, Time
 
 __all__ = ["MESSAGES"]
 

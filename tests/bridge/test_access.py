@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import (
     Access,
     Credentials,
@@ -16,7 +17,6 @@ from minirospy.bridge.access import (
     new_token,
     without_token,
 )
-from minirospy.errors import BridgeError
 
 WRITE, READ = "write-token-0001", "read-token-00001"
 GUARDED = Access(read_token=READ, write_token=WRITE, requires_token=True)

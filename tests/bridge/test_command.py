@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 from websockets.exceptions import InvalidStatus
 
+from minirospy.base.environment import Environment
+from minirospy.base.errors import BridgeError
+from minirospy.base.installation import install_command
 from minirospy.bridge.addresses import links, own_addresses, qr_code
 from minirospy.bridge.foxglove.node import options_of
 from minirospy.bridge.tokens import kept_tokens, read_tokens
 from minirospy.cli import bridge as command
-from minirospy.environment import Environment
-from minirospy.errors import BridgeError
-from minirospy.installation import install_command
 from tests.bridge.conftest import Client
 from tests.conftest import free_port
 

@@ -16,8 +16,8 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.base.errors import ServiceException
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.errors import ServiceException
 from minirospy.idl.load import class_from_text
 from tests.bridge.fleet import SECONDS, Fleet, Place
 

@@ -10,6 +10,7 @@ from typing import Any, cast
 import pytest
 import yaml
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet import inquiry
 from minirospy.bridge.fleet.exporter import _MOST_READERS, _MOST_WANTED, Exporter
 from minirospy.bridge.fleet.imported_topic import ImportedTopic
@@ -29,7 +30,6 @@ from minirospy.bridge.fleet.network import _CONTROL_QUERIES, _QUERIES
 from minirospy.bridge.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.bridge.fleet.rules import GatewayRules, Lane
 from minirospy.bridge.fleet.sender import _MOST_OUTLETS, Intake, Sender
-from minirospy.errors import BridgeError
 from tests.waiting import until
 
 MD5 = "0123456789abcdef" * 2

@@ -24,14 +24,14 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64, String
 
+from minirospy.base.errors import BridgeError, ServiceException
+from minirospy.base.installation import install_command
 from minirospy.bridge.fleet.gateway import Gateway
 from minirospy.bridge.fleet.importer import Importer
 from minirospy.bridge.fleet.inquiry import fleet_status
 from minirospy.bridge.fleet.keys import ROOT, in_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
 from minirospy.bridge.fleet.rules import GatewayRules, parse_rates
-from minirospy.errors import BridgeError, ServiceException
-from minirospy.installation import install_command
 from tests.bridge.fleet import SECONDS, Fleet, Place
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 from tests.conftest import free_port

@@ -8,13 +8,13 @@ from contextlib import contextmanager
 import pytest
 from std_msgs.msg import String
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet.contents import FleetContents
 from minirospy.bridge.fleet.holders import HOLD_SECONDS, MAX_HOLDS, Holders, parse_machines
 from minirospy.bridge.fleet.importer import MACHINES, Importer
 from minirospy.bridge.fleet.inquiry import robot_parameter
 from minirospy.bridge.fleet.keys import Claim, TopicToken, claim_key, topic_key
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
-from minirospy.errors import BridgeError
 from tests.bridge.fleet import Fleet, Place
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 

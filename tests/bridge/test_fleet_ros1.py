@@ -10,13 +10,13 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import Empty, SetBool, SetBoolResponse
 
+from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.fleet import ros1_keys
 from minirospy.bridge.fleet.ros1_keys import LOST_SECONDS
 from minirospy.bridge.fleet.ros1_side import Ros1Side
 from minirospy.bridge.fleet.ros1_topic import MARK
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.errors import BridgeError, ServiceException
 from tests.bridge.fleet import SECONDS, Fleet, Place
 from tests.bridge.test_fleet_gateways import collect, publisher
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet import ros1_keys, ros1_side
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, TopicToken
 from minirospy.bridge.fleet.report import Answer, lines
@@ -28,7 +29,6 @@ from minirospy.bridge.fleet.ros1_keys import (
 )
 from minirospy.bridge.fleet.ros1_side import Ros1Side
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.errors import BridgeError
 from tests.bridge.test_fleet_hostile import CLAIM
 
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"

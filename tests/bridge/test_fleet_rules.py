@@ -14,6 +14,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from minirospy.base.errors import BridgeError, DefinitionError, DeserializationError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.fleet import keys
 from minirospy.bridge.fleet.clocks import ClockOffset, Delay, Ping, offset_of
@@ -35,7 +36,6 @@ from minirospy.bridge.fleet.rules import (
     parse_lanes,
     parse_rates,
 )
-from minirospy.errors import BridgeError, DefinitionError, DeserializationError
 from minirospy.introspect.snapshot import Snapshot
 
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"

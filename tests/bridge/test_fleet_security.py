@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from std_msgs.msg import String
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
-from minirospy.errors import BridgeError
 from tests.bridge.fleet import Fleet
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 from tests.bridge.test_fleet_losses import gateway_of

@@ -12,8 +12,8 @@ from geometry_msgs.msg import Twist, TwistStamped
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
+from minirospy.base.errors import ROSException
 from minirospy.bridge.fleet.stopping import CommandStream, at_rest
-from minirospy.errors import ROSException
 from tests.waiting import wait_until
 
 

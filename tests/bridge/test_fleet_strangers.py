@@ -10,6 +10,7 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolResponse
 
+from minirospy.base.errors import MasterUnreachableError
 from minirospy.bridge.fleet.definitions import MAX_QUERIES_OF_GATEWAY, Definitions
 from minirospy.bridge.fleet.imported_topic import MAX_REGISTERING, ImportedTopic, Shared
 from minirospy.bridge.fleet.importer import Importer
@@ -24,7 +25,6 @@ from minirospy.bridge.fleet.keys import (
 )
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.errors import MasterUnreachableError
 from minirospy.idl.load import class_from_text
 from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.fleet import Fleet

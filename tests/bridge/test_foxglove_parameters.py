@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from minirospy.base.errors import RpcRefused
 from minirospy.bridge.foxglove.parameters import Parameters
 from minirospy.bridge.foxglove.protocol import Parameter
 from minirospy.bridge.graph import Filters
-from minirospy.errors import RpcRefused
 
 
 class Listener:

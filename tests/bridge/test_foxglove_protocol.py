@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy.base.errors import BridgeProtocolError
 from minirospy.bridge.foxglove import parsing, serializing
 from minirospy.bridge.foxglove.protocol import (
     Channel,
@@ -36,7 +37,6 @@ from minirospy.bridge.foxglove.protocol import (
     UnsubscribeConnectionGraph,
     UnsubscribeParameterUpdates,
 )
-from minirospy.errors import BridgeProtocolError
 
 # The examples of the specification (docs/spec.md of foxglove/ws-protocol), with this server's encoding.
 FROM_CLIENTS = [

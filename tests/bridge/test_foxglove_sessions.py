@@ -16,14 +16,14 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from minirospy import Node
 from minirospy.aio.raw import raw_class
+from minirospy.base.errors import BridgeError
+from minirospy.base.times import Time
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.types import type_of_text
-from minirospy.errors import BridgeError
 from minirospy.idl.load import class_from_text, classes_from_text
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.times import Time
 from minirospy.wire.tcpros import InterfaceType
 from minirospy.workspace.packages import Packages
 from tests.conftest import write_files

@@ -8,10 +8,10 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
+from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge import node_queries
 from minirospy.bridge.node_queries import AT_ONCE, NodeQueries
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import BridgeError, ServiceException
 from tests.manual_loop import ManualLoop, run_manually
 from tests.waiting import until
 

@@ -20,6 +20,7 @@ from actionlib_tutorials.msg import FibonacciAction, FibonacciActionGoal, Fibona
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.base.errors import BridgeError, DeserializationError
 from minirospy.bridge.ros2.action_links import ActionLink, action_links
 from minirospy.bridge.ros2.action_messages import (
     GoalId,
@@ -40,7 +41,6 @@ from minirospy.bridge.ros2.rclpy_actions import ActionClient as Ros2ActionClient
 from minirospy.bridge.ros2.rclpy_actions import ActionServer as Ros2ActionServer
 from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.side import RclpySide
-from minirospy.errors import BridgeError, DeserializationError
 from minirospy.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from tests.bridge.ros2_definitions import catalogue

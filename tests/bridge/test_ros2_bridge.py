@@ -18,6 +18,7 @@ import pytest
 
 from minirospy import Node
 from minirospy.aio.raw import raw_class
+from minirospy.base.errors import BridgeError, DeserializationError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
 from minirospy.bridge.ros2.layouts import TypesDiffer
@@ -30,7 +31,6 @@ from minirospy.bridge.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
 from minirospy.bridge.ros2.side import large_message_settings
 from minirospy.bridge.ros2.statics import StaticTransforms
 from minirospy.cli.ros2_bridge import main
-from minirospy.errors import BridgeError, DeserializationError
 from minirospy.idl.load import message_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.tcpros import InterfaceType

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from minirospy.base.errors import DeserializationError
 from minirospy.bridge.ros2.cdr_values import decode, encode
 from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.errors import DeserializationError
 from minirospy.idl.type_hash import Fields
 from tests.bridge.ros2_definitions import catalogue
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
+from minirospy.base.errors import DeserializationError
 from minirospy.bridge.ros2.layouts import TypesDiffer, layout_of, ros2_field_type, ros2_spec, transcoder
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.errors import DeserializationError
 from minirospy.idl.cdr import CDR_HEADER, Transcoder, make_transcoder
 from minirospy.idl.load import class_from_text, classes_from_text, message_class, specs_of_text
 from minirospy.idl.spec import FieldType, MessageSpec

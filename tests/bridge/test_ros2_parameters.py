@@ -11,6 +11,7 @@ import pytest
 
 from minirospy import Node
 from minirospy.aio.raw import call_raw
+from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX
 from minirospy.bridge.ros2.parameter_values import (
@@ -22,7 +23,6 @@ from minirospy.bridge.ros2.parameter_values import (
     ros2_name,
     ros2_value,
 )
-from minirospy.errors import BridgeError, ServiceException
 from minirospy.idl.load import service_class
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide

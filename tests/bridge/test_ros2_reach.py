@@ -7,8 +7,8 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from typing import Any
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.ros2.reach import Reach
-from minirospy.errors import BridgeError
 from tests.bridge.test_ros2_bridge import FakeProbe, FakeReachable
 from tests.manual_loop import ManualLoop, run_manually
 

@@ -12,13 +12,13 @@ import pytest
 from minirospy import Node
 from minirospy.aio import raw
 from minirospy.aio.raw import RawService, call_raw, service_header
+from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
 from minirospy.bridge.ros2.rules import BUILT_IN
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
 from minirospy.cli.ros2_bridge import main
-from minirospy.errors import BridgeError, ServiceException
 from minirospy.idl.load import service_class
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.service import serialize_response

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from minirospy.base.errors import BridgeError
+from minirospy.base.installation import install_command
 from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import Ros2End
@@ -23,8 +25,6 @@ from minirospy.bridge.ros2.zenoh_node import ZenohNode
 from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
 from minirospy.cli.ros2_bridge import main
-from minirospy.errors import BridgeError
-from minirospy.installation import install_command
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_zenoh_keys import SERVICE_HASHES, STRING_HASH
 from tests.conftest import free_port

@@ -20,6 +20,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import call_raw
+from minirospy.base.errors import ServiceException
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX
@@ -27,7 +28,6 @@ from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.zenoh_keys import attachment
 from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
-from minirospy.errors import ServiceException
 from minirospy.graph.goals import GoalState
 from minirospy.idl.load import service_class
 from tests.bridge.ros2_definitions import catalogue, typestore

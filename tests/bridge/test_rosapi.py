@@ -18,13 +18,13 @@ from tf2_web_republisher.msg import TFSubscriptionAction, TFSubscriptionGoal
 from tf2_web_republisher.srv import RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionClient, GoalError
+from minirospy.base.times import Duration
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import describe
 from minirospy.bridge.tf_republisher.pairs import FramePair
 from minirospy.bridge.tf_republisher.republisher import Republisher
 from minirospy.idl.load import message_class
-from minirospy.times import Duration
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running

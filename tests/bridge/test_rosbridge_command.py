@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.node_parameters import globs
 from minirospy.bridge.rosbridge.node import main, options_of, refuse
 from minirospy.bridge.video import node as video
-from minirospy.errors import BridgeError
 from tests.bridge.conftest import RosbridgeClient
 from tests.conftest import free_port
 

@@ -24,12 +24,12 @@ from std_msgs.msg import Float32, Header, Int32, Int64MultiArray, String, UInt8M
 from std_srvs.srv import SetBool
 
 from minirospy.aio.handle import serialized
+from minirospy.base.errors import BridgeProtocolError
+from minirospy.base.times import Time
 from minirospy.bridge.rosbridge import conversion, png, protocol
 from minirospy.bridge.rosbridge.cbor import encode_cbor
 from minirospy.bridge.rosbridge.protocol import OperationError, StatusLevel, Subscribe
 from minirospy.bridge.rosbridge.subscription import Fragments, Merged, Pacer, Room, merge
-from minirospy.errors import BridgeProtocolError
-from minirospy.times import Time
 from tests.bridge.rosbridge_messages import MESSAGES
 
 

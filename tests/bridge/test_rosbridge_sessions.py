@@ -26,11 +26,11 @@ from websockets.exceptions import ConnectionClosed
 from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.aio.services import Service
+from minirospy.base.errors import ServiceException
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosbridge import png, protocol
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
-from minirospy.errors import ServiceException
 from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import until, wait_until
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import pytest
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.web.files import PIECE_BYTES, FileAnswer, FileSender
 from minirospy.bridge.web.queue import SendQueue
-from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running

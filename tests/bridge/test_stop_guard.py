@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.stop_guard import StopGuard
-from minirospy.errors import BridgeError
 from tests.waiting import wait_until
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge import tokens
 from minirospy.bridge.tokens import Tokens, kept_tokens, read_tokens
-from minirospy.errors import BridgeError
 
 
 def test_tokens_are_kept_private_and_renewed(tmp_path: Path) -> None:

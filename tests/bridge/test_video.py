@@ -18,11 +18,11 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
 from minirospy.aio.handle import serialized
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import Access, NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.video.options import Picture, VideoRequest, request_of
 from minirospy.bridge.video.pictures import encoded
-from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running

@@ -23,6 +23,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
 from websockets.typing import Subprotocol
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import Access, Grant
 from minirospy.bridge.web import owners
 from minirospy.bridge.web.admission import Rank
@@ -30,7 +31,6 @@ from minirospy.bridge.web.connection import Connection, Limits
 from minirospy.bridge.web.pipe import Endpoints
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.bridge.web.turns import FairTurns
-from minirospy.errors import BridgeError
 from tests.waiting import wait_until
 
 if TYPE_CHECKING:

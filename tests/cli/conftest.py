@@ -16,8 +16,8 @@ from geometry_msgs.msg import Point32, PolygonStamped
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
-from minirospy.environment import Environment
-from minirospy.errors import ServiceException
+from minirospy.base.environment import Environment
+from minirospy.base.errors import ServiceException
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread

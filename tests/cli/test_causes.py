@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment, wrong_address
-from minirospy.errors import LaunchError, NotFoundError
+from minirospy.base.environment import Environment, wrong_address
+from minirospy.base.errors import LaunchError, NotFoundError
 from minirospy.launch.load import load_text
 from minirospy.workspace.packages import Packages
 

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from std_msgs.msg import Bool, String
 
+from minirospy.base.environment import Environment
 from minirospy.cli import doctor
-from minirospy.environment import Environment
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread

@@ -14,7 +14,7 @@ from typing import Any
 import psutil
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.launch.command import node_environment
 from minirospy.launch.spec import NodeSpec
 from minirospy.runtime.node.node import Node

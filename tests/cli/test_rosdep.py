@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.installation import install_command
 from minirospy.cli.ros.rosdep import main
-from minirospy.installation import install_command
 
 
 @pytest.fixture

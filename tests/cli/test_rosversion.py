@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import ROS_VERSION
+from minirospy.base.environment import ROS_VERSION
 
 from .conftest import Command
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from minirospy.base.errors import MasterUnreachableError
 from minirospy.cli import main as umbrella
 from minirospy.cli.ros import roslaunch, rosrun
-from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
@@ -379,7 +379,7 @@ def test_the_line_of_a_node_where_no_master_is_named(
 
 
 def test_roslaunch_does_not_start_a_master_elsewhere(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from minirospy.environment import Environment
+    from minirospy.base.environment import Environment
     from minirospy.launch.runner import Launcher
     from minirospy.launch.spec import LaunchSpec
     from minirospy.workspace.packages import Packages

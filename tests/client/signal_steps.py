@@ -30,10 +30,11 @@ from typing import IO
 import rospy
 from roscpp import msg, srv  # noqa: F401
 
+from minirospy.base.errors import RpcRefused
+
 # What init_node imports: the steps of an import are not those of a node.
 from minirospy.client import params, shutdown, startup  # noqa: F401
 from minirospy.client.session import current_session
-from minirospy.errors import RpcRefused
 from minirospy.runtime.master import log_file  # noqa: F401
 from minirospy.runtime.node import node, registration  # noqa: F401
 from minirospy.runtime.rpc.master_proxy import MasterProxy

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.errors import RpcRefused
+from minirospy.base.errors import RpcRefused
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 
 SPINNER = """

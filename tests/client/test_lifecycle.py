@@ -19,7 +19,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from minirospy.errors import RpcRefused
+from minirospy.base.errors import RpcRefused
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread

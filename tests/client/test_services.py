@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.errors import CallFailed
+from minirospy.base.errors import CallFailed
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 

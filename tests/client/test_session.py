@@ -9,10 +9,10 @@ from typing import cast
 
 import pytest
 
+from minirospy.base.clock import SimulatedClock
 from minirospy.client import session as sessions
 from minirospy.client.session import Session, current_session, replace_session, replace_session_in_fork
 from minirospy.client.shutdown import Action
-from minirospy.clock import SimulatedClock
 from minirospy.runtime.transport.loop import LoopThread
 
 

@@ -16,11 +16,11 @@ from typing import cast
 
 import pytest
 
+from minirospy.base.signal_dispatch import is_dispatching_signal
 from minirospy.client import signals
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action, Awareness, Phase, ShutdownMachine
 from minirospy.client.signals import SignalWatchdog
-from minirospy.signal_dispatch import is_dispatching_signal
 
 
 @pytest.fixture

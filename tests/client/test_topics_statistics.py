@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from std_msgs.msg import Header, String
 
+from minirospy.base.times import Time
 from minirospy.client.statistics import Report, Spread, TopicStatisticsCounter, WindowLimits
-from minirospy.times import Time
 
 TALKER = {"callerid": "/talker"}
 SECOND = 10**9

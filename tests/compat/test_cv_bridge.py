@@ -10,7 +10,7 @@ import pytest
 from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 
 bridge = CvBridge()
 

@@ -17,6 +17,7 @@ from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from minirospy.base.installation import install_command
 from minirospy.compat.image_transport.codecs import (
     CodecError,
     Settings,
@@ -26,7 +27,6 @@ from minirospy.compat.image_transport.codecs import (
     uncompressed_depth,
 )
 from minirospy.compat.image_transport.republish import settings_of
-from minirospy.installation import install_command
 
 BRIDGE = CvBridge()
 PROGRAM = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "image_transport" / "nodes" / "republish"

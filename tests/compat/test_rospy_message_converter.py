@@ -20,7 +20,7 @@ from rospy_message_converter.message_converter import (
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Header
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.idl.load import Catalogue, message_class
 
 MSGS = Path(__file__).parents[2] / "msgs"

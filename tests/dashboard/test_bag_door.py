@@ -20,13 +20,13 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from minirospy.bag.timeline import Timeline
+from minirospy.base.errors import BagFormatError
 from minirospy.bridge.access import Access
 from minirospy.dashboard import bag_door, recording
 from minirospy.dashboard.bag_door import SUBPROTOCOL, BagSession
 from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.bag_player import OpenBag
 from minirospy.dashboard.recording import Recording
-from minirospy.errors import BagFormatError
 from minirospy.launch.process import Process, Timeouts, start_process
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag, text_body

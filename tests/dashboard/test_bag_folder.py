@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.errors import BagError, UsageError
 from minirospy.dashboard.bag_folder import BagFolder
-from minirospy.errors import BagError, UsageError
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import pytest
 
+from minirospy.base.errors import UsageError
 from minirospy.dashboard import json_session
 from minirospy.dashboard.json_session import (
     Fields,
@@ -22,7 +23,6 @@ from minirospy.dashboard.json_session import (
     texts_of,
     wait_until,
 )
-from minirospy.errors import UsageError
 from tests import manual_loop
 from tests.manual_loop import ManualLoop, run_manually
 from tests.waiting import until

@@ -18,12 +18,12 @@ import yaml
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from minirospy.base.errors import RvizFileError
 from minirospy.bridge.access import Access
 from minirospy.cli import dashboard as command
 from minirospy.dashboard import rviz_door
 from minirospy.dashboard.rviz_door import SUBPROTOCOL, RvizDoor
 from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
-from minirospy.errors import RvizFileError
 from tests import manual_loop
 from tests.dashboard.conftest import TOKEN
 from tests.waiting import until

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
+from minirospy.base.errors import UsageError
 from minirospy.cli.dashboard import _dashboard_parser
 from minirospy.dashboard.files import FOLDER
 from minirospy.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields, view_of_plugin
-from minirospy.errors import UsageError
 
 
 def test_page_has_the_views_that_links_name() -> None:

@@ -11,15 +11,15 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
-from minirospy.errors import (
+from minirospy.base.errors import (
     ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,
     LookupException,
     ROSInterruptException,
 )
+from minirospy.base.times import Time
 from minirospy.frames.aio import Broadcaster, Buffer
-from minirospy.times import Time
 from tests.waiting import until
 
 LONG = 40.0

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import TransformStamped
 
-from minirospy import times
+from minirospy.base import times
 from minirospy.frames.interface import (
     BufferInterface,
     ConvertRegistration,

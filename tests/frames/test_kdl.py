@@ -15,7 +15,7 @@ from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
 from tf2_sensor_msgs import do_transform_cloud
 
-from minirospy import times
+from minirospy.base import times
 
 
 def transform() -> TransformStamped:

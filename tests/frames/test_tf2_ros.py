@@ -99,7 +99,7 @@ print([each.child_frame_id for each in first.net_message.transforms])
         said = run(
             """
 from minirospy.client.session import current_session
-from minirospy.clock import SimulatedClock
+from minirospy.base.clock import SimulatedClock
 session = current_session()
 session.clock = SimulatedClock(10 * 10**9)
 buffer = tf2_ros.Buffer()
@@ -227,7 +227,7 @@ except rospy.ROSInterruptException as error:
 import minirospy.frames.waiting as module
 import tf
 from minirospy.client.session import current_session
-from minirospy.clock import SimulatedClock
+from minirospy.base.clock import SimulatedClock
 def wait(event, seconds):
     clock.set(next(times))
 module.wait_for_event = wait
@@ -253,7 +253,7 @@ for call in (
         said = run("""
 import minirospy.frames.waiting as module
 from minirospy.client.session import current_session
-from minirospy.clock import SimulatedClock
+from minirospy.base.clock import SimulatedClock
 clock = current_session().clock = SimulatedClock(100 * 10**9)
 times = iter([100_500_000_000, 100_200_000_000, 161 * 10**9])
 module.wait_for_event = lambda event, seconds: clock.set(next(times))

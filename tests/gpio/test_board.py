@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from minirospy.errors import BoardError
+from minirospy.base.errors import BoardError
 from minirospy.gpio import link
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function

@@ -13,12 +13,12 @@ from types import FrameType
 
 import pytest
 
+from minirospy.base.signal_dispatch import dispatching_signal
 from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function, Setup
 from minirospy.gpio.rpigpio import Gpio
 from minirospy.gpio.wave import Wave
-from minirospy.signal_dispatch import dispatching_signal
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import RpcFault
+from minirospy.base.errors import RpcFault
+from minirospy.base.steps import Steps, finish
 from minirospy.graph.calls import (
     ERROR,
     FAILURE,
@@ -29,7 +30,6 @@ from minirospy.graph.calls import (
     type_name,
     uris,
 )
-from minirospy.steps import Steps, finish
 
 
 class Full(Exception):

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import RpcFault
+from minirospy.base.errors import RpcFault
+from minirospy.base.steps import ALONE, Steps, finish
 from minirospy.graph import parameters, registry_limits
 from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import PARAMETERS, MasterApi, Notice, key_of_node
 from minirospy.graph.parameters import ParameterUpdate
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate
-from minirospy.steps import ALONE, Steps, finish
 
 URI = "http://n:1/"
 INVALID = "Error: invalid arguments"

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy.base.steps import finish
 from minirospy.graph import parameters
 from minirospy.graph.parameters import ParametersFullError, ParameterTree, ParameterUpdate, weigh_in_steps
-from minirospy.steps import finish
 
 MIB = 1024 * 1024
 

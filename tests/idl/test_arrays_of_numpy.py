@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import Image, JointState, LaserScan
 
-from minirospy.errors import SerializationError
+from minirospy.base.errors import SerializationError
 
 
 def written(message: Any) -> bytes:

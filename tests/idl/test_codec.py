@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from minirospy.errors import DeserializationError, SerializationOverflowError
+from minirospy.base.errors import DeserializationError, SerializationOverflowError
+from minirospy.base.times import Duration, Time
 from minirospy.idl.load import class_from_text, specs_of_text
-from minirospy.times import Duration, Time
 
 SEPARATOR = "=" * 80
 NUMBERS = {

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.errors import DefinitionError, DeserializationError
+from minirospy.base.errors import DefinitionError, DeserializationError
 from minirospy.idl.digest import message_md5
 from minirospy.idl.load import Catalogue, class_from_text, compile_package, specs_of_text
 from minirospy.idl.parse import parse_message

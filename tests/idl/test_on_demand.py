@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.idl.load import message_class, service_class
 from minirospy.idl.own_packages import COMPILED_AHEAD, own_definitions
 

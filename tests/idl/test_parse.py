@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import DefinitionError
+from minirospy.base.errors import DefinitionError
 from minirospy.idl.parse import parse_action, parse_message, parse_service
 from minirospy.idl.spec import Constant, Field, FieldType
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from minirospy.errors import DefinitionError, NotFoundError
+from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.idl.emit import emit_class, emit_message, emit_package, emit_service
 from minirospy.idl.load import (
     Catalogue,

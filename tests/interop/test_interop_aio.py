@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger
 
 from minirospy import Node
-from minirospy.errors import ServiceException
+from minirospy.base.errors import ServiceException
 from tests.interop.conftest import PATIENCE
 
 PEER = """

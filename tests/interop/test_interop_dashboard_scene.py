@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from minirospy.base.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.dashboard.files import FOLDER
-from minirospy.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
 from tests.interop.conftest import PATIENCE
 from tests.interop.page_modules import run_script

@@ -25,7 +25,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
-from minirospy.times import Time
+from minirospy.base.times import Time
 from tests.interop.conftest import PATIENCE
 
 FOREIGN = Path(__file__).parent / "foreign"

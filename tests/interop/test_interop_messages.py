@@ -20,7 +20,8 @@ import yaml
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from minirospy.errors import DefinitionError, DeserializationError, MessageException, SerializationError
+from minirospy.base.errors import DefinitionError, DeserializationError, MessageException, SerializationError
+from minirospy.base.times import Duration, Time
 from minirospy.idl.digest import full_text, service_md5
 from minirospy.idl.emit import python_name
 from minirospy.idl.load import (
@@ -33,7 +34,6 @@ from minirospy.idl.load import (
 )
 from minirospy.idl.message import fill_message_args, strify_message
 from minirospy.idl.spec import FieldType, MessageSpec
-from minirospy.times import Duration, Time
 
 HERE = Path(__file__).parent
 REAL_PYTHON = "/usr/bin/python3"

@@ -29,7 +29,7 @@ from rosgraph_msgs.msg import Log
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import RawService, call_raw, raw_class
-from minirospy.errors import ServiceException
+from minirospy.base.errors import ServiceException
 from minirospy.graph.goals import TERMINAL, GoalState
 from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.snapshot import Snapshot, fetch
@@ -292,7 +292,7 @@ def _fill(message: Any, number: int) -> None:
 
 
 def _value(base: str, number: int) -> Any:
-    from minirospy.times import Duration, Time
+    from minirospy.base.times import Duration, Time
 
     if base == "string":
         return "x" * (number % 9)

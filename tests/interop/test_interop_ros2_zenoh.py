@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from minirospy.errors import ServiceException
+from minirospy.base.errors import ServiceException
 from tests.conftest import free_port
 from tests.interop.conftest import OUR_BIN, running_master
 from tests.interop.install_zenoh_peers import CACHE, PYTHON, STAMP

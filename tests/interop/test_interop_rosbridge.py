@@ -26,8 +26,8 @@ from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
+from minirospy.base.errors import ServiceException
 from minirospy.bridge.bridge import Bridge, BridgeOptions
-from minirospy.errors import ServiceException
 from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import modules

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError, RpcUnreachable
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, RpcError, RpcUnreachable
 from minirospy.introspect.doctor import Examination, Finding, Status, reach
 from minirospy.introspect.doctor.machine import check_packages, check_variables
 from minirospy.introspect.doctor.master import clock_finding

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.doctor import Status
 from minirospy.introspect.doctor.frames import Observation, frame_findings
 from minirospy.introspect.doctor.frames import check_frames as check

@@ -12,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Bool, Empty, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from minirospy.errors import DeserializationError, MessageException, NotFoundError, UsageError
+from minirospy.base.errors import DeserializationError, MessageException, NotFoundError, UsageError
 from minirospy.introspect.echo import Echo, Filter, fill_message
 from minirospy.introspect.messages import MessageClasses
 from minirospy.introspect.streams import Received

@@ -6,7 +6,7 @@ import pytest
 from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped
 from sensor_msgs.msg import LaserScan
 
-from minirospy.errors import NotFoundError, UsageError
+from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.introspect.fields import Step, field_type, field_value, parse_path
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import NotFoundError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import NotFoundError
 from minirospy.idl.load import get_message_class, get_service_class
 from minirospy.introspect.interfaces import Interfaces, Kind
 from minirospy.workspace.packages import Packages

@@ -20,7 +20,7 @@ import rostopic
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.streams import ToolNode
 
 

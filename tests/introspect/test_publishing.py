@@ -6,7 +6,7 @@ import threading
 from types import SimpleNamespace
 from typing import Any
 
-from minirospy.errors import ROSTimeMovedBackwardsException
+from minirospy.base.errors import ROSTimeMovedBackwardsException
 from minirospy.introspect.publishing import publish_all
 
 SECOND = 10**9

@@ -13,7 +13,7 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.doctor.own_node import DoctorNode
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.node.node import Node

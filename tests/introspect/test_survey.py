@@ -8,7 +8,7 @@ import pytest
 from std_msgs.msg import Bool, String
 
 from minirospy import Node
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.doctor.graph import NodeAnswer
 from minirospy.introspect.doctor.reach import MasterPlace

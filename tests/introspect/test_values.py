@@ -10,8 +10,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy import yaml_text
-from minirospy.errors import ValueTextError
+from minirospy.base import yaml_text
+from minirospy.base.errors import ValueTextError
 from minirospy.introspect.values import (
     check_parameter,
     format_pretty,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import LaunchError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import LaunchError
 from minirospy.launch.arg_docs import describe_args
 from minirospy.launch.load import LaunchSource, load_files, load_sources, load_text
 from minirospy.launch.spec import LaunchSpec, ParameterCommand

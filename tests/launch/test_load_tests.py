@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.errors import LaunchError
+from minirospy.base.errors import LaunchError
 from minirospy.launch.load import load_text
 from minirospy.launch.spec import LaunchSpec
 from minirospy.workspace.packages import Packages

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from minirospy.child_lifetime import guard_children
+from minirospy.base.child_lifetime import guard_children
 from minirospy.launch import guardian, process
 from minirospy.launch.process import Timeouts, end_processes, start_process
 from minirospy.launch.spec import NodeSpec

@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import forget_node
 from minirospy.launch import registrations

@@ -14,7 +14,7 @@ from typing import Any
 import psutil
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.launch.output import Output
 from minirospy.launch.process import Guardian, Process, start_process
 from minirospy.launch.runner import Launcher, RunOptions

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import MinirospyError, UsageError
-from minirospy.installation import install_command
+from minirospy.base.errors import MinirospyError, UsageError
+from minirospy.base.installation import install_command
 from minirospy.maps.grid import (
     MapError,
     Mode,

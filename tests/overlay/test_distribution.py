@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 
-from minirospy.environment import ROS_VERSION
+from minirospy.base.environment import ROS_VERSION
 
 
 def test_distribution_rospy_has_the_version_of_rosversion() -> None:

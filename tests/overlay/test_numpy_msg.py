@@ -24,9 +24,9 @@ from std_msgs.msg import (
 )
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from minirospy.errors import SerializationError
+from minirospy.base.errors import SerializationError
+from minirospy.base.installation import install_command
 from minirospy.idl.load import class_from_text
-from minirospy.installation import install_command
 
 
 def wire(message: Any) -> bytes:

@@ -11,7 +11,7 @@ import pytest
 import urdf_parser_py.xml_reflection.core
 from urdf_parser_py.urdf import URDF, Box, Link, Visual
 
-from minirospy.errors import UrdfError
+from minirospy.base.errors import UrdfError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 URDFS = Path(__file__).parents[1] / "urdf"

@@ -12,7 +12,7 @@ from typing import IO, NamedTuple
 import pytest
 from rosbags.rosbag1 import Reader
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 from minirospy.recording.options import RecordOptions, parse_duration, parse_size, topic_filter
 
 SECOND = 10**9

@@ -16,7 +16,7 @@ from unittest.mock import Mock
 import pytest
 
 from minirospy.bag.writer import BagWriter
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.introspect.streams import ToolNode
 from minirospy.recording.player import Player
 from minirospy.recording.schedule import PlayOptions

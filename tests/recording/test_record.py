@@ -11,7 +11,7 @@ import pytest
 
 from minirospy.bag import records
 from minirospy.bag.writer import BagWriter
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 from tests.recording.conftest import (
     GUARD,
     STRING,

@@ -11,7 +11,7 @@ import pytest
 
 from minirospy.bag.base import StoredMessage
 from minirospy.bag.records import Connection
-from minirospy.errors import BagFormatError
+from minirospy.base.errors import BagFormatError
 from minirospy.introspect.bag_convert import convert
 from minirospy.recording.sources import Bags, ReadAhead, Selection
 from tests.bag.bags import Given, make_bag

@@ -16,7 +16,7 @@ from rosserial_msgs.msg import TopicInfo
 from std_msgs.msg import String
 
 from minirospy import Node
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 from minirospy.rosserial.endpoints import to_bytes
 from minirospy.rosserial.packets import Decoder, Packet, encode
 from minirospy.rosserial.ports import SerialPort

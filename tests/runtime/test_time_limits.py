@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.base.environment import Environment
 from minirospy.graph.registry import PublisherUpdate
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.notifier import Notifier

@@ -18,7 +18,7 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Joy
 
 from minirospy import Node
-from minirospy.installation import install_command
+from minirospy.base.installation import install_command
 from minirospy.teleop import devices
 from minirospy.teleop.devices import DeviceError, PygameDevice, find_by_name, open_device
 from minirospy.teleop.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, Event

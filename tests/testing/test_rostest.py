@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from minirospy.base.errors import MinirospyError
 from minirospy.cli.ros.rostest import rostest, rosunit
-from minirospy.errors import MinirospyError
 from minirospy.testing.bare import run_bare
 from tests.waiting import wait_until
 

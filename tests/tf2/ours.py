@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from minirospy.errors import InvalidArgumentException, TransformException
+from minirospy.base.errors import InvalidArgumentException, TransformException
 from minirospy.tf2.buffer import StampedTransform, TransformBuffer
 from minirospy.tf2.listing import frames_as_dot, frames_as_yaml
 from tests.tf2.conversation import Answer, Question

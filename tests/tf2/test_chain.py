@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.errors import ConnectivityException, LookupException
+from minirospy.base.errors import ConnectivityException, LookupException
 from minirospy.tf2.buffer import TransformBuffer
 
 SECOND = 1_000_000_000

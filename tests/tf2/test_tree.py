@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import DeserializationError, ExtrapolationException, TransformException
+from minirospy.base.errors import DeserializationError, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
 from minirospy.tf2.insertion import Refusal, RefusalLog
 from minirospy.tf2.pending import Layout, TransformSample

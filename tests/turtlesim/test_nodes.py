@@ -22,7 +22,7 @@ from turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelativ
 
 from minirospy import Node
 from minirospy.aio.topics import Publisher
-from minirospy.errors import ServiceException
+from minirospy.base.errors import ServiceException
 from minirospy.workspace.packages import Packages
 from tests.robots.conftest import SECONDS, Start, end
 
@@ -127,7 +127,7 @@ def test_turtles_come_and_go(start: Start) -> None:
             break
 
     async def topics(node: Node) -> set[str]:
-        from minirospy.environment import Environment
+        from minirospy.base.environment import Environment
         from minirospy.runtime.rpc.master_proxy import MasterProxy
 
         proxy = MasterProxy(Environment.read().master_uri, "/test")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import UrdfError
+from minirospy.base.errors import UrdfError
 from minirospy.urdf.describe import error_lines, problem_lines, tree_lines
 from minirospy.urdf.model import Box, Cylinder, JointType, Limit, Mimic
 from minirospy.urdf.read import parse_robot, read_robot

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.wire.framing import (
     CHUNK,
     MAX_FRAME,

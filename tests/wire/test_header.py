@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.wire.header import MAX_HEADER, parse_header, serialize_header
 
 # "callerid=/a" is 11 bytes, "topic=/t" 8: each with its length in front, the whole with its own.

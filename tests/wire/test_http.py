@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import RpcProtocolError
+from minirospy.base.errors import RpcProtocolError
 from minirospy.wire.http import (
     MAX_BODY,
     HttpHead,

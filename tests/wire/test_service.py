@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.errors import ServiceException, WireError
+from minirospy.base.errors import ServiceException, WireError
 from minirospy.wire.framing import MAX_FRAME
 from minirospy.wire.service import (
     REQUEST_HEAD,

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import HandshakeRefused, WireError
+from minirospy.base.errors import HandshakeRefused, WireError
 from minirospy.wire.tcpros import (
     InterfaceType,
     check_publisher,

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.steps import ALONE, finish
+from minirospy.base.errors import RpcFault, RpcProtocolError
+from minirospy.base.steps import ALONE, finish
 from minirospy.wire import xmlrpc_reader
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.xmlrpc import (

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import RpcProtocolError
+from minirospy.base.errors import RpcProtocolError
 from minirospy.wire.xmlrpc import serialize_call, serialize_response
 from minirospy.wire.xmlrpc_plain import read_plain
 from minirospy.wire.xmlrpc_reader import read_document

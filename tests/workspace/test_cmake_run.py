@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.cmake_run import Command, run_cmake
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.errors import NotFoundError
 from minirospy.dashboard import views
-from minirospy.errors import NotFoundError
 from minirospy.workspace import elsewhere
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 from minirospy.workspace.packages import Packages, built_in_roots

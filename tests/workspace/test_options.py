@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.errors import BuildError
+from minirospy.base.errors import BuildError
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.install import install
 from minirospy.workspace.plan import read_plan

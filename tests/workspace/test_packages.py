@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import NotFoundError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import NotFoundError
 from minirospy.workspace.packages import NotExecutableError, Packages
 
 

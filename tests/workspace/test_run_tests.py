@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from minirospy.base.installation import install_command
 from minirospy.cli.catkin.make import catkin_make
 from minirospy.cli.catkin.test_results import main as catkin_test_results
 from minirospy.cli.catkin.tool import catkin
-from minirospy.installation import install_command
 from minirospy.workspace.plan import Test as PlannedTest
 from minirospy.workspace.plan import read_plan
 from tests.waiting import wait_until

@@ -15,7 +15,7 @@ from minirospy.actionlib.aio.common import WAITING, ActionClass, ActionEnd, Goal
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList, find_status
 from minirospy.aio import Publisher, Subscription
-from minirospy.errors import ROSException, ROSInterruptException
+from minirospy.base.errors import ROSException, ROSInterruptException
 from minirospy.graph.goals import TERMINAL, GoalState
 from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar, cast
 from minirospy import Node
 from minirospy.actionlib.spec import ActionTypes, action_types
 from minirospy.aio.handle import Handle
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.graph.goals import GoalState
 from minirospy.idl.protocols import Action
 

@@ -15,7 +15,7 @@ from minirospy.actionlib.aio.common import WAITING, ActionClass, ActionEnd, Goal
 from minirospy.actionlib.spec import CANCEL_SECONDS, SEND_SECONDS, TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList, status_bytes
 from minirospy.aio import Publisher, Subscription
-from minirospy.errors import ROSException
+from minirospy.base.errors import ROSException
 from minirospy.graph.goals import SERVER_STEPS, GoalEvent, GoalState, is_meant
 from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.idl.service import to_response

@@ -6,11 +6,11 @@ import asyncio
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
+from minirospy.base.errors import DefinitionError, MinirospyError
 from minirospy.bridge.fleet.frames import FrameRewriter
 from minirospy.bridge.fleet.keys import definition_key
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
 from minirospy.bridge.types import TypeTexts
-from minirospy.errors import DefinitionError, MinirospyError
 from minirospy.idl.load import checked_text
 from minirospy.idl.spec import MessageSpec
 from minirospy.wire.tcpros import InterfaceType

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 from minirospy.idl.digest import Lookup
 from minirospy.idl.spec import PRIMITIVES, Field, MessageSpec
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.exporter import Exporter
 from minirospy.bridge.fleet.importer import Importer
@@ -23,7 +24,6 @@ from minirospy.bridge.fleet.ros1_side import Ros1Side
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
+from minirospy.base.errors import DeserializationError, ROSException
 from minirospy.bridge.fleet.clocks import ClockOffset, Delay
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.keys import (
@@ -29,7 +30,6 @@ from minirospy.bridge.fleet.network import FleetNetwork, Later
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
-from minirospy.errors import DeserializationError, ROSException
 from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService
+from minirospy.base.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
 from minirospy.bridge.fleet.contents import FleetContents, Refused, Robot
 from minirospy.bridge.fleet.definitions import Definitions
@@ -20,7 +21,6 @@ from minirospy.bridge.fleet.presence import Presence
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.master.heap import return_free_memory
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

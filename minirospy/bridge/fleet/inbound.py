@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import call_raw, raw_class
 from minirospy.aio.topics import Publisher
+from minirospy.base.errors import BridgeError, DeserializationError, ROSException, ServiceException
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.frames import FrameRewriter, stripped
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, ServiceToken, TopicToken
 from minirospy.bridge.fleet.network import QueryFailed
 from minirospy.bridge.fleet.rules import STOP_SECONDS
 from minirospy.bridge.fleet.stopping import CommandStream
-from minirospy.errors import BridgeError, DeserializationError, ROSException, ServiceException
 from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 

@@ -8,11 +8,11 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
 from minirospy.bridge.fleet.keys import ROOT, Claim, parse_claim
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions, QueryFailed
 from minirospy.bridge.fleet.report import Answer, is_shallow, is_shown, parse_answer
-from minirospy.errors import BridgeError
 from minirospy.runtime.transport.loop import new_event_loop
 
 __all__ = ["fleet_status", "inquire", "robot_parameter"]

@@ -26,7 +26,7 @@ import re
 import struct
 from typing import NamedTuple
 
-from minirospy.names import is_legal_name
+from minirospy.base.names import is_legal_name
 
 __all__ = [
     "ROOT",

@@ -17,6 +17,8 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from minirospy.base.errors import BridgeError, MinirospyError
+from minirospy.base.escape import escaped
 from minirospy.bridge.fleet.rules import Lane
 from minirospy.bridge.linger import LingerRemover
 from minirospy.bridge.tasks import Faults, keep_running
@@ -38,8 +40,6 @@ from minirospy.bridge.zenoh_library import (
     to_endpoint,
     unresolved,
 )
-from minirospy.errors import BridgeError, MinirospyError
-from minirospy.escape import escaped
 
 __all__ = [
     "DEFAULT_ENDPOINT",

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawSubscription
+from minirospy.base.errors import DeserializationError
 from minirospy.bridge.fleet.frames import FrameRewriter, prefixed
 from minirospy.bridge.fleet.keys import TopicToken, out_key
 from minirospy.bridge.fleet.sender import Outflow
-from minirospy.errors import DeserializationError
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header

@@ -6,9 +6,9 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from minirospy.base.escape import escaped
 from minirospy.bridge.fleet.clocks import ClockOffset
 from minirospy.bridge.fleet.keys import Claim
-from minirospy.escape import escaped
 
 __all__ = ["Answer", "as_json", "is_shallow", "is_shown", "lines", "parse_answer"]
 

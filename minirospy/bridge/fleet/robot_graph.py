@@ -9,12 +9,12 @@ from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import service_header
+from minirospy.base.errors import MasterUnreachableError, RpcError, WireError
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken, TopicToken, is_md5
 from minirospy.bridge.fleet.rules import Export, GatewayRules, exported_services, exported_topics
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import MasterUnreachableError, RpcError, WireError
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.header import Header
 

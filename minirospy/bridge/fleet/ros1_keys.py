@@ -18,8 +18,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, TopicToken, is_global_name, is_md5
-from minirospy.errors import BridgeError
 
 __all__ = [
     "EVERY_NAMESPACE",

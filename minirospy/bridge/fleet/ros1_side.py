@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, RawSubscription
+from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError, ServiceException
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.inbound import call_service
@@ -37,7 +38,6 @@ from minirospy.bridge.fleet.ros1_topic import Ros1Topic, Shared
 from minirospy.bridge.fleet.rules import GatewayRules, is_logger_service
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.errors import BridgeError, DeserializationError, MinirospyError, ServiceException
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.header import Header

@@ -7,9 +7,9 @@ import contextlib
 import signal
 from collections.abc import Callable
 
+from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.signal_dispatch import interrupt_signals
 
 __all__ = ["run_router"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from fnmatch import fnmatchcase
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.fleet.keys import is_global_name
-from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import Snapshot
 
 __all__ = [

@@ -14,9 +14,9 @@ import threading
 import time
 from collections.abc import Callable
 
+from minirospy.base.errors import ROSException
 from minirospy.bridge.fleet.rules import STOP_SECONDS
 from minirospy.bridge.stop_guard import StopGuard
-from minirospy.errors import ROSException
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 __all__ = ["CommandStream", "at_rest"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 from urllib.parse import unquote
 
-from minirospy.errors import BridgeError, NotFoundError
+from minirospy.base.errors import BridgeError, NotFoundError
 
 if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from minirospy.base.clock import time_of_clock_message
+from minirospy.base.environment import DISTRO
 from minirospy.bridge.foxglove import protocol, serializing
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.foxglove.channels import Channels, Services
@@ -15,8 +17,6 @@ from minirospy.bridge.foxglove.parameters import Parameters
 from minirospy.bridge.foxglove.protocol import Channel, GraphTables, PlaybackControl, PlaybackState
 from minirospy.bridge.foxglove.session import FoxgloveSession
 from minirospy.bridge.graph import Arrival, SharedGraph
-from minirospy.clock import time_of_clock_message
-from minirospy.environment import DISTRO
 from minirospy.introspect.snapshot import Changes
 from minirospy.wire.header import Header
 

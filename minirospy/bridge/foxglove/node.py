@@ -10,6 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.bridge import FOXGLOVE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.foxglove.assets import ALLOWED
@@ -18,7 +19,6 @@ from minirospy.bridge.graph import Filters
 from minirospy.bridge.node_parameters import access_of, address_of, private_parameters, texts, value
 from minirospy.bridge.serve import announce, exit_status, run
 from minirospy.bridge.web.connection import Limits
-from minirospy.errors import BridgeError
 
 __all__ = ["main", "options_of"]
 

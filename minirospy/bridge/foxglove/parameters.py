@@ -6,9 +6,9 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Protocol
 
+from minirospy.base.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.bridge.foxglove.protocol import Parameter
 from minirospy.bridge.graph import SharedGraph
-from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
 
 __all__ = ["ParameterListener", "Parameters"]
 

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from minirospy.base.errors import BridgeProtocolError
 from minirospy.bridge.foxglove.protocol import (
     ClientAdvertise,
     ClientChannel,
@@ -31,7 +32,6 @@ from minirospy.bridge.foxglove.protocol import (
     UnsubscribeParameterUpdates,
 )
 from minirospy.bridge.json_text import load_json
-from minirospy.errors import BridgeProtocolError
 
 __all__ = [
     "parse_binary",

@@ -9,17 +9,17 @@ from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from minirospy.bridge.foxglove import parsing, protocol, serializing
-from minirospy.bridge.foxglove.protocol import Channel, Event, Parameter, StatusLevel
-from minirospy.bridge.graph import Arrival, Publication
-from minirospy.bridge.web.files import FileAnswer
-from minirospy.errors import (
+from minirospy.base.errors import (
     BridgeError,
     BridgeProtocolError,
     MasterUnreachableError,
     RpcError,
     ServiceException,
 )
+from minirospy.bridge.foxglove import parsing, protocol, serializing
+from minirospy.bridge.foxglove.protocol import Channel, Event, Parameter, StatusLevel
+from minirospy.bridge.graph import Arrival, Publication
+from minirospy.bridge.web.files import FileAnswer
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 
 __all__ = [
     "GoalId",

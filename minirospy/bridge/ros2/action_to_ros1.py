@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BridgeError, DeserializationError, ROSException
 from minirospy.bridge.ros2.action_messages import (
     GoalId,
     cancel_message,
@@ -17,7 +18,6 @@ from minirospy.bridge.ros2.action_messages import (
 )
 from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import BridgeError, DeserializationError, ROSException
 from minirospy.graph.goals import TERMINAL, GoalState
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

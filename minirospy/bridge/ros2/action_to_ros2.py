@@ -7,6 +7,7 @@ import contextlib
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.base.errors import BridgeError, DeserializationError, ROSException
 from minirospy.bridge.ros2.action_messages import (
     GoalId,
     Status,
@@ -18,7 +19,6 @@ from minirospy.bridge.ros2.action_messages import (
 from minirospy.bridge.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
 from minirospy.bridge.ros2.reach import Reach
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.errors import BridgeError, DeserializationError, ROSException
 from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

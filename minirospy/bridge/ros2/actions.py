@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import raw_class
+from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.bridge.ros2.action_links import ActionLink, action_links
 from minirospy.bridge.ros2.action_to_ros1 import GoalsToRos1
 from minirospy.bridge.ros2.action_to_ros2 import GoalsToRos2
@@ -14,7 +15,6 @@ from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction
 from minirospy.bridge.ros2.rules import Rules
-from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.idl.cdr import Transcoder
 from minirospy.idl.digest import Lookup, full_text, message_md5
 from minirospy.idl.protocols import Message

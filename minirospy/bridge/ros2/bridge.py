@@ -10,6 +10,14 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
+from minirospy.base.errors import (
+    DefinitionError,
+    DeserializationError,
+    MasterUnreachableError,
+    NotFoundError,
+    ROSException,
+    RpcError,
+)
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.ros2.actions import ActionBridge
@@ -22,14 +30,6 @@ from minirospy.bridge.ros2.services import ServiceBridge
 from minirospy.bridge.ros2.statics import MOST_BYTES, MOST_FRAMES, TF_TYPES, StaticTransforms
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import TypeTexts
-from minirospy.errors import (
-    DefinitionError,
-    DeserializationError,
-    MasterUnreachableError,
-    NotFoundError,
-    ROSException,
-    RpcError,
-)
 from minirospy.idl.cdr import Transcoder
 from minirospy.idl.codec import keeps_buffer
 from minirospy.idl.digest import Lookup, full_text, message_md5

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Iterable, Mapping, Sized
 from typing import cast
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.idl.type_hash import Fields
 

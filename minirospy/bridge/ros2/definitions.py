@@ -9,9 +9,9 @@ from __future__ import annotations
 import contextlib
 from types import MappingProxyType
 
+from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.rules import Rules, snake_case
-from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.idl.load import Catalogue
 from minirospy.idl.spec import FieldType, MessageSpec, ServiceSpec
 from minirospy.idl.type_hash import Fields, type_hash

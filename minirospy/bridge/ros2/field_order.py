@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 

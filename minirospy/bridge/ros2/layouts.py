@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from minirospy.base.errors import BridgeError, DefinitionError
 from minirospy.bridge.ros2.field_order import Array, Node, Reordered, inverse, reorder
 from minirospy.bridge.ros2.field_order import Fixed as Wide
 from minirospy.bridge.ros2.field_order import Text as String
 from minirospy.bridge.ros2.rules import Rules, TypeRule, snake_case
-from minirospy.errors import BridgeError, DefinitionError
 from minirospy.idl.cdr import (
     CDR_HEADER,
     Fixed,

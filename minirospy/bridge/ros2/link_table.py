@@ -7,13 +7,13 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from minirospy.base.errors import MinirospyError, ROSException
+from minirospy.base.escape import escaped
 from minirospy.bridge.ros2.action_links import ActionLink
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.links import Link
 from minirospy.bridge.ros2.service_links import ServiceLink
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import MinirospyError, ROSException
-from minirospy.escape import escaped
 
 __all__ = ["LinkTable", "OpenLink", "Pair", "pairs"]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from minirospy.errors import BridgeError
-from minirospy.escape import escaped
+from minirospy.base.errors import BridgeError
+from minirospy.base.escape import escaped
 from minirospy.introspect.snapshot import Snapshot
 
 __all__ = [

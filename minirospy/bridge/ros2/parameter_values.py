@@ -11,7 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 from xmlrpc.client import Binary
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 __all__ = [
     "FIELDS",

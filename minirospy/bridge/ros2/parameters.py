@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.aio.raw import RawService
+from minirospy.base.errors import BridgeError, MinirospyError, ServiceException
 from minirospy.bridge.ros2.parameter_values import (
     Value,
     leaves,
@@ -19,7 +20,6 @@ from minirospy.bridge.ros2.parameter_values import (
     ros2_name,
     ros2_value,
 )
-from minirospy.errors import BridgeError, MinirospyError, ServiceException
 from minirospy.idl.digest import service_md5
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType

@@ -14,9 +14,9 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, InvalidStateError
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
+from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.bridge.ros2.action_links import send_goal_service
 from minirospy.bridge.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
-from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos1", "GoalOfRos2", "Ros2Goal"]
 

@@ -13,8 +13,8 @@ from concurrent.futures import CancelledError, Future, InvalidStateError
 from types import TracebackType
 from typing import Protocol, TypeVar
 
+from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.bridge.ros2.parameter_values import ParameterService
-from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = [
     "Calls",

@@ -11,9 +11,9 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Protocol, TypeVar, cast
 
+from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.bridge.ros2.parameter_values import FIELDS, ParameterService, Value, listed
 from minirospy.bridge.ros2.rclpy_calls import Calls, Client, Message, NotAnsweredError, ServiceClass
-from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = ["NodeParameters", "ParameterServer", "ParameterStore"]
 

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 if TYPE_CHECKING:
     from minirospy.bridge.ros2.interface import Ros2Probe

@@ -14,8 +14,8 @@ from types import MappingProxyType
 
 import yaml
 
-from minirospy.errors import BridgeError
-from minirospy.yaml_text import safe_load
+from minirospy.base.errors import BridgeError
+from minirospy.base.yaml_text import safe_load
 
 __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 

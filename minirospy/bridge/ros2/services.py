@@ -10,15 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, call_raw, service_header
-from minirospy.bridge.node_queries import NodeQueries
-from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
-from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
-from minirospy.bridge.ros2.links import Direction, is_bridge
-from minirospy.bridge.ros2.reach import Reach
-from minirospy.bridge.ros2.rules import Rules
-from minirospy.bridge.ros2.service_links import ServiceLink, service_links
-from minirospy.bridge.tasks import Faults
-from minirospy.errors import (
+from minirospy.base.errors import (
     BridgeError,
     DefinitionError,
     DeserializationError,
@@ -28,6 +20,14 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
+from minirospy.bridge.node_queries import NodeQueries
+from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
+from minirospy.bridge.ros2.links import Direction, is_bridge
+from minirospy.bridge.ros2.reach import Reach
+from minirospy.bridge.ros2.rules import Rules
+from minirospy.bridge.ros2.service_links import ServiceLink, service_links
+from minirospy.bridge.tasks import Faults
 from minirospy.idl.cdr import CDR_HEADER, Transcoder
 from minirospy.idl.digest import service_md5
 from minirospy.idl.load import Catalogue

@@ -20,6 +20,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Protocol, cast
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.ros2.action_links import send_goal_service
 from minirospy.bridge.ros2.interface import (
     Ros2ActionClient,
@@ -39,7 +40,6 @@ from minirospy.bridge.ros2.rclpy_calls import (
     ServiceClass,
 )
 from minirospy.bridge.ros2.rclpy_parameters import NodeParameters, ParameterServer, ParameterStore
-from minirospy.errors import BridgeError
 
 __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 
 __all__ = ["MOST_BYTES", "MOST_FRAMES", "TF_TYPES", "StaticTransforms"]
 

@@ -16,12 +16,12 @@ from concurrent.futures import CancelledError, Future, InvalidStateError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.bridge.ros2.cdr_values import decode, encode
 from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
 from minirospy.bridge.ros2.zenoh_calls import ZenohClient, ZenohServer
 from minirospy.bridge.ros2.zenoh_keys import Kind
 from minirospy.bridge.ros2.zenoh_topics import ZenohPublisher, subscribe
-from minirospy.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.graph.goals import is_meant
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.idl.type_hash import Fields

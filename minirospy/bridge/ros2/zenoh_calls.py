@@ -15,10 +15,10 @@ from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError
+from minirospy.base.escape import escaped
 from minirospy.bridge.ros2.zenoh_keys import Kind, reply_attachment
 from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
-from minirospy.errors import BridgeError, DeserializationError, MinirospyError
-from minirospy.escape import escaped
 from minirospy.idl.cdr import CDR_HEADER
 from minirospy.idl.type_hash import Fields
 

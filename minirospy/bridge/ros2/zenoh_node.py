@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.ros2.links import parse_domain
 from minirospy.bridge.ros2.zenoh_keys import (
     Entity,
@@ -31,7 +32,6 @@ from minirospy.bridge.zenoh_library import (
     one_line,
     require_zenoh,
 )
-from minirospy.errors import BridgeError
 
 __all__ = ["Graph", "Handle", "ZenohNode"]
 

@@ -9,9 +9,9 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import TYPE_CHECKING, cast
 
+from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.bridge.ros2.cdr_values import decode, encode
 from minirospy.bridge.ros2.parameter_values import FIELDS, ParameterService, Value, listed
-from minirospy.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.idl.type_hash import Fields
 
 if TYPE_CHECKING:

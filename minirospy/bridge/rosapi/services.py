@@ -41,12 +41,12 @@ from rosapi.srv import (
 from minirospy.aio.node import Node
 from minirospy.aio.raw import service_header
 from minirospy.aio.services import Service, ServiceClass
+from minirospy.base.errors import BridgeError, RpcRefused, ServiceException
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.json_text import load_json
 from minirospy.bridge.node_queries import AT_ONCE
 from minirospy.bridge.rosapi.typedefs import TypeDefinition, describe
 from minirospy.bridge.rosbridge.types import message_class, service_class
-from minirospy.errors import BridgeError, RpcRefused, ServiceException
 from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.tcpros import ANY

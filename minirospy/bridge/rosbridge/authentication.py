@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from minirospy.base.times import Time
 from minirospy.bridge.rosbridge.protocol import Auth
 from minirospy.bridge.rosbridge.types import service_class
-from minirospy.times import Time
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from typing import Any
 
-from minirospy.errors import BridgeProtocolError
+from minirospy.base.errors import BridgeProtocolError
 
 __all__ = ["TYPED_ARRAYS", "decode_cbor", "encode_cbor", "typed_array"]
 

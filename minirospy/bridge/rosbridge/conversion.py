@@ -14,10 +14,10 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from minirospy.base.errors import BridgeProtocolError
+from minirospy.base.times import Duration, Time
 from minirospy.bridge.rosbridge.cbor import TYPED_ARRAYS, typed_array
-from minirospy.errors import BridgeProtocolError
 from minirospy.idl.protocols import Message
-from minirospy.times import Duration, Time
 
 __all__ = ["ConversionError", "cbor_values", "fill", "request_values", "values"]
 

@@ -10,13 +10,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.graph import Arrival, Publication, SharedGraph
 from minirospy.bridge.rosbridge import conversion, png
 from minirospy.bridge.rosbridge.cbor import encode_cbor
 from minirospy.bridge.rosbridge.services import ClientService
 from minirospy.bridge.rosbridge.session import RosbridgeSession
 from minirospy.bridge.rosbridge.types import ArrivingTypes
-from minirospy.errors import BridgeError
 from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

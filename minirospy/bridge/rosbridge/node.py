@@ -10,6 +10,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.bridge import ROSBRIDGE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.graph import Filters
@@ -17,7 +18,6 @@ from minirospy.bridge.node_parameters import access_of, address_of, globs, numbe
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
 from minirospy.bridge.serve import announce, exit_status, run
 from minirospy.bridge.web.connection import Limits
-from minirospy.errors import BridgeError
 
 __all__ = ["main", "options_of", "refuse"]
 

@@ -11,7 +11,7 @@ import math
 from io import BytesIO
 from typing import Any
 
-from minirospy.errors import BridgeProtocolError
+from minirospy.base.errors import BridgeProtocolError
 
 __all__ = ["decode", "encode"]
 

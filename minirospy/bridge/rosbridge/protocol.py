@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
+from minirospy.base.errors import BridgeProtocolError
 from minirospy.bridge.json_text import MAX_QUICK_CHARACTERS, is_quick_text, load_json, load_json_in_pieces
 from minirospy.bridge.rosbridge import png
 from minirospy.bridge.rosbridge.cbor import decode_cbor, encode_cbor
-from minirospy.errors import BridgeProtocolError
 
 __all__ = [
     "OPERATIONS",

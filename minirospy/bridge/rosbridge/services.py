@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.raw import service_header
+from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge.graph import SharedGraph
 from minirospy.bridge.rosbridge import conversion, protocol
 from minirospy.bridge.rosbridge.types import service_class
-from minirospy.errors import BridgeError, ServiceException
 from minirospy.idl.protocols import Message
 
 if TYPE_CHECKING:

@@ -13,6 +13,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.aio.handle import serialized
+from minirospy.base.errors import (
+    BridgeError,
+    MessageException,
+    MinirospyError,
+    ROSSerializationException,
+    ServiceException,
+)
 from minirospy.bridge.graph import Publication
 from minirospy.bridge.rosbridge import conversion, protocol
 from minirospy.bridge.rosbridge.authentication import authenticate
@@ -22,13 +29,6 @@ from minirospy.bridge.rosbridge.subscription import Fragments, Room
 from minirospy.bridge.rosbridge.topic import MOST_IDS, ClientTopic
 from minirospy.bridge.rosbridge.types import message_class
 from minirospy.bridge.tasks import Faults
-from minirospy.errors import (
-    BridgeError,
-    MessageException,
-    MinirospyError,
-    ROSSerializationException,
-    ServiceException,
-)
 from minirospy.idl.protocols import Message, is_stamped
 from minirospy.introspect.graph import why_illegal
 from minirospy.wire.tcpros import ANY, InterfaceType

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.graph import Arrival
 from minirospy.bridge.rosbridge import protocol
 from minirospy.bridge.rosbridge.protocol import StatusLevel
 from minirospy.bridge.rosbridge.subscription import Merged, Pacer, merge
-from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
     from minirospy.bridge.rosbridge.door import RosbridgeDoor

@@ -6,7 +6,7 @@ import importlib.util
 from collections.abc import Callable
 from typing import TypeVar
 
-from minirospy.errors import BridgeError, MinirospyError
+from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.idl.load import class_from_text, get_message_class, get_service_class
 from minirospy.idl.protocols import Message, ServiceClass
 from minirospy.wire.header import Header

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import Quaternion, Transform, Vector3

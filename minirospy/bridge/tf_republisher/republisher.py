@@ -19,9 +19,9 @@ from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 from minirospy.actionlib.aio import ActionServer, GoalError, ServerGoal
 from minirospy.aio.node import Node
 from minirospy.aio.topics import Publisher
+from minirospy.base.errors import BridgeError, ServiceException, TransformException
 from minirospy.bridge.tasks import Faults
 from minirospy.bridge.tf_republisher.pairs import FramePair, pairs_of
-from minirospy.errors import BridgeError, ServiceException, TransformException
 from minirospy.frames.aio import Buffer
 
 __all__ = ["NAME", "Republisher"]

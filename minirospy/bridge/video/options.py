@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from urllib.parse import urlencode
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 from minirospy.introspect.graph import why_illegal
 
 __all__ = ["BOUNDARY", "Picture", "VideoRequest", "part", "request_of", "topics_page", "viewer_page"]

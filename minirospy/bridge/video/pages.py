@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError
 from minirospy.bridge.graph import Arrival, SharedGraph
 from minirospy.bridge.video import options
 from minirospy.bridge.video.capacity import Capacity
 from minirospy.bridge.video.options import VideoRequest, request_of
 from minirospy.bridge.video.pictures import COMPRESSED, IMAGE, MAX_PIXELS, encoded, work_of
 from minirospy.bridge.web.client import Exchange, HttpHandler
-from minirospy.errors import BridgeError, MasterUnreachableError, RpcError
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.video.options import Picture
-from minirospy.errors import BridgeError
 from minirospy.images.compressed import Options, decode, encode, opencv
 from minirospy.images.encodings import converted, is_converted_by_opencv
 from minirospy.images.sizes import size_of

@@ -22,6 +22,7 @@ from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 from websockets.protocol import State
 
+from minirospy.base.escape import escaped
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
 from minirospy.bridge.json_text import size_in_memory
 from minirospy.bridge.web.admission import Rank
@@ -42,7 +43,6 @@ from minirospy.bridge.web.files import FileAnswer, FileSender
 from minirospy.bridge.web.frames import FrameByFrame
 from minirospy.bridge.web.pipe import LARGE_READ, SMALL_READ
 from minirospy.bridge.web.queue import Piece, SendQueue
-from minirospy.escape import escaped
 
 if TYPE_CHECKING:
     from websockets.typing import Subprotocol

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from minirospy.errors import BridgeError
+from minirospy.base.errors import BridgeError
 
 __all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
 

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
+from minirospy.base.errors import BridgeError
 from minirospy.bridge.access import Access, Credentials, Grant, Refusal
 from minirospy.bridge.web.account import Account
 from minirospy.bridge.web.admission import Rank, displaced, rank_of
@@ -21,7 +22,6 @@ from minirospy.bridge.web.owners import is_own_user
 from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
 from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.bridge.web.turns import FairTurns, cpu_meter
-from minirospy.errors import BridgeError
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import is_file_limit
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from minirospy.base.errors import UsageError
 from minirospy.cli.command import warn
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import UsageError
 
 __all__ = [
     "CREATE",

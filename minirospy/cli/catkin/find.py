@@ -11,9 +11,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import read_manifest

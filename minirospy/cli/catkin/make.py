@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from minirospy.base.errors import BuildError, UsageError
 from minirospy.cli.catkin.create import TOP_LEVEL
 from minirospy.cli.catkin.workspace import (
     TEST_TARGETS,
@@ -26,7 +27,6 @@ from minirospy.cli.catkin.workspace import (
 from minirospy.cli.command import INTERRUPTED
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import BuildError, UsageError
 from minirospy.workspace.build import Workspace
 
 __all__ = ["MAKE", "MAKE_ISOLATED", "catkin_make", "catkin_make_isolated"]

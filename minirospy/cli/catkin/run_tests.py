@@ -13,10 +13,10 @@ import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from minirospy.child_lifetime import guard_children
+from minirospy.base.child_lifetime import guard_children
+from minirospy.base.errors import BuildError, MinirospyError, NotFoundError
+from minirospy.base.installation import install_command
 from minirospy.cli.catkin.test_results import Counts, results_below
-from minirospy.errors import BuildError, MinirospyError, NotFoundError
-from minirospy.installation import install_command
 from minirospy.testing.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
+from minirospy.base.errors import MinirospyError
+from minirospy.base.xml_text import XmlError, check_xml
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import MinirospyError
-from minirospy.xml_text import XmlError, check_xml
 
 __all__ = ["COMMAND", "Counts", "main", "read_counts", "results_below"]
 

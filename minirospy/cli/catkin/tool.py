@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.base.errors import BuildError, NotFoundError, UsageError
 from minirospy.cli.catkin.create import create_package_here, create_parser
 from minirospy.cli.catkin.workspace import (
     build_packages,
@@ -26,7 +27,6 @@ from minirospy.cli.catkin.workspace import (
 from minirospy.cli.command import INTERRUPTED
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import BuildError, NotFoundError, UsageError
 from minirospy.workspace.build import Workspace, find_workspace, read_plans
 
 __all__ = ["CATKIN", "catkin"]

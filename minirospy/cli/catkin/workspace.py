@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.workspace.build import Report, Workspace, build, read_plans, write_set_up
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import Plan

@@ -19,14 +19,14 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import MinirospyError
+from minirospy.base.escape import has_controls
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.completers import Completer, Cursor
 from minirospy.cli.completion.words import POSIX, POWERSHELL, Shell
 from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
 from minirospy.cli.verbs import Family
-from minirospy.errors import MinirospyError
-from minirospy.escape import has_controls
 
 if TYPE_CHECKING:
     import argparse

@@ -95,7 +95,7 @@ def package_folders(cursor: Cursor) -> Iterable[str]:
 
 
 def _logs() -> Path:
-    from minirospy.environment import Environment
+    from minirospy.base.environment import Environment
 
     return Environment.read(host="localhost", master_uri="http://localhost:1").log_dir
 

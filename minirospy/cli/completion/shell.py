@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy.base.errors import UsageError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import UsageError
 from minirospy.workspace.build import own_set_up
 from minirospy.workspace.setup_files import SHELLS, shell_text
 

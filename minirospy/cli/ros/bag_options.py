@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
+from minirospy.base.errors import BagError, MinirospyError, NotFoundError
 from minirospy.cli.command import RosText, WordedError
-from minirospy.errors import BagError, MinirospyError, NotFoundError
 from minirospy.introspect.bags import open_reader
 
 if TYPE_CHECKING:

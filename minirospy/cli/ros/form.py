@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple, TypeVar
 
-from minirospy.errors import MessageException, ValueTextError
+from minirospy.base.errors import MessageException, ValueTextError
 from minirospy.idl.protocols import Message, is_message
 from minirospy.introspect.messages import check, fill
 from minirospy.introspect.values import parse_value

@@ -19,13 +19,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import minirospy
-from minirospy import private_files
+from minirospy.base import private_files
+from minirospy.base.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host, wrong_address
+from minirospy.base.errors import MinirospyError, RpcError, RpcFault, RpcLate, RpcUnreachable
+from minirospy.base.log_levels import LEVEL_NAMES, set_logger_level
+from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.cli.command import warn
 from minirospy.cli.parser import Misuse, Parser, attach_completer, split_assignments
 from minirospy.cli.verbs import Command
-from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host, wrong_address
-from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcLate, RpcUnreachable
-from minirospy.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.master.master import Master
@@ -34,7 +35,6 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.rpc.server import is_address_in_use
 from minirospy.runtime.transport.access import Access, listening_lines
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.signal_dispatch import interrupt_signals
 
 __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from minirospy.base.errors import UsageError
+from minirospy.base.suggestions import did_you_mean
 from minirospy.cli.command import INTERRUPTED, complain
 from minirospy.cli.ros import (
     rosbag_convert,
@@ -19,8 +21,6 @@ from minirospy.cli.ros import (
     rosbag_rewrite,
 )
 from minirospy.cli.verbs import Family, HelpStatus
-from minirospy.errors import UsageError
-from minirospy.suggestions import did_you_mean
 
 __all__ = ["FAMILY", "main"]
 

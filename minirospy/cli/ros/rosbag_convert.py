@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 
+from minirospy.base.errors import BagError, BagUnindexedError, NotFoundError
+from minirospy.base.installation import install_command
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Verb
-from minirospy.errors import BagError, BagUnindexedError, NotFoundError
-from minirospy.installation import install_command
 
 __all__ = ["VERB"]
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from minirospy.cli.command import complain
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Verb
-from minirospy.errors import (
+from minirospy.base.errors import (
     BagEncryptedError,
     BagError,
     BagUnindexedError,
@@ -17,7 +14,10 @@ from minirospy.errors import (
     MinirospyError,
     ValueTextError,
 )
-from minirospy.escape import escaped
+from minirospy.base.escape import escaped
+from minirospy.cli.command import complain
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Verb
 
 __all__ = ["VERBS", "report"]
 

@@ -8,12 +8,12 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy import private_files
+from minirospy.base import private_files
+from minirospy.base.errors import BagEncryptedError, BagError, MessageException, MinirospyError
 from minirospy.cli.command import complain
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.ros.rosbag_info import report, unreadable
 from minirospy.cli.verbs import Verb
-from minirospy.errors import BagEncryptedError, BagError, MessageException, MinirospyError
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message

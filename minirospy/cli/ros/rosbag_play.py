@@ -9,9 +9,9 @@ import contextlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import ROSInterruptException, UsageError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command, Verb
-from minirospy.errors import ROSInterruptException, UsageError
 
 if TYPE_CHECKING:
     from minirospy.recording.schedule import PlayOptions
@@ -110,7 +110,7 @@ def _play(
     foxglove: bool,
     foxglove_port: int,
 ) -> int:
-    from minirospy.names import parse_arguments
+    from minirospy.base.names import parse_arguments
     from minirospy.recording.schedule import PlayOptions
 
     paths = parse_arguments([*bagfiles, *bags]).plain

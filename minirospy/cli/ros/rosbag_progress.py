@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-from minirospy.escape import escaped, own_output
+from minirospy.base.escape import escaped, own_output
 
 __all__ = ["showing_progress"]
 

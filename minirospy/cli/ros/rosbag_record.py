@@ -9,9 +9,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from minirospy.base.errors import BagCompressionError, ROSInterruptException, UsageError
 from minirospy.cli.parser import Misuse, Parser, attach_completer
 from minirospy.cli.verbs import Command, Verb
-from minirospy.errors import BagCompressionError, ROSInterruptException, UsageError
 
 if TYPE_CHECKING:
     from minirospy.recording.options import RecordOptions
@@ -140,7 +140,7 @@ def _record(
     mcap: bool,
     zstd: bool,
 ) -> int:
-    from minirospy.names import is_legal_name, parse_arguments
+    from minirospy.base.names import is_legal_name, parse_arguments
     from minirospy.recording.options import MEGABYTE, RecordOptions, parse_duration, parse_size
 
     names = (*parse_arguments(topics).plain, *topic)

@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import BagError, DefinitionError, MinirospyError
 from minirospy.cli.command import run
 from minirospy.cli.parser import Parser
 from minirospy.cli.ros.rosbag_info import report
-from minirospy.errors import BagError, DefinitionError, MinirospyError
 
 if TYPE_CHECKING:
     from minirospy.bag.records import Connection

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import MinirospyError, UsageError
 
 __all__ = ["FAMILY", "disk_usage", "human_size", "main"]
 

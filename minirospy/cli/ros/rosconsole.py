@@ -10,20 +10,20 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, cast
 
+from minirospy.base.errors import MinirospyError, UsageError
+from minirospy.base.log_levels import LEVEL_NAMES
 from minirospy.cli.command import tool_node, warn, warn_unpublished
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import MinirospyError, UsageError
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.loggers import logger_level, logger_levels, set_logger_level
 from minirospy.introspect.nodes import list_nodes
 from minirospy.introspect.topics import find_topic
-from minirospy.log_levels import LEVEL_NAMES
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log
 
-    from minirospy.names import Arguments
+    from minirospy.base.names import Arguments
 
 __all__ = ["FAMILY", "main"]
 

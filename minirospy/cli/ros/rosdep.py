@@ -16,10 +16,10 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from minirospy.base.errors import UsageError
+from minirospy.base.installation import install_command
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import UsageError
-from minirospy.installation import install_command
 
 __all__ = ["FAMILY", "main"]
 

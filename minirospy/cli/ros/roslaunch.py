@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minirospy import private_files
+from minirospy.base import private_files
+from minirospy.base.environment import Environment
+from minirospy.base.errors import LaunchError, MinirospyError, NotFoundError, UsageError
 from minirospy.cli.command import RosText, WordedError, warn
 from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
-from minirospy.environment import Environment
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
 from minirospy.launch.arg_docs import resolved_arg_docs
 from minirospy.launch.command import shell_line
 from minirospy.launch.files import LaunchFileNotFoundError, find_files

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from minirospy.base.errors import NotFoundError
 from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
-from minirospy.errors import NotFoundError
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 __all__ = ["ROSMSG", "ROSSRV", "main", "main_srv"]

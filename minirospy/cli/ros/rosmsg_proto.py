@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import DefinitionError, NotFoundError
 
 __all__ = ["COMMAND", "main"]
 

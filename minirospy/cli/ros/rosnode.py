@@ -9,11 +9,11 @@ import sys
 import time
 from collections.abc import Sequence
 
+from minirospy.base.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
+from minirospy.base.escape import escaped
 from minirospy.cli.command import RosText, WordedError, complain
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
-from minirospy.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
-from minirospy.escape import escaped
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.nodes import (
     NodeDetail,

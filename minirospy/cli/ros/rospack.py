@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from minirospy.base.errors import MinirospyError, NotFoundError
+from minirospy.base.suggestions import did_you_mean
 from minirospy.cli.command import run
-from minirospy.errors import MinirospyError, NotFoundError
-from minirospy.suggestions import did_you_mean
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, crawl_times, package_name
 

@@ -10,10 +10,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.child_lifetime import guard_children
+from minirospy.base.child_lifetime import guard_children
+from minirospy.base.environment import export_local
+from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.cli.command import RosText, WordedError, run, warn
-from minirospy.environment import export_local
-from minirospy.errors import NotFoundError, UsageError
 from minirospy.workspace.packages import NotExecutableError, Packages, why_ros_refuses, with_prefix
 
 __all__ = ["become", "main"]

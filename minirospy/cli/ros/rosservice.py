@@ -9,16 +9,16 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import CallFailed, MessageException, ServiceException, UsageError
 from minirospy.cli.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
-from minirospy.errors import CallFailed, MessageException, ServiceException, UsageError
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
+    from minirospy.base.names import Arguments
     from minirospy.idl.protocols import Message
-    from minirospy.names import Arguments
 
 __all__ = ["FAMILY", "main"]
 

@@ -11,11 +11,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy import private_files
+from minirospy.base import private_files
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.testing.junit import Result, report
 from minirospy.testing.unit import begin_results, rostest_name_from_path
 from minirospy.workspace.packages import Packages, package_name

@@ -10,17 +10,17 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import NotFoundError
 from minirospy.cli.command import RosText, WordedError, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser, integer
 from minirospy.cli.verbs import Family, HelpStatus, Verb, deferred_verb
-from minirospy.errors import NotFoundError
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from minirospy.names import Arguments
+    from minirospy.base.names import Arguments
 
 __all__ = ["FAMILY", "main"]
 

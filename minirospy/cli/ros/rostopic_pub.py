@@ -10,19 +10,25 @@ import itertools
 import re
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from minirospy.base.errors import (
+    MessageException,
+    NotFoundError,
+    SerializationError,
+    UsageError,
+    ValueTextError,
+)
+from minirospy.base.yaml_text import safe_load
 from minirospy.cli.command import RosText, WordedError, tool_node, warn, warn_no_subscribers
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Verb
-from minirospy.errors import MessageException, NotFoundError, SerializationError, UsageError, ValueTextError
 from minirospy.introspect.graph import Graph, why_illegal
-from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from minirospy.base.names import Arguments
     from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
-    from minirospy.names import Arguments
 
 __all__ = ["VERB"]
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import NotFoundError
 from minirospy.cli.command import tool_node, warn_unpublished
 from minirospy.cli.parser import Parser, integer
 from minirospy.cli.verbs import Verb
-from minirospy.errors import NotFoundError
 from minirospy.idl.protocols import is_stamped
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.topics import find_topic
@@ -18,8 +18,8 @@ from minirospy.introspect.topics import find_topic
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from minirospy.base.names import Arguments
     from minirospy.introspect.streams import Received, ToolNode
-    from minirospy.names import Arguments
 
 __all__ = ["BW", "DELAY", "HZ"]
 

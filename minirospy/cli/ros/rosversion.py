@@ -10,9 +10,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from minirospy.base.errors import NotFoundError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import NotFoundError
 from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages

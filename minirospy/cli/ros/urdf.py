@@ -12,11 +12,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy.base.errors import MinirospyError, UrdfError, UsageError
+from minirospy.base.escape import escaped
 from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import MinirospyError, UrdfError, UsageError
-from minirospy.escape import escaped
 from minirospy.urdf.describe import dot_graph, error_lines, problem_lines, tree_lines
 from minirospy.urdf.model import Robot
 from minirospy.urdf.poses import quaternion_from_rpy, rpy_from_quaternion
@@ -105,7 +105,7 @@ def _graph(file: str | None, output: str | None) -> None:
 
 
 def _picture(robot: Robot) -> str:
-    from minirospy.tree_svg import Edge, tree_svg
+    from minirospy.base.tree_svg import Edge, tree_svg
 
     edges = []
     for name, joint in robot.joints.items():

@@ -12,10 +12,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy.base.errors import MinirospyError, NotFoundError
+from minirospy.base.installation import install_command
+from minirospy.base.xml_text import check_xml
 from minirospy.cli.command import run
-from minirospy.errors import MinirospyError, NotFoundError
-from minirospy.installation import install_command
-from minirospy.xml_text import check_xml
 
 __all__ = ["main"]
 

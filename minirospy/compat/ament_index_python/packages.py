@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from minirospy.errors import NotFoundError
+from minirospy.base.errors import NotFoundError
 from minirospy.workspace.packages import Packages
 
 __all__ = [

@@ -14,9 +14,9 @@ from contextlib import suppress
 from bond.msg import Constants, Status
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.bondpy.machine import Action, Event, State, next_state
-from minirospy.errors import MinirospyError
 
 __all__ = ["Bond", "Timeout", "as_float_duration", "as_ros_duration"]
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from sensor_msgs.msg import CameraInfo
 
-from minirospy.yaml_text import load
+from minirospy.base.yaml_text import load
 
 __all__ = ["CalibrationError", "ini_of", "parse_ini", "parse_yaml", "yaml_of"]
 

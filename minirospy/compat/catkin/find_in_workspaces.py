@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from minirospy.base.errors import NotFoundError
 from minirospy.compat.catkin.workspace import get_source_paths, get_workspaces
-from minirospy.errors import NotFoundError
 from minirospy.workspace.packages import Packages
 
 __all__ = ["find_in_workspaces"]

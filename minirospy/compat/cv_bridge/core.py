@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from minirospy.base.installation import install_command
 from minirospy.images.compressed import decode, encode, opencv
 from minirospy.images.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
 from minirospy.images.view import pixels
-from minirospy.installation import install_command
 
 if TYPE_CHECKING:
     import numpy

@@ -11,9 +11,9 @@ import sys
 from diagnostic_msgs.srv import AddDiagnostics
 
 from minirospy import client as rospy
+from minirospy.base.errors import MinirospyError
 from minirospy.compat import rosparam
 from minirospy.compat.bondpy.bondpy import Bond
-from minirospy.errors import MinirospyError
 
 __all__ = ["main"]
 

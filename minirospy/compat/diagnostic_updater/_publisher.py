@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
 from minirospy.compat.diagnostic_updater._diagnostic_updater import (
     CompositeDiagnosticTask,
     DiagnosticTaskVector,

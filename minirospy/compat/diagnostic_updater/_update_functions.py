@@ -10,7 +10,7 @@ import threading
 from collections.abc import Mapping
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
 from minirospy.compat.diagnostic_updater._diagnostic_status_wrapper import ERROR, OK, WARN
 from minirospy.compat.diagnostic_updater._diagnostic_updater import DiagnosticTask, Status
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from minirospy import client as rospy
+from minirospy.base.errors import MinirospyError, UsageError
+from minirospy.base.yaml_text import safe_load
 from minirospy.cli.command import NO_MASTER
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
@@ -20,8 +22,6 @@ from minirospy.compat.dynamic_reconfigure import (
     Values,
     find_reconfigure_services,
 )
-from minirospy.errors import MinirospyError, UsageError
-from minirospy.yaml_text import safe_load
 
 if TYPE_CHECKING:
     from minirospy.compat.dynamic_reconfigure.encoding import Config

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from minirospy.base.errors import DefinitionError
 from minirospy.compat.genmsg.base import InvalidMsgSpec
 from minirospy.compat.genmsg.msgs import (
     HEADER_FULL_NAME,
@@ -22,7 +23,6 @@ from minirospy.compat.genmsg.msgs import (
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
 from minirospy.compat.roslib.names import package_resource_name
-from minirospy.errors import DefinitionError
 from minirospy.idl import digest
 from minirospy.idl.parse import parse_message, parse_service
 from minirospy.idl.spec import MessageSpec, ServiceSpec

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.errors import MessageException
+from minirospy.base.errors import MessageException
 
 __all__ = ["SIMPLE_TYPES", "SIMPLE_TYPES_DICT", "MsgGenerationException", "is_simple"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from minirospy.errors import DefinitionError
+from minirospy.base.errors import DefinitionError
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from minirospy.base.errors import DefinitionError
 from minirospy.compat.genmsg.base import InvalidMsgSpec
 from minirospy.compat.genmsg.msg_loader import (
     MsgContext,
@@ -23,7 +24,6 @@ from minirospy.compat.genmsg.msg_loader import (
 from minirospy.compat.genmsg.msgs import Constant, MsgSpec
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
-from minirospy.errors import DefinitionError
 from minirospy.idl.emit import emit_message, emit_service
 
 __all__ = [

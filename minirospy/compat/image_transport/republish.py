@@ -17,6 +17,7 @@ from typing import TypeAlias
 from sensor_msgs.msg import CompressedImage, Image
 
 from minirospy import client as rospy
+from minirospy.base.errors import ROSInterruptException
 from minirospy.client.topics import AnyMsg
 from minirospy.compat.image_transport.codecs import (
     CodecError,
@@ -26,7 +27,6 @@ from minirospy.compat.image_transport.codecs import (
     uncompressed,
     uncompressed_depth,
 )
-from minirospy.errors import ROSInterruptException
 from minirospy.images.compressed import require_library
 
 __all__ = ["Republisher", "list_main", "main", "settings_of"]

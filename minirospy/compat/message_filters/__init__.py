@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable, MutableMapping, Sequence
 from typing import Protocol
 
 from minirospy import client as rospy
+from minirospy.base.times import Duration, Time
 from minirospy.client.session import current_session
 from minirospy.client.time import is_wallclock
 from minirospy.compat.message_filters.stamps import StampQueue, closest_stamps
 from minirospy.idl.protocols import Message
-from minirospy.times import Duration, Time
 
 __all__ = ["ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 
-from minirospy.times import Time
+from minirospy.base.times import Time
 
 __all__ = ["StampQueue", "closest_stamps"]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 from sensor_msgs.msg import PointCloud2, PointField
 
+from minirospy.base.times import Time
 from minirospy.compat.ros_numpy.registry import converts_from_numpy, converts_to_numpy
-from minirospy.times import Time
 
 if TYPE_CHECKING:
     from minirospy.compat.ros_numpy.registry import Array

@@ -13,7 +13,7 @@ from pathlib import Path
 from rosauth.srv import Authentication, AuthenticationRequest, AuthenticationResponse
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
 
 __all__ = ["is_authentic", "mac_of", "main"]
 

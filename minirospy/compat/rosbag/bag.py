@@ -19,6 +19,7 @@ from minirospy.bag import info
 from minirospy.bag.reader import ChunkedReader
 from minirospy.bag.reader12 import Reader12
 from minirospy.bag.repair import Repair
+from minirospy.base.errors import BagCompressionError, BagError
 from minirospy.compat.rosbag.exceptions import (
     ROSBagEncryptException,
     ROSBagEncryptNotSupportedException,
@@ -37,11 +38,10 @@ from minirospy.compat.rosbag.private import (
     nanoseconds_of,
 )
 from minirospy.compat.rosbag.readers import _BagReader, _BagReader200
-from minirospy.errors import BagCompressionError, BagError
 
 if TYPE_CHECKING:
+    from minirospy.base.times import Time
     from minirospy.idl.protocols import Message
-    from minirospy.times import Time
 
 __all__ = [
     "Bag",

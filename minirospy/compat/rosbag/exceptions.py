@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
-from minirospy.errors import BagEncryptedError, BagError, BagFormatError, BagUnindexedError, NoBagError
+from minirospy.base.errors import BagEncryptedError, BagError, BagFormatError, BagUnindexedError, NoBagError
 
 __all__ = [
     "ROSBagEncryptException",

@@ -6,10 +6,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import DefinitionError
 from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagFormatException
-from minirospy.errors import (
-    DefinitionError,
-)
 from minirospy.introspect.bags import class_of
 
 if TYPE_CHECKING:

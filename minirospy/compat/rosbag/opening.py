@@ -12,9 +12,9 @@ from minirospy.bag.reader import ChunkedReader, open_bag
 from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import ChunkInfo, Connection, read_version
 from minirospy.bag.writer import BagWriter, Continued
+from minirospy.base.errors import BagUnindexedError
 from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagUnindexedException
 from minirospy.compat.rosbag.private import PrivateBag
-from minirospy.errors import BagUnindexedError
 
 __all__ = ["CLOSED", "FileArgument", "OpenedBag"]
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.bag.compression import NONE
 from minirospy.bag.index import merge_entries
+from minirospy.base.names import canonicalize
+from minirospy.base.times import Time
 from minirospy.compat.rosbag.exceptions import as_ros_errors
 from minirospy.compat.rosbag.internals import (
     Header,
@@ -19,8 +21,6 @@ from minirospy.compat.rosbag.internals import (
     _IndexEntry,
     make_time,
 )
-from minirospy.names import canonicalize
-from minirospy.times import Time
 
 if TYPE_CHECKING:
     from minirospy.bag.base import BagReader, Position

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from minirospy.bag.base import Position
+    from minirospy.base.times import Time
     from minirospy.compat.rosbag.bag import Bag
     from minirospy.compat.rosbag.private import BagMessage, BagMessageWithConnectionHeader, ConnectionFilter
-    from minirospy.times import Time
 
 __all__: list[str] = []
 

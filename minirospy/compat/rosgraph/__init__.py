@@ -3,8 +3,8 @@
 import sys
 from collections.abc import Sequence
 
+from minirospy.base.names import parse_arguments
 from minirospy.compat.submodules import on_first_use
-from minirospy.names import parse_arguments
 
 __all__ = ["myargv"]
 

@@ -6,11 +6,11 @@ import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from minirospy.base.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.compat.rosgraph.names import make_caller_id
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rosgraph.rosenv import get_master_uri
-from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:

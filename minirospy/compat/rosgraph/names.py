@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from minirospy import names as _names
+from minirospy.base import names as _names
 from minirospy.compat.ros_names import (
     canonicalize_name,
     get_ros_namespace,

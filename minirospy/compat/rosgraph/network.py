@@ -11,9 +11,9 @@ import struct
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from minirospy.base.environment import Environment, is_local
+from minirospy.base.errors import WireError
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
-from minirospy.environment import Environment, is_local
-from minirospy.errors import WireError
 from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import parse_header
 

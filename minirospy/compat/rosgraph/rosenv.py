@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
-from minirospy.environment import DEFAULT_MASTER_PORT
+from minirospy.base.environment import DEFAULT_MASTER_PORT
 
 __all__ = [
     "DEFAULT_MASTER_URI",

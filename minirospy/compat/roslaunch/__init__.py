@@ -6,8 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.environment import DEFAULT_MASTER_PORT
-from minirospy.private_files import open_text
+from minirospy.base.environment import DEFAULT_MASTER_PORT
+from minirospy.base.private_files import open_text
 
 __all__ = ["NAME", "configure_logging", "main", "write_pid_file"]
 

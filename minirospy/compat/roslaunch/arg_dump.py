@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy import names
+from minirospy.base import names
 from minirospy.compat.roslaunch.config import LaunchFile
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.launch.arg_docs import resolved_arg_docs

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from minirospy.base.environment import DISTRO, ROS_VERSION, Environment
+from minirospy.base.errors import LaunchError
 from minirospy.compat.roslaunch.core import (
     Machine,
     Master,
@@ -18,8 +20,6 @@ from minirospy.compat.roslaunch.core import (
     local_machine,
 )
 from minirospy.compat.roslaunch.xmlloader import XmlLoader
-from minirospy.environment import DISTRO, ROS_VERSION, Environment
-from minirospy.errors import LaunchError
 from minirospy.launch.spec import LaunchSpec
 from minirospy.launch.summary import summary
 

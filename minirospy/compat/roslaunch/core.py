@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 from xml.sax.saxutils import escape
 
-from minirospy import names
-from minirospy.environment import Environment, is_own_host
+from minirospy.base import names
+from minirospy.base.environment import Environment, is_own_host
 from minirospy.launch.command import node_environment
 from minirospy.launch.output import ERROR, Output
 from minirospy.launch.spec import MachineSpec, NodeSpec, TestSpec

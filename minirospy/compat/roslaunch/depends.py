@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.errors import MinirospyError
 from minirospy.launch.depends import file_needs, missing_declarations, package_of
 
 __all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps"]

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
+from minirospy.base.errors import MinirospyError, RpcError
 from minirospy.compat.roslaunch.config import ROSLaunchConfig
 from minirospy.compat.roslaunch.core import Node, RLException, Test
 from minirospy.compat.roslaunch.pmon import (
@@ -18,7 +19,6 @@ from minirospy.compat.roslaunch.pmon import (
     ProcessMonitor,
     init_signal_handlers,
 )
-from minirospy.errors import MinirospyError, RpcError
 from minirospy.launch.output import Output
 from minirospy.launch.process import Timeouts
 from minirospy.launch.runner import RunOptions

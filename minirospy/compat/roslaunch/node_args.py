@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
 from minirospy.compat.roslaunch.core import Machine, Node
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError
 from minirospy.launch.command import node_command, node_environment
 from minirospy.launch.spec import NodeSpec
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import yaml
 
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.errors import MinirospyError
 from minirospy.launch.load import load_files
 
 __all__ = ["dump_params"]

@@ -9,6 +9,7 @@ import contextlib
 import logging
 from collections.abc import Sequence
 
+from minirospy.base.environment import Environment
 from minirospy.compat.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.launch import ROSLaunchRunner, master_options, replacement_of
@@ -16,7 +17,6 @@ from minirospy.compat.roslaunch.pmon import (
     ProcessListener,
     ProcessMonitor,
 )
-from minirospy.environment import Environment
 from minirospy.launch.process import Timeouts
 from minirospy.launch.runner import RunOptions
 from minirospy.runtime.rpc.master_proxy import MasterProxy

@@ -17,10 +17,10 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import ClassVar
 
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.roslaunch.core import Node, RLException
 from minirospy.compat.roslaunch.node_args import NodeParamsException
-from minirospy.environment import Environment
-from minirospy.errors import MinirospyError
 from minirospy.launch import process as processes
 from minirospy.launch.command import node_command, node_environment
 from minirospy.launch.output import Output

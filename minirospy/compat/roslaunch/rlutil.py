@@ -6,11 +6,11 @@ import time
 import uuid
 from collections.abc import Sequence
 
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.compat.roslaunch.config import LaunchFile, load_config_default
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
 from minirospy.launch.files import find_files
 from minirospy.launch.master import LaunchMaster

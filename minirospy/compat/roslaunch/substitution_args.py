@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
-from minirospy import names
+from minirospy.base import names
 from minirospy.compat.catkin.find_in_workspaces import find_in_workspaces
 from minirospy.compat.rospkg.rospack import RosPack
 from minirospy.launch.substitution import convert

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from minirospy import names
+from minirospy.base import names
+from minirospy.base.errors import MinirospyError
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.substitution_args import chosen_packages
-from minirospy.errors import MinirospyError
 from minirospy.launch.load import STDIN, LaunchSource, load_sources
 from minirospy.launch.spec import LaunchSpec
 

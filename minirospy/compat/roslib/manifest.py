@@ -10,12 +10,12 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from xml.parsers.expat import ExpatError
 
+from minirospy.base.xml_text import XmlError, check_xml
 from minirospy.compat.roslib.exceptions import ROSLibException
 from minirospy.compat.roslib.packages import InvalidROSPkgException, get_pkg_dir
 from minirospy.compat.rospkg.common import MANIFEST_FILE
 from minirospy.compat.rospkg.manifest import Export
 from minirospy.compat.rospkg.manifest import RosDep as ROSDep
-from minirospy.xml_text import XmlError, check_xml
 
 if TYPE_CHECKING:
     from xml.dom.minidom import Element

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 
 __all__ = ["Master"]
 

@@ -13,12 +13,12 @@ from collections.abc import Callable
 from typing import Any, cast
 from xmlrpc.client import Error
 
+from minirospy.base.steps import Steps, finish
 from minirospy.compat.rosmaster.util import xmlrpcapi
 from minirospy.graph.calls import ERROR, Answer
 from minirospy.graph.master_api import MasterApi, Notice
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate
 from minirospy.graph.registry import NodeShutdown
-from minirospy.steps import Steps, finish
 
 __all__ = ["ROSMasterHandler"]
 

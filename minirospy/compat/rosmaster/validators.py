@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from minirospy.base.names import is_global
 from minirospy.compat.rosgraph.names import resolve_name
 from minirospy.compat.rospy.names import ParameterInvalid
-from minirospy.names import is_global
 
 __all__ = [
     "ParameterInvalid",

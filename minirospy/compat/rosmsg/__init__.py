@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from minirospy.errors import DefinitionError, NotFoundError
+from minirospy.base.errors import DefinitionError, NotFoundError
+from minirospy.base.times import TVal
 from minirospy.introspect.interfaces import Interfaces, Kind, describe
-from minirospy.times import TVal
 from minirospy.workspace.packages import Packages
 
 if TYPE_CHECKING:

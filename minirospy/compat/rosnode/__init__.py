@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
 from minirospy.compat.rosgraph import masterapi
-from minirospy.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
 from minirospy.introspect import nodes
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.texts import connections_text, node_text

@@ -11,10 +11,10 @@ from xmlrpc.client import Binary
 
 import yaml
 
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.compat.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.compat.rosgraph.masterapi import Master, MasterError
-from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import add_angles, parse_documents, parse_value

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import ManifestError
+from minirospy.base.errors import ManifestError
 
 if TYPE_CHECKING:
     from minirospy.workspace import manifest

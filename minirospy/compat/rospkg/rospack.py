@@ -12,9 +12,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from minirospy.base.errors import ManifestError
+from minirospy.base.suggestions import nearest
 from minirospy.compat.rospkg.environment import get_ros_paths
-from minirospy.errors import ManifestError
-from minirospy.suggestions import nearest
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, package_name
 

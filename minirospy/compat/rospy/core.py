@@ -11,11 +11,11 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import ROSException
 from minirospy.client.log import logerr, logger_of, places, write
 from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
-from minirospy.environment import split_uri
-from minirospy.errors import ROSException
 
 if TYPE_CHECKING:
     from minirospy.client.log import Keywords

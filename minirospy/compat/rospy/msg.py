@@ -6,7 +6,7 @@ import struct
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from minirospy.errors import DeserializationError
+from minirospy.base.errors import DeserializationError
 from minirospy.idl.message import number_header
 
 if TYPE_CHECKING:

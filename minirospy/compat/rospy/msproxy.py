@@ -10,9 +10,9 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from minirospy.base.errors import RpcFault, RpcUnreachable
 from minirospy.client.params import as_xmlrpc_client, check_sendable, get_param_cached
 from minirospy.client.session import current_session
-from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
 
 __all__ = ["MasterProxy", "ServerProxy", "get_master", "xmlrpcapi"]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from minirospy import names
+from minirospy.base import names
+from minirospy.base.errors import ROSException
 from minirospy.client.session import current_session
 from minirospy.compat.ros_names import is_global, is_private
 from minirospy.compat.rosgraph.names import resolve_name
-from minirospy.errors import ROSException
 
 __all__ = [
     "ANYTYPE",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 import time
 
+from minirospy.base.clock import SimulatedClock, WallClock
+from minirospy.base.times import Time
 from minirospy.client.session import current_session
 from minirospy.client.time import is_wallclock
-from minirospy.clock import SimulatedClock, WallClock
-from minirospy.times import Time
 
 __all__ = [
     "get_rostime_cond",

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from minirospy.client.params import check_sendable
-from minirospy.compat.rosgraph import masterapi
-from minirospy.errors import (
+from minirospy.base.errors import (
     MasterUnreachableError,
     MessageException,
     MinirospyError,
@@ -17,6 +15,8 @@ from minirospy.errors import (
     NotFoundError,
     ServiceException,
 )
+from minirospy.client.params import check_sendable
+from minirospy.compat.rosgraph import masterapi
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
+from minirospy.base.environment import Environment
 from minirospy.compat.roslaunch.config import LaunchFile, ROSLaunchConfig
 from minirospy.compat.roslaunch.core import Master, Test, generate_run_id
 from minirospy.compat.roslaunch.launch import ROSLaunchRunner
 from minirospy.compat.roslaunch.parent import ROSLaunchParent
-from minirospy.environment import Environment
 from minirospy.testing.runner import master_of_tests
 
 __all__ = ["ROSTestLaunchParent"]

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.compat.rosgraph import masterapi
 from minirospy.compat.rosgraph.names import script_resolve_name
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rostopic.echo import CallbackEcho
-from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.introspect import topics
 from minirospy.introspect.fields import Step, field_value, parse_path
 from minirospy.introspect.graph import Graph
@@ -218,7 +218,7 @@ def publish_message(
     """
     import rospy
 
-    from minirospy.errors import MessageException
+    from minirospy.base.errors import MessageException
     from minirospy.introspect.echo import fill_message
 
     def message() -> Message:

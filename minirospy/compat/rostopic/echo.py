@@ -11,7 +11,7 @@ from minirospy.introspect.echo import elided
 from minirospy.introspect.plot import plot_header, plot_row
 
 if TYPE_CHECKING:
-    from minirospy.times import Time
+    from minirospy.base.times import Time
 
 __all__ = ["CallbackEcho", "create_field_filter", "create_value_transform"]
 

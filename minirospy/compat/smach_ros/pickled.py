@@ -13,10 +13,10 @@ from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from minirospy.base.times import Duration, Time
 from minirospy.client.time import Duration as RosDuration
 from minirospy.client.time import Time as RosTime
 from minirospy.idl.load import get_message_class, get_service_class
-from minirospy.times import Duration, Time
 
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 

@@ -11,12 +11,12 @@ from actionlib_msgs.msg import GoalStatus
 
 from minirospy import client as rospy
 from minirospy.actionlib.simple_client import SimpleActionClient
+from minirospy.base.times import Duration
 from minirospy.compat.smach.exceptions import InvalidStateError
 from minirospy.compat.smach.state import State
 from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach_ros.callbacks import StateCallback
 from minirospy.idl.protocols import Message
-from minirospy.times import Duration
 
 __all__ = ["SimpleActionState"]
 

@@ -12,8 +12,8 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from sound_play.msg import SoundRequest, SoundRequestAction, SoundRequestGoal
 
 from minirospy import client as rospy
-from minirospy import times
 from minirospy.actionlib.simple_client import SimpleActionClient
+from minirospy.base import times
 from minirospy.compat.rospkg.rospack import RosPack
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ A leading slash of a frame's name is dropped, where tf2 refuses it. Source: http
 
 from __future__ import annotations
 
+from minirospy.base.errors import ConnectivityException, ExtrapolationException, LookupException
+from minirospy.base.errors import TransformException as Exception
 from minirospy.compat.tf.broadcaster import TransformBroadcaster
 from minirospy.compat.tf.listener import Transformer, TransformerROS, TransformListener
-from minirospy.errors import ConnectivityException, ExtrapolationException, LookupException
-from minirospy.errors import TransformException as Exception
 
 __all__ = [
     "ConnectivityException",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from geometry_msgs.msg import TransformStamped
 
-from minirospy import times
+from minirospy.base import times
 from minirospy.frames import broadcasters
 
 __all__ = ["TransformBroadcaster"]

@@ -13,9 +13,9 @@ import sensor_msgs.msg
 from std_msgs.msg import Header
 
 from minirospy import client as rospy
-from minirospy import times
+from minirospy.base import times
+from minirospy.base.errors import TransformException
 from minirospy.compat.tf import transformations
-from minirospy.errors import TransformException
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener as Tf2Listener
 from minirospy.frames.messages import Moment

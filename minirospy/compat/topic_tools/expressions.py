@@ -15,12 +15,12 @@ from types import CodeType, ModuleType
 from std_msgs.msg import Header
 
 from minirospy import client as rospy
+from minirospy.base.errors import MinirospyError
+from minirospy.base.yaml_text import safe_load
 from minirospy.compat import rostopic
-from minirospy.errors import MinirospyError
 from minirospy.idl.load import message_class
 from minirospy.idl.message import fill_message_args
 from minirospy.idl.protocols import Message
-from minirospy.yaml_text import safe_load
 
 __all__ = ["relay_field_main", "transform_main"]
 

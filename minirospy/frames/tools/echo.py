@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from geometry_msgs.msg import TransformStamped
 
 from minirospy import client as rospy
-from minirospy.errors import ExtrapolationException, LookupException, TransformException
-from minirospy.escape import escaped
+from minirospy.base.errors import ExtrapolationException, LookupException, TransformException
+from minirospy.base.escape import escaped
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix

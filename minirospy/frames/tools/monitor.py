@@ -13,8 +13,8 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 
 from minirospy import client as rospy
-from minirospy.errors import DeserializationError, TransformException
-from minirospy.escape import escaped
+from minirospy.base.errors import DeserializationError, TransformException
+from minirospy.base.escape import escaped
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.messages import LazyTFMessage

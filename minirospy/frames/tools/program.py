@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Sequence
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
-from minirospy.escape import escaped
+from minirospy.base.errors import MinirospyError
+from minirospy.base.escape import escaped
 
 __all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
 

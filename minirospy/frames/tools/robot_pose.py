@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from geometry_msgs.msg import Point, Pose, PoseStamped
 
 from minirospy import client as rospy
-from minirospy.errors import TransformException
+from minirospy.base.errors import TransformException
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.tools.program import ToolError, run_program

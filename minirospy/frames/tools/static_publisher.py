@@ -11,7 +11,7 @@ from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 
 from minirospy import client as rospy
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 from minirospy.frames.broadcasters import StaticTransformBroadcaster, TransformBroadcaster
 from minirospy.frames.tools.program import ToolError, run_program
 from minirospy.urdf.poses import quaternion_from_rpy

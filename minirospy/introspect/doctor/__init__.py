@@ -9,8 +9,8 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError, UsageError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, RpcError, UsageError
 from minirospy.introspect.doctor.findings import Finding, Status, ok, problem, warning
 from minirospy.introspect.doctor.machine import check_packages, check_python, check_variables
 from minirospy.introspect.doctor.reach import CONNECT_SECONDS, MasterPlace, addresses_of

@@ -9,8 +9,8 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from minirospy.environment import Environment
-from minirospy.errors import DeserializationError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import DeserializationError
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import SystemState

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError, RpcFault, RpcProtocolError, RpcRefused
+from minirospy.base.errors import MinirospyError, RpcFault, RpcProtocolError, RpcRefused
+from minirospy.base.suggestions import nearest
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
@@ -28,7 +29,6 @@ from minirospy.introspect.doctor.reach import (
 )
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.runtime.rpc.master_proxy import BusConnection, SlaveProxy, SystemState
-from minirospy.suggestions import nearest
 
 __all__ = [
     "Answers",

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
 
-from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, RpcRefused
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError, RpcRefused
 from minirospy.idl.load import service_class
 from minirospy.introspect.doctor.findings import Finding, ok, problem
 from minirospy.introspect.doctor.graph import Answers, node_trouble

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import minirospy
-from minirospy import names
-from minirospy.environment import Environment
-from minirospy.errors import ManifestError, NotFoundError
+from minirospy.base import names
+from minirospy.base.environment import Environment
+from minirospy.base.errors import ManifestError, NotFoundError
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import MasterPlace, is_loopback, is_own_address
 

@@ -7,7 +7,7 @@ import socket
 import time
 from collections.abc import Iterator
 
-from minirospy.errors import MasterUnreachableError, RpcError, RpcFault
+from minirospy.base.errors import MasterUnreachableError, RpcError, RpcFault
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import CONNECT_SECONDS, RESUME, Fault, MasterPlace, Trouble, trouble_of
 from minirospy.runtime.rpc.master_proxy import MasterProxy

@@ -10,9 +10,9 @@ import threading
 from collections.abc import Collection, Iterator
 from types import TracebackType
 
-from minirospy import names
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError
+from minirospy.base import names
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.doctor.findings import Finding, ok, problem
 from minirospy.introspect.doctor.reach import (

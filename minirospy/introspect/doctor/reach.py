@@ -16,7 +16,7 @@ from enum import Enum
 from typing import NamedTuple, TypeVar
 from urllib.parse import urlsplit
 
-from minirospy.errors import (
+from minirospy.base.errors import (
     MasterUnreachableError,
     MinirospyError,
     RpcLate,

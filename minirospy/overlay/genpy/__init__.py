@@ -4,9 +4,9 @@ from genpy import base as base
 from genpy import dynamic as dynamic
 from genpy import message as message
 from genpy import rostime as rostime
+from minirospy.base.times import Duration, Time, TVal
 from minirospy.compat.genpy.message import struct_I
 from minirospy.idl.message import DeserializationError, Message, MessageException, SerializationError
-from minirospy.times import Duration, Time, TVal
 
 __all__ = [
     "DeserializationError",

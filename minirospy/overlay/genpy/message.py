@@ -1,5 +1,6 @@
 """genpy.message, provided by minirospy."""
 
+from minirospy.base.times import Duration, Time, TVal
 from minirospy.compat.genpy.base import is_simple
 from minirospy.compat.genpy.message import (
     RosMsgUnicodeErrors,
@@ -18,7 +19,6 @@ from minirospy.idl.message import (
     get_printable_message_args,
     strify_message,
 )
-from minirospy.times import Duration, Time, TVal
 
 __all__ = [
     "DeserializationError",

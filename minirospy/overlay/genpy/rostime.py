@@ -1,5 +1,5 @@
 """genpy.rostime, provided by minirospy."""
 
-from minirospy.times import Duration, Time, TVal
+from minirospy.base.times import Duration, Time, TVal
 
 __all__ = ["Duration", "TVal", "Time"]

@@ -1,5 +1,6 @@
 """rosgraph.rosenv, provided by minirospy."""
 
+from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.compat.rosgraph.rosenv import (
     DEFAULT_MASTER_URI,
     ROS_HOSTNAME,
@@ -9,7 +10,6 @@ from minirospy.compat.rosgraph.rosenv import (
     ROS_NAMESPACE,
     get_master_uri,
 )
-from minirospy.environment import DEFAULT_MASTER_PORT
 
 __all__ = [
     "DEFAULT_MASTER_PORT",

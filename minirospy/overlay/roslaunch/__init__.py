@@ -1,5 +1,6 @@
 """roslaunch, provided by minirospy."""
 
+from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.compat.roslaunch import NAME, configure_logging, main, write_pid_file
 from minirospy.compat.roslaunch.config import ROSLaunchConfig
 from minirospy.compat.roslaunch.core import Master, Node, RLException, Test
@@ -7,7 +8,6 @@ from minirospy.compat.roslaunch.launch import ROSLaunchRunner
 from minirospy.compat.roslaunch.pmon import Process
 from minirospy.compat.roslaunch.scriptapi import ROSLaunch
 from minirospy.compat.roslaunch.xmlloader import XmlLoader, XmlParseException
-from minirospy.environment import DEFAULT_MASTER_PORT
 from roslaunch import arg_dump as arg_dump
 from roslaunch import config as config
 from roslaunch import core as core

@@ -1,5 +1,6 @@
 """roslaunch.config, provided by minirospy."""
 
+from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.compat.roslaunch.config import (
     ROSLaunchConfig,
     get_roscore_filename,
@@ -7,7 +8,6 @@ from minirospy.compat.roslaunch.config import (
     namespaces_of,
 )
 from minirospy.compat.roslaunch.core import Master, RLException, is_machine_local, local_machine
-from minirospy.environment import DEFAULT_MASTER_PORT
 
 __all__ = [
     "DEFAULT_MASTER_PORT",

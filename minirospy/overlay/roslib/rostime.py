@@ -1,5 +1,5 @@
 """roslib.rostime, provided by minirospy: genpy's names under their former module."""
 
-from minirospy.times import Duration, Time, TVal
+from minirospy.base.times import Duration, Time, TVal
 
 __all__ = ["Duration", "TVal", "Time"]

@@ -1,8 +1,6 @@
 """rospy.exceptions, provided by minirospy."""
 
-from minirospy.client.lifecycle import ROSInterruptException
-from minirospy.client.time import ROSTimeMovedBackwardsException
-from minirospy.errors import (
+from minirospy.base.errors import (
     ROSException,
     ROSInitException,
     ROSInternalException,
@@ -11,6 +9,8 @@ from minirospy.errors import (
     TransportInitError,
     TransportTerminated,
 )
+from minirospy.client.lifecycle import ROSInterruptException
+from minirospy.client.time import ROSTimeMovedBackwardsException
 
 __all__ = [
     "ROSException",

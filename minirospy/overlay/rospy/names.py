@@ -1,5 +1,6 @@
 """rospy.names, provided by minirospy: remappings, and the validation of a call's arguments."""
 
+from minirospy.base.errors import ROSException, ROSInitException
 from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
 from minirospy.compat.ros_names import (
     GLOBALNS,
@@ -34,7 +35,6 @@ from minirospy.compat.rospy.names import (
 from minirospy.compat.rospy.names import (
     _set_caller_id as _set_caller_id,
 )
-from minirospy.errors import ROSException, ROSInitException
 
 __all__ = [
     "ANYTYPE", "GLOBALNS", "REMAP", "SEP", "SERVICE_ANYTYPE", "TOPIC_ANYTYPE", "ParameterInvalid", "ROSException",

@@ -1,5 +1,7 @@
 """rospy.topics, provided by minirospy."""
 
+from minirospy.base.errors import ROSSerializationException as ROSSerializationException
+from minirospy.base.errors import TransportTerminated as TransportTerminated
 from minirospy.client.publisher import PublishedTopic as _PublisherImpl
 from minirospy.client.subscriber import SubscribedTopic as _SubscriberImpl
 from minirospy.client.topic import SharedTopic as _TopicImpl
@@ -11,8 +13,6 @@ from minirospy.compat.rospy.core import topics_logger as _logger
 from minirospy.compat.rospy.msg import serialize_message as serialize_message
 from minirospy.compat.rospy.passing import topics_dir as __dir__
 from minirospy.compat.rospy.passing import topics_getattr as __getattr__
-from minirospy.errors import ROSSerializationException as ROSSerializationException
-from minirospy.errors import TransportTerminated as TransportTerminated
 from minirospy.idl.message import Message as Message
 from minirospy.idl.message import args_kwds_to_message as args_kwds_to_message
 from rospy.impl.registration import Registration as Registration

@@ -9,12 +9,12 @@ from tf2_msgs.msg import TFMessage as TFMessage
 from tf2_msgs.srv import FrameGraph as FrameGraph
 from tf2_msgs.srv import FrameGraphResponse as FrameGraphResponse
 
-from minirospy.errors import ConnectivityException as ConnectivityException
-from minirospy.errors import ExtrapolationException as ExtrapolationException
-from minirospy.errors import InvalidArgumentException as InvalidArgumentException
-from minirospy.errors import LookupException as LookupException
-from minirospy.errors import TimeoutException as TimeoutException
-from minirospy.errors import TransformException as TransformException
+from minirospy.base.errors import ConnectivityException as ConnectivityException
+from minirospy.base.errors import ExtrapolationException as ExtrapolationException
+from minirospy.base.errors import InvalidArgumentException as InvalidArgumentException
+from minirospy.base.errors import LookupException as LookupException
+from minirospy.base.errors import TimeoutException as TimeoutException
+from minirospy.base.errors import TransformException as TransformException
 from minirospy.frames.broadcasters import StaticTransformBroadcaster as StaticTransformBroadcaster
 from minirospy.frames.broadcasters import TransformBroadcaster as TransformBroadcaster
 from minirospy.frames.buffer import DEFAULT_CAN_TRANSFORM_POLLING_SCALE as DEFAULT_CAN_TRANSFORM_POLLING_SCALE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Mapping
 
-from minirospy.errors import RpcError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcUnreachable
 from minirospy.graph.shares import holder_of
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 

@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy import private_files
-from minirospy.steps import PAUSE, Steps, finish, is_small
+from minirospy.base import private_files
+from minirospy.base.steps import PAUSE, Steps, finish, is_small
 from minirospy.wire.journal import HEAD, Recovered, pack_in_steps, parse_journal, serialize_record
 
 __all__ = ["RETRY_SECONDS", "Journal", "JournalBusyError", "Left", "boot_id"]

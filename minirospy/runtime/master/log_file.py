@@ -14,8 +14,8 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import cast
 
-from minirospy import private_files
-from minirospy.escape import escaped
+from minirospy.base import private_files
+from minirospy.base.escape import escaped
 
 __all__ = ["LogFile", "LogFileHandler"]
 

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import minirospy
-from minirospy.closing import close_all
-from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.base.closing import close_all
+from minirospy.base.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.base.steps import ALONE, Steps, finish
 from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import MasterApi, Notice, nothing
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate
@@ -31,7 +32,6 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.steps import ALONE, Steps, finish
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol
 
-from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcProtocolError, RpcUnreachable
+from minirospy.base.steps import ALONE, Steps, is_small
 from minirospy.graph.master_api import PARAMETERS, Notice
 from minirospy.graph.parameters import ParameterUpdate
 from minirospy.graph.registry import PublisherUpdate
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import MAX_BODY, Body
 from minirospy.wire.xmlrpc import serialize_call, serialize_call_in_steps
 

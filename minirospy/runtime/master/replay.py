@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Any
 
+from minirospy.base.steps import finish
 from minirospy.graph.master_api import Notice, key_of_node
 from minirospy.graph.parameters import ParameterTree, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, Registry
-from minirospy.steps import finish
 from minirospy.wire.journal import unpack
 
 __all__ = ["Replay", "changes_to", "forget_node"]

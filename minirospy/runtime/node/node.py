@@ -12,9 +12,9 @@ import socket
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from minirospy.closing import close_all, close_each
-from minirospy.environment import Environment
-from minirospy.errors import WireError
+from minirospy.base.closing import close_all, close_each
+from minirospy.base.environment import Environment
+from minirospy.base.errors import WireError
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi

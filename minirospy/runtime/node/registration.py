@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 from weakref import WeakValueDictionary
 
-from minirospy.environment import Environment
-from minirospy.errors import (
+from minirospy.base.environment import Environment
+from minirospy.base.errors import (
     MasterUnreachableError,
     RpcError,
     RpcFault,
@@ -22,7 +22,7 @@ from minirospy.errors import (
     RpcRefused,
     RpcUnreachable,
 )
-from minirospy.names import is_legal_name
+from minirospy.base.names import is_legal_name
 from minirospy.runtime.node.services import ServiceServer
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient

@@ -12,8 +12,8 @@ import socket
 from collections.abc import Mapping
 from typing import Any
 
-from minirospy.environment import split_uri
-from minirospy.errors import CallFailed, WireError
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import CallFailed, WireError
 from minirospy.runtime.transport import local, sockets
 from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header

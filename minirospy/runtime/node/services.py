@@ -14,7 +14,7 @@ import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
-from minirospy.errors import CallFailed, ServiceException, ThreadLimitError, WireError
+from minirospy.base.errors import CallFailed, ServiceException, ThreadLimitError, WireError
 from minirospy.runtime.node.service_client import PeerEndedError, Reader, parse_service_uri
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

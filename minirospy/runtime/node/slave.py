@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from minirospy import names
+from minirospy.base import names
 from minirospy.graph.calls import (
     ERROR,
     FAILURE,
@@ -28,7 +28,7 @@ from minirospy.graph.calls import (
 from minirospy.runtime.transport.local import PROTOCOL
 
 if TYPE_CHECKING:
-    from minirospy.environment import Environment
+    from minirospy.base.environment import Environment
     from minirospy.runtime.node.topics import InLink, Publication, Subscription
     from minirospy.runtime.transport.links import OutLink
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 
-from minirospy.closing import close_each
-from minirospy.environment import split_uri
-from minirospy.errors import (
+from minirospy.base.closing import close_each
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import (
     SUSPENDED,
     HandshakeRefused,
     RpcError,
@@ -27,6 +27,7 @@ from minirospy.errors import (
     ThreadLimitError,
     WireError,
 )
+from minirospy.base.steps import Steps
 from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
@@ -35,7 +36,6 @@ from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.readers import ReaderSet, read_frames, watch_frames, watch_frames_in_turns
 from minirospy.runtime.transport.workers import Workers
-from minirospy.steps import Steps
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import (

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from minirospy.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
 from minirospy.runtime.rpc.client import parse_http_uri
 from minirospy.runtime.transport import local, tcp
 from minirospy.runtime.transport.deadlines import Deadlines

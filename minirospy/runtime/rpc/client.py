@@ -7,8 +7,8 @@ import socket
 from collections import deque
 from typing import Any
 
-from minirospy.environment import split_uri
-from minirospy.errors import RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import RpcLate, RpcProtocolError, RpcUnreachable
 from minirospy.runtime.transport import local, sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request

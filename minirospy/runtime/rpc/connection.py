@@ -14,9 +14,9 @@ from collections.abc import Awaitable, Generator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.base.errors import RpcFault, RpcProtocolError
+from minirospy.base.steps import ALONE, SHORT_ITEMS, Steps, is_small
 from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
-from minirospy.steps import ALONE, SHORT_ITEMS, Steps, is_small
 from minirospy.wire.http import (
     MAX_BODY,
     HttpMessage,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import socket
 from typing import Any, NamedTuple
 
-from minirospy.environment import split_uri
-from minirospy.errors import SUSPENDED, MasterUnreachableError, RpcLate, RpcRefused, RpcUnreachable
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import SUSPENDED, MasterUnreachableError, RpcLate, RpcRefused, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.transport.limits import is_file_limit
 

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from minirospy.steps import ALONE, PAUSE, Steps
+from minirospy.base.steps import ALONE, PAUSE, Steps
 
 __all__ = ["Turns"]
 

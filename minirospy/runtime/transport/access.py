@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
     # Without networks, as in nearly every node, it is not imported.

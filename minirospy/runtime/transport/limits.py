@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy.errors import NoThreadsAtEndError, ThreadLimitError
+from minirospy.base.errors import NoThreadsAtEndError, ThreadLimitError
 
 __all__ = ["explain", "is_file_limit", "naming_thread_limit"]
 

@@ -6,7 +6,7 @@ import logging
 import time
 from typing import TYPE_CHECKING
 
-from minirospy.escape import escaped
+from minirospy.base.escape import escaped
 
 if TYPE_CHECKING:
     import asyncio

@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
+from minirospy.base.steps import Steps
 from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
-from minirospy.steps import Steps
 from minirospy.wire.framing import (
     CHUNK,
     LENGTH_BYTES,

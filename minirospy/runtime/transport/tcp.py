@@ -14,7 +14,7 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.runtime.transport import sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger

@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from minirospy.errors import ThreadLimitError
+from minirospy.base.errors import ThreadLimitError
 from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["InOrder", "Workers"]

@@ -17,11 +17,11 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from minirospy.escape import has_controls
+from minirospy.base.escape import has_controls
+from minirospy.base.steps import finish
 from minirospy.runtime.master import notifier
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.replay import Replay, changes_to
-from minirospy.steps import finish
 from minirospy.wire.xmlrpc import Serialized, serialize_response
 from tests.runtime.master.master_calls import CALLS, SCENE
 

@@ -16,8 +16,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from minirospy.environment import Environment
-from minirospy.errors import RpcFault, UsageError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import RpcFault, UsageError
+from minirospy.base.steps import finish
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.replay import Replay, changes_to
 from minirospy.runtime.node.node import Node
@@ -25,7 +26,6 @@ from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as rpc_server
 from minirospy.runtime.transport.access import Access, listening_lines
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.steps import finish
 from minirospy.wire.xmlrpc import parse_response, serialize_response
 
 DOCS = Path(__file__).parents[3] / "docs" / "master.md"

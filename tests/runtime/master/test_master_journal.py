@@ -22,7 +22,7 @@ from xmlrpc.client import Fault, ServerProxy
 
 import pytest
 
-from minirospy.errors import RpcFault, RpcUnreachable
+from minirospy.base.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.master import journal as journal_module
 from minirospy.runtime.master import master as master_module
 from minirospy.runtime.master.journal import Journal

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from minirospy.errors import RpcError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcUnreachable
 from minirospy.graph.parameters import ParameterUpdate
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate
 from minirospy.runtime.master import notifier as notifier_module

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import RpcFault, RpcUnreachable
+from minirospy.base.environment import Environment
+from minirospy.base.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.node import registration
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication

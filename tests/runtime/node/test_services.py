@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import CallFailed, HandshakeRefused, ServiceException, WireError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import CallFailed, HandshakeRefused, ServiceException, WireError
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient, parse_service_uri
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import (
+from minirospy.base.environment import Environment
+from minirospy.base.errors import (
     HandshakeRefused,
     MasterUnreachableError,
     RpcUnreachable,

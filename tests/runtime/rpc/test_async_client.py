@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.async_client import AsyncRpcClient

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from minirospy.base.steps import ALONE, PAUSE, Need, Steps, finish, is_small
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.steps import ALONE, PAUSE, Need, Steps, finish, is_small
 from tests.waiting import until
 
 

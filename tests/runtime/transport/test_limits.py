@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import CallFailed, MasterUnreachableError, ROSException, ThreadLimitError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import CallFailed, MasterUnreachableError, ROSException, ThreadLimitError
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.node.topics import Publication

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable

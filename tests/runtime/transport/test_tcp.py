@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.errors import WireError
+from minirospy.base.errors import WireError
 from minirospy.runtime.transport import sockets, tcp
 from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.header import serialize_header

@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.environment import Environment
-from minirospy.errors import RpcUnreachable, UsageError, WireError
+from minirospy.base.environment import Environment
+from minirospy.base.errors import RpcUnreachable, UsageError, WireError
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer

@@ -99,8 +99,8 @@ class ROSHandler(XmlRpcHandler):
         if session.node is None:
             return -1, "the node has not been initialized", known.get("value", 0)
 
+        from minirospy.base.steps import Steps, finish
         from minirospy.runtime.node.slave import SlaveApi
-        from minirospy.steps import Steps, finish
 
         answer = SlaveApi(session.node).dispatch(method, args)
         code, text, value = answer if isinstance(answer, list) else finish(cast("Steps[list[Any]]", answer))

@@ -1,6 +1,6 @@
 """rospy.impl.rosout: the handler that publishes log records, and the levels' numbers."""
 
-from minirospy.log_levels import PYTHON_LEVELS
+from minirospy.base.log_levels import PYTHON_LEVELS
 
 _rospy_to_logging_levels = PYTHON_LEVELS
 _logging_to_rospy_levels = {python: ros for ros, python in PYTHON_LEVELS.items()}

@@ -1,7 +1,7 @@
 """rospy.impl.simtime."""
 
+from minirospy.base.errors import ROSInitException
 from minirospy.client.startup import start_clock
-from minirospy.errors import ROSInitException
 
 __all__ = ["init_simtime"]
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from xml.dom import minidom
 from xml.etree import ElementTree as ET
 
-from minirospy.xml_text import XmlError, check_xml
+from minirospy.base.xml_text import XmlError, check_xml
 
 __all__ = [
     "Attribute", "Codec", "Element", "Many", "NamedAttribute", "Number", "Object", "ObjectOf", "ParseError", "Path",

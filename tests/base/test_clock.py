@@ -11,9 +11,15 @@ from typing import Any
 
 import pytest
 
-from minirospy import clock as clock_module
-from minirospy.clock import SignalSafeEvent, SimulatedClock, WallClock, time_of_clock_message, wait_for_event
-from minirospy.errors import ROSTimeMovedBackwardsException
+from minirospy.base import clock as clock_module
+from minirospy.base.clock import (
+    SignalSafeEvent,
+    SimulatedClock,
+    WallClock,
+    time_of_clock_message,
+    wait_for_event,
+)
+from minirospy.base.errors import ROSTimeMovedBackwardsException
 
 SECOND = 10**9
 

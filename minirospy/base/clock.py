@@ -13,7 +13,7 @@ import threading
 import time
 from typing import Protocol
 
-from minirospy.errors import ROSTimeMovedBackwardsException
+from minirospy.base.errors import ROSTimeMovedBackwardsException
 
 __all__ = [
     "Clock",

@@ -16,7 +16,7 @@ from types import ModuleType
 
 __all__ = ["is_of_ros2", "prefer_ros1"]
 
-_OVERLAY = os.path.join(os.path.dirname(os.path.abspath(__file__)), "overlay")
+_OVERLAY = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "overlay")
 _SUITABLE = frozenset(
     {
         "PyKDL",

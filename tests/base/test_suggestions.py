@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy.suggestions import did_you_mean, nearest
+from minirospy.base.suggestions import did_you_mean, nearest
 
 NODES = ("/talker", "/listener", "/rosout", "/turtle1/teleop", "/robot/arm_driver")
 TOPICS = (

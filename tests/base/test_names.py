@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from minirospy import names
+from minirospy.base import names
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from minirospy.errors import MinirospyError
+from minirospy.base.errors import MinirospyError
 
 __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
 

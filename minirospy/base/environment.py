@@ -12,8 +12,8 @@ import socket
 from collections.abc import Mapping, MutableMapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import UsageError
-from minirospy.escape import escaped, has_controls
+from minirospy.base.errors import UsageError
+from minirospy.base.escape import escaped, has_controls
 
 if TYPE_CHECKING:
     from pathlib import Path

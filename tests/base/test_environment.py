@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import (
+from minirospy.base.environment import (
     LOOPBACK,
     Environment,
     export_local,
@@ -17,7 +17,7 @@ from minirospy.environment import (
     run_folder,
     split_uri,
 )
-from minirospy.errors import UsageError
+from minirospy.base.errors import UsageError
 
 
 def test_defaults_are_those_of_ros() -> None:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy.base.times import Duration, Time, TVal
 from minirospy.client import time as client_time
-from minirospy.times import Duration, Time, TVal
 
 BILLION = 10**9
 KINDS = pytest.mark.parametrize("kind", [Time, Duration, client_time.Time, client_time.Duration])

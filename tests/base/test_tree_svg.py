@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.tree_svg import Edge, tree_svg
+from minirospy.base.tree_svg import Edge, tree_svg
 
 NAMES = st.sampled_from(["a", "b", "c", "d", "<script>", "ü&"])
 

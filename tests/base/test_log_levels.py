@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from minirospy.log_levels import LEVEL_NAMES, PYTHON_LEVELS, logger_levels, ros_level, set_logger_level
+from minirospy.base.log_levels import LEVEL_NAMES, PYTHON_LEVELS, logger_levels, ros_level, set_logger_level
 
 
 @pytest.mark.parametrize(

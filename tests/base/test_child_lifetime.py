@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from minirospy.child_lifetime import ChildLifetime, ProcessJob, guard_children, start_outside_of_job
+from minirospy.base.child_lifetime import ChildLifetime, ProcessJob, guard_children, start_outside_of_job
 
 KILL_ON_JOB_CLOSE, BREAKAWAY_OK = 0x2000, 0x800
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy import private_files
+from minirospy.base import private_files
 from minirospy.gpio.server import _LogOnDemand
 
 

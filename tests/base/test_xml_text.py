@@ -10,15 +10,15 @@ from xml.etree import ElementTree
 
 import pytest
 
+from minirospy.base.errors import LaunchError, ManifestError, UrdfError
+from minirospy.base.xml_text import XmlError, XmlSyntaxError, check_xml, parse_xml
 from minirospy.cli.catkin.test_results import read_counts
 from minirospy.compat.roslib import manifest as old_manifest
 from minirospy.compat.urdf_parser_py.urdf import URDF
-from minirospy.errors import LaunchError, ManifestError, UrdfError
 from minirospy.launch.document import parse_document
 from minirospy.testing import junit
 from minirospy.urdf.read import parse_robot
 from minirospy.workspace.manifest import parse_manifest
-from minirospy.xml_text import XmlError, XmlSyntaxError, check_xml, parse_xml
 
 LAUGHS = (
     '<!DOCTYPE {0} [<!ENTITY a0 "aaaaaaaaaa">'

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy import private_files
+from minirospy.base import private_files
 from minirospy.gpio.place import Place
 from minirospy.launch.output import Output
 from minirospy.launch.process import start_process

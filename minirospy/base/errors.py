@@ -61,7 +61,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from minirospy.suggestions import nearest
+from minirospy.base.suggestions import nearest
 
 __all__ = [
     "SUSPENDED",

@@ -1,0 +1,1 @@
+"""What all rooms share: errors, names, times, clocks, the environment."""
