@@ -16,7 +16,7 @@ from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.topics import Publisher
 from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import ServiceInfo, TypeTexts, described

@@ -197,7 +197,8 @@ def _bridge(
     _check_range("connections", connections, 1, 100_000)
     require_libraries()
 
-    from minirospy.bridge.access import Access, NameFilter, is_loopback
+    from minirospy.base.name_filter import NameFilter
+    from minirospy.bridge.access import Access, is_loopback
     from minirospy.bridge.addresses import host_names
     from minirospy.bridge.bridge import Bridge, BridgeOptions
     from minirospy.bridge.foxglove.door import CAPABILITIES

@@ -207,7 +207,7 @@ def _gateway(
         raise Misuse(f"--stop-after {stop_after:g} is not between 0 and 60")
     network = _network(connect, listen, config, scout)
 
-    from minirospy.bridge.access import NameFilter
+    from minirospy.base.name_filter import NameFilter
     from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
     from minirospy.bridge.fleet.ros1_keys import parse_namespace
     from minirospy.bridge.fleet.rules import GatewayRules, parse_lanes, parse_rates

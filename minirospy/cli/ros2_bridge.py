@@ -111,7 +111,7 @@ def _ros2_bridge(
     import os
 
     from minirospy.base.errors import BridgeError
-    from minirospy.bridge.access import NameFilter
+    from minirospy.base.name_filter import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
     from minirospy.bridge.ros2.links import BRIDGE_PREFIX, parse_domain
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules

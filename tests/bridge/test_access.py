@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from minirospy.base.errors import BridgeError
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.access import (
     Access,
     Credentials,
     Grant,
-    NameFilter,
     Refusal,
     header_items,
     is_loopback,

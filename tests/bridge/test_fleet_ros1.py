@@ -11,7 +11,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, SetBool, SetBoolResponse
 
 from minirospy.base.errors import BridgeError, ServiceException
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.fleet import ros1_keys
 from minirospy.bridge.fleet.ros1_keys import LOST_SECONDS
 from minirospy.bridge.fleet.ros1_side import Ros1Side

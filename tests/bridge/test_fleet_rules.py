@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from minirospy.base.errors import BridgeError, DefinitionError, DeserializationError
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.fleet import keys
 from minirospy.bridge.fleet.clocks import ClockOffset, Delay, Ping, offset_of
 from minirospy.bridge.fleet.contents import MOST_NAMES, FleetContents

@@ -17,8 +17,9 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.base.errors import BridgeError
+from minirospy.base.name_filter import NameFilter
 from minirospy.base.times import Time
-from minirospy.bridge.access import Access, NameFilter
+from minirospy.bridge.access import Access
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.types import type_of_text

@@ -19,7 +19,7 @@ import pytest
 from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.base.errors import BridgeError, DeserializationError
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.link_table import Pair

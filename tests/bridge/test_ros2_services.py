@@ -13,7 +13,7 @@ from minirospy import Node
 from minirospy.aio import raw
 from minirospy.aio.raw import RawService, call_raw, service_header
 from minirospy.base.errors import BridgeError, ServiceException
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
 from minirospy.bridge.ros2.rules import BUILT_IN

@@ -18,8 +18,8 @@ from tf2_web_republisher.msg import TFSubscriptionAction, TFSubscriptionGoal
 from tf2_web_republisher.srv import RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionClient, GoalError
+from minirospy.base.name_filter import NameFilter
 from minirospy.base.times import Duration
-from minirospy.bridge.access import NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import describe
 from minirospy.bridge.tf_republisher.pairs import FramePair

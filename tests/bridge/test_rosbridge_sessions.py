@@ -27,7 +27,8 @@ from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.aio.services import Service
 from minirospy.base.errors import ServiceException
-from minirospy.bridge.access import Access, NameFilter
+from minirospy.base.name_filter import NameFilter
+from minirospy.bridge.access import Access
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosbridge import png, protocol
 from minirospy.bridge.rosbridge.door import RosbridgeOptions

@@ -19,7 +19,8 @@ from std_msgs.msg import String
 
 from minirospy.aio.handle import serialized
 from minirospy.base.errors import BridgeError
-from minirospy.bridge.access import Access, NameFilter
+from minirospy.base.name_filter import NameFilter
+from minirospy.bridge.access import Access
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.video.options import Picture, VideoRequest, request_of
 from minirospy.bridge.video.pictures import encoded

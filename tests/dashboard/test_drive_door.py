@@ -23,7 +23,8 @@ from std_msgs.msg import String
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from minirospy.bridge.access import Access, NameFilter
+from minirospy.base.name_filter import NameFilter
+from minirospy.bridge.access import Access
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.stop_guard import StopGuard
 from minirospy.dashboard.drive_door import SUBPROTOCOL, Command, DriveSession, Joystick, Velocity, parse

@@ -16,7 +16,8 @@ from sensor_msgs.msg import JointState
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from minirospy.bridge.access import Access, NameFilter
+from minirospy.base.name_filter import NameFilter
+from minirospy.bridge.access import Access
 from minirospy.bridge.graph import Filters
 from minirospy.dashboard.joint_door import SUBPROTOCOL, JointDoor
 from minirospy.introspect.snapshot import fetch

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, RawSubscription
 from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError, ServiceException
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.fleet.definitions import Definitions
 from minirospy.bridge.fleet.inbound import call_service
 from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken

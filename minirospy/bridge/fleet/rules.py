@@ -8,7 +8,7 @@ from enum import IntEnum
 from fnmatch import fnmatchcase
 
 from minirospy.base.errors import BridgeError
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.fleet.keys import is_global_name
 from minirospy.introspect.snapshot import Snapshot
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
 from minirospy.base.errors import BridgeError
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.bridge import FOXGLOVE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.foxglove.assets import ALLOWED
 from minirospy.bridge.foxglove.door import CAPABILITIES

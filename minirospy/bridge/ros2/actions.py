@@ -23,7 +23,7 @@ from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.access import NameFilter
+    from minirospy.base.name_filter import NameFilter
     from minirospy.bridge.ros2.interface import Ros2Side
     from minirospy.idl.load import Catalogue
     from minirospy.introspect.snapshot import Snapshot

@@ -18,7 +18,7 @@ from minirospy.base.errors import (
     ROSException,
     RpcError,
 )
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.ros2.actions import ActionBridge
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder

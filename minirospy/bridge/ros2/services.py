@@ -37,7 +37,7 @@ from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.access import NameFilter
+    from minirospy.base.name_filter import NameFilter
     from minirospy.bridge.ros2.interface import Ros2Client, Ros2Handle, Ros2Side
 
 __all__ = ["ServiceBridge", "ServiceCodec"]

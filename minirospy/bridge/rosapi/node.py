@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from minirospy.aio.node import Node
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.node_parameters import globs, private_parameters
 from minirospy.bridge.rosapi.services import Rosapi

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
 from minirospy.base.errors import BridgeError
-from minirospy.bridge.access import NameFilter
+from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.bridge import ROSBRIDGE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.node_parameters import access_of, address_of, globs, number, private_parameters, value
