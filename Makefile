@@ -12,7 +12,7 @@ STAMP := $(VENV)/.installed
 unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
 
 # What needs no process of its own, and the first messages and calls between nodes: under a minute on two cores.
-CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
+CHECKED := tests/core/graph tests/core/wire tests/core/idl tests/introspect tests/overlay \
   tests/runtime/master/test_master.py tests/runtime/node/test_topics.py tests/runtime/node/test_services.py \
   tests/test_architecture.py tests/test_layers.py tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py \
   tests/base/test_environment.py tests/base/test_escape.py tests/base/test_private_files.py tests/test_scanner.py
@@ -32,7 +32,7 @@ help:
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and the bridge, random files to the readers, ten minutes each"
-	@echo "make mutants  put small faults into graph/, wire/, the journal and access; list those that no test notices"
+	@echo "make mutants  put small faults into core/graph/, core/wire/, the journal and access; list those that no test notices"
 	@echo "make site     write the documentation as a site to build/site"
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"
@@ -54,7 +54,7 @@ interop: $(STAMP)
 	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck or grammar" tests/workspace
 
 # The environment is kept in build/windows; tests that need no Unix run in there, too.
-WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/base/test_child_lifetime.py tests/base/test_signal_dispatch.py \
+WINDOWS_TESTS := tests/core/wire tests/core/graph tests/core/idl/test_parse.py tests/base/test_child_lifetime.py tests/base/test_signal_dispatch.py \
   tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py tests/base/test_environment.py tests/base/test_open_files.py tests/gpio \
   tests/runtime/node/test_topics.py
 windows: $(STAMP)
@@ -108,7 +108,7 @@ clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Made again when the project file or a definition changes; an interrupted install leaves no stamp.
-$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/idl/*.py msgs/*/*/* msgs/*/package.xml)
+$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/core/idl/*.py msgs/*/*/* msgs/*/package.xml)
 	@$(PYTHON) -c "import sys; v = sys.version_info; v >= (3, 10) or sys.exit('minirospy needs Python 3.10 or newer, this is %d.%d: make PYTHON=python3.x' % v[:2])"
 	@echo "Making the environment $(VENV) ..."
 	@$(PYTHON) -m venv $(VENV)

@@ -151,8 +151,8 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         root = Path(self.root)
         sys.path.insert(0, self.root)
         try:
-            from minirospy.idl.load import Catalogue, write_package
-            from minirospy.idl.own_packages import COMPILED_AHEAD
+            from minirospy.core.idl.load import Catalogue, write_package
+            from minirospy.core.idl.own_packages import COMPILED_AHEAD
         finally:
             sys.path.remove(self.root)
         overlay = root / "minirospy" / "overlay"

@@ -14,9 +14,9 @@ from xmlrpc.client import ServerProxy, dumps
 
 from rosgraph_msgs.msg import Log
 
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.header import serialize_header
-from minirospy.wire.tcpros import InterfaceType, publisher_header, subscriber_header
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.header import serialize_header
+from minirospy.core.wire.tcpros import InterfaceType, publisher_header, subscriber_header
 
 MIB = 1024 * 1024
 HUGE = 60 * MIB

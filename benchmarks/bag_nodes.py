@@ -28,16 +28,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from minirospy.bag.reader import open_bag
-from minirospy.bag.writer import BagWriter
 from minirospy.base.environment import Environment
+from minirospy.core.bag.reader import open_bag
+from minirospy.core.bag.writer import BagWriter
+from minirospy.core.wire.framing import LargeFrame
+from minirospy.core.wire.header import serialize_header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import LargeFrame
-from minirospy.wire.header import serialize_header
-from minirospy.wire.tcpros import InterfaceType
 
 CPP = Path("/usr/lib/rosbag")
 IMAGE = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

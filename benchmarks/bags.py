@@ -119,7 +119,7 @@ CASES = {
 
 def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
     """Write a bag of strings on ten topics, each of ``size`` bytes."""
-    from minirospy.bag.writer import BagWriter
+    from minirospy.core.bag.writer import BagWriter
 
     definition = {
         "type": "std_msgs/String",

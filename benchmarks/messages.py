@@ -85,7 +85,7 @@ def compiler():
     """Milliseconds to compile all of msgs/ in memory, and to import a package of messages in a fresh process."""
     from pathlib import Path
 
-    from minirospy.idl.load import Catalogue, compile_package
+    from minirospy.core.idl.load import Catalogue, compile_package
 
     start = time.perf_counter()
     catalogue = Catalogue.below(Path(__file__).parents[1] / "msgs")

@@ -163,8 +163,8 @@ class Log:
 def send1(topic: str, type_: str, rate: float, seconds: float) -> None:
     from minirospy import Node
     from minirospy.aio.raw import raw_class
-    from minirospy.idl.load import message_class
-    from minirospy.wire.tcpros import InterfaceType
+    from minirospy.core.idl.load import message_class
+    from minirospy.core.wire.tcpros import InterfaceType
 
     async def send() -> None:
         clock = Clock(rate, seconds)

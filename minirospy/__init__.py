@@ -5,15 +5,15 @@ first used, so that a command which needs none of them starts quickly.
 
 The way of a message, file by file::
 
-    Bool.msg -> idl/parse -> spec -> idl/emit -> class
+    Bool.msg -> core/idl/parse -> spec -> core/idl/emit -> class
     publish  -> client/publisher (serialize, caller's thread) -> runtime/node/topics.Publication
              -> runtime/transport/links.OutLink ==> TCP ==>
-    runtime/transport/readers.read_frames (worker) -> wire/framing -> runtime/node/topics.Subscription
+    runtime/transport/readers.read_frames (worker) -> core/wire/framing -> runtime/node/topics.Subscription
              -> client/subscriber (deserialize, user's function)
 
-and how the two ends find each other: client/publisher -> runtime/node/node -> runtime/master/master -> graph/registry ->
-publisherUpdate -> runtime/node/slave -> runtime/node/topics -> graph/subscription (whom to connect) -> requestTopic
--> wire/tcpros (headers).
+and how the two ends find each other: client/publisher -> runtime/node/node -> runtime/master/master -> core/graph/registry ->
+publisherUpdate -> runtime/node/slave -> runtime/node/topics -> core/graph/subscription (whom to connect) -> requestTopic
+-> core/wire/tcpros (headers).
 """
 
 from __future__ import annotations

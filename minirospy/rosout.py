@@ -20,16 +20,16 @@ from minirospy.base.escape import escaped
 from minirospy.base.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
 from minirospy.base.ros1_imports import prefer_ros1
 from minirospy.base.steps import Steps
-from minirospy.idl.protocols import Message, ServiceClass
+from minirospy.core.idl.protocols import Message, ServiceClass
+from minirospy.core.wire.framing import Frame, serialize_frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
 from minirospy.runtime.node.topics import InTurns, Publication
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame, serialize_frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log

@@ -63,8 +63,8 @@ class Target:
         self._loop.close()
 
     async def _take(self, data: bytes) -> None:
+        from minirospy.core.wire.xmlrpc import parse_response, serialize_response
         from minirospy.runtime.rpc import connection as connections
-        from minirospy.wire.xmlrpc import parse_response, serialize_response
 
         if self._count % INPUTS_PER_MASTER == 0:
             await self._renew()
@@ -106,7 +106,7 @@ class Target:
 
 def seeds() -> list[bytes]:
     """Good and bad requests to start with."""
-    from minirospy.wire.xmlrpc import serialize_call
+    from minirospy.core.wire.xmlrpc import serialize_call
 
     uri = "http://127.0.0.1:1/"
     bodies = [

@@ -49,10 +49,10 @@ class Reader(NamedTuple):
 
 def bag_readers() -> dict[str, Reader]:
     """Return the readers of files of messages."""
-    from minirospy.bag.mcap_writer import McapWriter
     from minirospy.base.errors import BagError
-    from tests.bag.bags import Given, make_bag
-    from tests.bag.test_reader12 import MESSAGES, make_bag12
+    from minirospy.core.bag.mcap_writer import McapWriter
+    from tests.core.bag.bags import Given, make_bag
+    from tests.core.bag.test_reader12 import MESSAGES, make_bag12
 
     source = random.Random(1)
     chunks = [
@@ -84,8 +84,8 @@ def bag_readers() -> dict[str, Reader]:
 
 
 def _read_all(stream: io.BytesIO) -> None:
-    from minirospy.bag import info
-    from minirospy.bag.mcap_reader import open_bag_or_mcap
+    from minirospy.core.bag import info
+    from minirospy.core.bag.mcap_reader import open_bag_or_mcap
 
     reader = open_bag_or_mcap(stream)
     try:
@@ -109,7 +109,7 @@ def _bag_error() -> type[Exception]:
 
 
 def _read_bag(data: bytes) -> None:
-    from minirospy.bag.repair import Repair
+    from minirospy.core.bag.repair import Repair
 
     with contextlib.suppress(_bag_error()):
         _read_all(io.BytesIO(data))
@@ -121,7 +121,7 @@ def _read_bag(data: bytes) -> None:
 
 
 def _read_bag12(data: bytes) -> None:
-    from minirospy.bag.reader12 import unindexed_bag12
+    from minirospy.core.bag.reader12 import unindexed_bag12
 
     with contextlib.suppress(_bag_error()):
         _read_all(io.BytesIO(data))
@@ -132,7 +132,7 @@ def _read_bag12(data: bytes) -> None:
 
 
 def _read_mcap(data: bytes) -> None:
-    from minirospy.bag.mcap_repair import McapRepair
+    from minirospy.core.bag.mcap_repair import McapRepair
 
     with contextlib.suppress(_bag_error()):
         _read_all(io.BytesIO(data))
@@ -189,10 +189,10 @@ def xml_readers() -> dict[str, Reader]:
     from minirospy.compat.roslib.manifest import parse as parse_old
     from minirospy.compat.urdf_parser_py.urdf import URDF
     from minirospy.compat.urdf_parser_py.xml_reflection import core
+    from minirospy.core.urdf.describe import dot_graph, tree_lines
+    from minirospy.core.urdf.read import parse_robot
     from minirospy.launch.load import load_text
     from minirospy.testing import junit
-    from minirospy.urdf.describe import dot_graph, tree_lines
-    from minirospy.urdf.read import parse_robot
     from minirospy.workspace.manifest import parse_manifest
     from minirospy.workspace.packages import Packages
 

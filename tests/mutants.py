@@ -51,16 +51,16 @@ class Room:
 
 ROOMS = {
     "graph": Room(
-        ["graph/*.py"],
+        ["core/graph/*.py"],
         [
-            "tests/graph",
+            "tests/core/graph",
             "tests/runtime/master/test_master.py",
             "tests/runtime/master/test_master_journal.py",
             "tests/actionlib/test_statuses.py",
         ],
         ["two_hundred_nodes", "double_start"],
     ),
-    "wire": Room(["wire/*.py"], ["tests/wire"]),
+    "wire": Room(["core/wire/*.py"], ["tests/core/wire"]),
     "journal": Room(
         ["runtime/master/journal.py", "base/private_files.py"],
         [
@@ -81,7 +81,7 @@ ROOMS = {
             "bridge/web/queue.py",
             "bridge/web/rate.py",
             "dashboard/codes.py",
-            "images/sizes.py",
+            "core/images/sizes.py",
         ],
         [
             "tests/bridge/test_access.py",
@@ -95,7 +95,7 @@ ROOMS = {
             "tests/bridge/test_served_files.py",
             "tests/bridge/test_tokens.py",
             "tests/dashboard/test_codes.py",
-            "tests/images/test_sizes.py",
+            "tests/core/images/test_sizes.py",
         ],
     ),
 }

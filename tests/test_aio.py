@@ -34,8 +34,8 @@ from minirospy.base.errors import (
     ServiceException,
 )
 from minirospy.base.times import Duration, Time
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
-from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import until
 
 SECONDS = 100.0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag.writer import BagWriter
+from minirospy.core.bag.writer import BagWriter
 
 PAGE = Path(__file__).parents[1] / "docs" / "bags.md"
 BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

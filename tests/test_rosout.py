@@ -15,10 +15,10 @@ from rosgraph_msgs.msg import Log
 from minirospy import rosout
 from minirospy.base.environment import Environment
 from minirospy.base.steps import Steps, finish
+from minirospy.core.wire.framing import serialize_frame
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport.readers import watch_frames_in_turns
-from minirospy.wire.framing import serialize_frame
 
 
 def body_of(text: str, name: str = "/talker") -> bytes:

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 
 import pytest
 
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 PROGRAM = """
 import rospy

@@ -3,7 +3,7 @@
 The way of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
 `internal_goal_callback` -> simple_server, the user's function -> handle `set_succeeded` -> topic result ==>
 machine `update_result` -> simple_client `_handle_transition`, the user's function. Which state follows which
-is in `minirospy.graph.goals`. What `import actionlib` re-exports. Source: http://wiki.ros.org/actionlib.
+is in `minirospy.core.graph.goals`. What `import actionlib` re-exports. Source: http://wiki.ros.org/actionlib.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from minirospy.actionlib.waiting import Waiting
 from minirospy.base import times
 from minirospy.client.connection import Connection
 from minirospy.client.session import current_session
-from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message
+from minirospy.core.idl.protocols import Action, ActionFeedback, ActionResult, Message
 
 __all__ = ["ActionClient"]
 

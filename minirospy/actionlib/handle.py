@@ -1,6 +1,6 @@
 """The server's state of a goal: a StatusTracker each, and the ServerGoalHandle by which user code moves it on.
 
-Which state follows which is a table (`minirospy.graph.goals`).
+Which state follows which is a table (`minirospy.core.graph.goals`).
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from minirospy import client as rospy
 from minirospy.actionlib.goal_id import GoalIDGenerator
 from minirospy.actionlib.statuses import status_bytes
 from minirospy.base import times
-from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent
+from minirospy.core.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent
 
 if TYPE_CHECKING:
     from minirospy.actionlib.server import ActionServer
-    from minirospy.idl.protocols import ActionGoal, Message
+    from minirospy.core.idl.protocols import ActionGoal, Message
 
 __all__ = ["HandleTrackerDeleter", "ServerGoalHandle", "StatusTracker"]
 

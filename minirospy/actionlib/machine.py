@@ -1,6 +1,6 @@
 """The client's state of its goals: one CommStateMachine a goal, found by the GoalManager, read through a ClientGoalHandle.
 
-The machine's rules are tables (`minirospy.graph.goals`). Source: http://wiki.ros.org/actionlib/DetailedDescription.
+The machine's rules are tables (`minirospy.core.graph.goals`). Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from minirospy import client as rospy
 from minirospy.actionlib.spec import action_types
 from minirospy.actionlib.states import CommState, TerminalState, get_name_of_constant
 from minirospy.actionlib.statuses import find_status
-from minirospy.graph.goals import TERMINAL, client_steps
-from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
-from minirospy.idl.protocols import GoalStatus as AnyGoalStatus
+from minirospy.core.graph.goals import TERMINAL, client_steps
+from minirospy.core.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.idl.protocols import GoalStatus as AnyGoalStatus
 
 __all__ = ["ClientGoalHandle", "CommStateMachine", "GoalManager"]
 

@@ -25,8 +25,8 @@ from minirospy.actionlib.spec import (
 from minirospy.actionlib.statuses import StatusList
 from minirospy.base import times
 from minirospy.base.clock import SignalSafeEvent
-from minirospy.graph.goals import is_meant
-from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.graph.goals import is_meant
+from minirospy.core.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["ActionServer", "nop_cb"]

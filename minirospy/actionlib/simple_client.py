@@ -17,8 +17,8 @@ from minirospy.actionlib.machine import ClientGoalHandle
 from minirospy.actionlib.states import CommState, SimpleGoalState
 from minirospy.actionlib.waiting import Waiting
 from minirospy.base import times
-from minirospy.graph.goals import SIMPLE_STEPS, SimpleStep, visible_state
-from minirospy.idl.protocols import Action, Message
+from minirospy.core.graph.goals import SIMPLE_STEPS, SimpleStep, visible_state
+from minirospy.core.idl.protocols import Action, Message
 
 __all__ = ["SimpleActionClient"]
 

@@ -15,7 +15,7 @@ from actionlib_msgs.msg import GoalStatus
 from minirospy import client as rospy
 from minirospy.actionlib.handle import ServerGoalHandle
 from minirospy.actionlib.server import ActionServer
-from minirospy.idl.protocols import Action, Message
+from minirospy.core.idl.protocols import Action, Message
 from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["SimpleActionServer"]

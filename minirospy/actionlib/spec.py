@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from minirospy.base.errors import MinirospyError
-from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 
 __all__ = [
     "CANCEL_SECONDS",

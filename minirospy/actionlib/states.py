@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from actionlib_msgs.msg import GoalStatus
 
-from minirospy.graph.goals import ClientState, GoalState, SimpleState
+from minirospy.core.graph.goals import ClientState, GoalState, SimpleState
 
 __all__ = [
     "INVALID_TRANSITION",
@@ -19,7 +19,7 @@ __all__ = [
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
 """The marks in the transition table of ROS's client for a status that changes nothing, or is impossible.
 
-Ours is in :mod:`minirospy.graph.goals`; `from actionlib import *` brings them, so programs may use these names.
+Ours is in :mod:`minirospy.core.graph.goals`; `from actionlib import *` brings them, so programs may use these names.
 """
 g_goal_id = 1
 """A number of ROS's module that nothing counts; `from actionlib import *` brings it."""

@@ -11,7 +11,7 @@ from io import BytesIO
 
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 
-from minirospy.idl.protocols import Buffer, Writer
+from minirospy.core.idl.protocols import Buffer, Writer
 
 __all__ = ["StatusList", "find_status", "status_bytes"]
 

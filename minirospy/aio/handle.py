@@ -14,9 +14,9 @@ from minirospy.base.errors import (
     RpcRefused,
     SerializationError,
 )
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Pieces
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Pieces
 
 __all__ = ["Handle", "pieces_of", "registered", "serialized"]
 

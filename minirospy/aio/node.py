@@ -33,14 +33,14 @@ from minirospy.base.errors import (
 from minirospy.base.ros1_imports import prefer_ros1
 from minirospy.base.times import Duration, Time
 from minirospy.base.yaml_text import one_line, safe_load
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node as RuntimeNode
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Node"]
 

@@ -17,12 +17,12 @@ from minirospy.base.errors import (
     ServiceException,
     WireError,
 )
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.services import AsyncHandler, AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.transport.sockets import HANDSHAKE_SECONDS
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -20,12 +20,12 @@ from minirospy.base.errors import (
     ServiceException,
     WireError,
 )
-from minirospy.idl.message import args_kwds_to_message, number_header
-from minirospy.idl.protocols import Message
-from minirospy.idl.service import to_response
+from minirospy.core.idl.message import args_kwds_to_message, number_header
+from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.service import to_response
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from minirospy.aio.handle import Handle, pieces_of, registered
 from minirospy.base.errors import MasterUnreachableError, ROSException, ROSInterruptException, RpcError
-from minirospy.idl.message import args_kwds_to_message
-from minirospy.idl.protocols import Message, is_stamped
+from minirospy.core.idl.message import args_kwds_to_message
+from minirospy.core.idl.protocols import Message, is_stamped
+from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, serialize_frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import CHUNK, Frame, LargeFrame, serialize_frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

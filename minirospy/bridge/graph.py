@@ -20,11 +20,11 @@ from minirospy.base.name_filter import NameFilter
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import ServiceInfo, TypeTexts, described
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", "TopicListener"]
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import MinirospyError, NotFoundError, RpcError, WireError
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -27,7 +27,7 @@ _AT_ONCE = 32
 
 def installed_type(name: str) -> InterfaceType | None:
     """Return a message type of the installed packages; None where there is none, or it cannot be read."""
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
 
     try:
         found = get_message_class(name)
@@ -38,7 +38,7 @@ def installed_type(name: str) -> InterfaceType | None:
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
     """Return the type that a full text defines; None where it does not parse. No class is made: that takes a second."""
-    from minirospy.idl.load import checked_text
+    from minirospy.core.idl.load import checked_text
 
     try:
         return InterfaceType(name, checked_text(name, text)[1], text)
@@ -134,7 +134,7 @@ class ServiceInfo:
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
     """Return the type that a service's connection header names. Raise NotFoundError where it is not installed here."""
-    from minirospy.idl.load import get_service_class
+    from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")
     try:

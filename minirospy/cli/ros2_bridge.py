@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.interface import Ros2Side
     from minirospy.bridge.ros2.link_table import Pair
     from minirospy.bridge.ros2.rules import Rules
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
 
 __all__ = ["COMMAND", "main"]
 
@@ -116,7 +116,7 @@ def _ros2_bridge(
     from minirospy.bridge.ros2.links import BRIDGE_PREFIX, parse_domain
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
     from minirospy.bridge.serve import run
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
     from minirospy.workspace.packages import Packages
 
     if not call_timeout > 0:

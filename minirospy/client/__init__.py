@@ -73,7 +73,7 @@ from minirospy.client.topics import (
     get_published_topics,
     wait_for_message,
 )
-from minirospy.idl.message import Message
+from minirospy.core.idl.message import Message
 
 __all__ = [
     "DEBUG",

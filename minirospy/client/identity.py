@@ -15,7 +15,7 @@ from minirospy.base import names
 from minirospy.base.environment import Environment
 from minirospy.base.errors import ROSInitException, RpcError, UsageError
 from minirospy.base.yaml_text import safe_load
-from minirospy.wire.xmlrpc import serialize_call
+from minirospy.core.wire.xmlrpc import serialize_call
 
 __all__ = ["Identity", "private_parameters", "warn_of_illegal_name"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
-from minirospy.graph.parameter_cache import NOT_SET
+from minirospy.core.graph.parameter_cache import NOT_SET
 
 if TYPE_CHECKING:
     import datetime

@@ -27,11 +27,11 @@ from minirospy.client.topic import (
     register_with_master,
     unregister_from_master,
 )
-from minirospy.idl.message import args_kwds_to_message
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.message import args_kwds_to_message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import LargeFrame, Pieces
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.transport.workers import InOrder
-from minirospy.wire.framing import LargeFrame, Pieces
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.runtime.transport.links import OutLink

@@ -29,15 +29,15 @@ from minirospy.base.times import Duration
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import unregister_from_master
-from minirospy.idl.message import args_kwds_to_message, number_header
-from minirospy.idl.service import to_response
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.core.idl.message import args_kwds_to_message, number_header
+from minirospy.core.idl.service import to_response
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.runtime.node.service_client import ServiceClient
     from minirospy.runtime.node.services import ServiceServer
 

@@ -17,7 +17,7 @@ from minirospy.base.errors import ROSInitException
 from minirospy.client.identity import Identity
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.signals import SignalWatchdog
-from minirospy.graph.parameter_cache import ParameterCache
+from minirospy.core.graph.parameter_cache import ParameterCache
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:

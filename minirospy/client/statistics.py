@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.client.session import current_session
 from minirospy.client.time import Duration, Time
-from minirospy.idl.protocols import Message, is_stamped
-from minirospy.wire.header import Header
+from minirospy.core.idl.protocols import Message, is_stamped
+from minirospy.core.wire.header import Header
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import TopicStatistics
 
     from minirospy.client.publisher import Publisher
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["Report", "Spread", "StatisticsPublisher", "TopicStatisticsCounter", "WindowLimits"]
 

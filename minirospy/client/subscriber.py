@@ -15,11 +15,11 @@ from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.client.statistics import StatisticsPublisher

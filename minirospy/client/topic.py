@@ -13,9 +13,9 @@ from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.client.connection import Connection
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
-from minirospy.idl import protocols
-from minirospy.idl.message import Message
-from minirospy.wire.tcpros import ANY
+from minirospy.core.idl import protocols
+from minirospy.core.idl.message import Message
+from minirospy.core.wire.tcpros import ANY
 
 __all__ = ["AnyMsg", "SharedTopic", "Topic", "register_with_master", "unregister_from_master"]
 

@@ -10,15 +10,15 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.bag.base import StoredMessage
-from minirospy.bag.records import Connection
-from minirospy.bag.timeline import Timeline
 from minirospy.base.errors import BagError, BagUnindexedError, BridgeError, MinirospyError
+from minirospy.core.bag.base import StoredMessage
+from minirospy.core.bag.records import Connection
+from minirospy.core.bag.timeline import Timeline
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.recording.player import Player, PlayerState
 from minirospy.recording.schedule import PlayOptions
 from minirospy.recording.sources import Bags, open_reader
 from minirospy.recording.stage import CLOCK, Controls
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.bridge.graph import Publication, SharedGraph

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from minirospy.base.errors import BridgeError, ROSException
 from minirospy.bridge.stop_guard import StopGuard
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.graph import why_illegal
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.bridge.graph import Publication, SharedGraph

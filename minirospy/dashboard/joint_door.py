@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.bridge.tasks import Faults, keep_running
+from minirospy.core.urdf.elements import parse_xml
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
 from minirospy.introspect.graph import why_illegal
 from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
 from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints
-from minirospy.urdf.elements import parse_xml
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import JointState

@@ -31,10 +31,10 @@ from minirospy.base.errors import (
     ROSInterruptException,
     TransformException,
 )
+from minirospy.core.tf2.buffer import StampedTransform, TransformBuffer
+from minirospy.core.tf2.insertion import RefusalLog
+from minirospy.core.tf2.listing import frames_as_yaml
 from minirospy.frames.messages import LazyTFMessage, Moment, nanoseconds, transform_stamped
-from minirospy.tf2.buffer import StampedTransform, TransformBuffer
-from minirospy.tf2.insertion import RefusalLog
-from minirospy.tf2.listing import frames_as_yaml
 
 __all__ = ["Broadcaster", "Buffer"]
 

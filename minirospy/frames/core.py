@@ -11,10 +11,10 @@ from geometry_msgs.msg import TransformStamped
 
 from minirospy.base.errors import InvalidArgumentException
 from minirospy.client.time import Time
+from minirospy.core.tf2.buffer import DEFAULT_CACHE_TIME, TransformBuffer
+from minirospy.core.tf2.insertion import Refusal, RefusalLog
+from minirospy.core.tf2.listing import frames_as_dot, frames_as_yaml
 from minirospy.frames.messages import Moment, nanoseconds, transform_stamped
-from minirospy.tf2.buffer import DEFAULT_CACHE_TIME, TransformBuffer
-from minirospy.tf2.insertion import Refusal, RefusalLog
-from minirospy.tf2.listing import frames_as_dot, frames_as_yaml
 
 __all__ = ["BufferCore"]
 

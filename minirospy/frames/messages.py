@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from minirospy.client.time import Time
-from minirospy.tf2.buffer import StampedTransform
+from minirospy.core.tf2.buffer import StampedTransform
 
 __all__ = ["LazyTFMessage", "Moment", "nanoseconds", "transform_stamped"]
 

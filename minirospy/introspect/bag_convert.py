@@ -6,11 +6,11 @@ import contextlib
 import os
 from collections.abc import Callable
 
-from minirospy.bag.compression import check_compression
-from minirospy.bag.mcap_writer import McapWriter, check_mcap_compression
-from minirospy.bag.writer import BagWriter
 from minirospy.base import private_files
 from minirospy.base.errors import BagError, UsageError
+from minirospy.core.bag.compression import check_compression
+from minirospy.core.bag.mcap_writer import McapWriter, check_mcap_compression
+from minirospy.core.bag.writer import BagWriter
 from minirospy.introspect.bags import naming_full_disk, open_reader
 
 __all__ = ["check", "convert"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from minirospy.bag.compression import NONE
+from minirospy.core.bag.compression import NONE
 from minirospy.introspect.bags import class_of_connection, naming_full_disk, new_bag, open_reader
 from minirospy.introspect.migration import MessageMigrator, Migration
 from minirospy.introspect.migration_rules import MessageClass, get_message_key

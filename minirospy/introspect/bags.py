@@ -12,20 +12,20 @@ import os
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
-from minirospy.bag import compression as compressions
-from minirospy.bag.base import BagReader
-from minirospy.bag.mcap_reader import open_bag_or_mcap
-from minirospy.bag.mcap_repair import MAGIC, McapRepair
-from minirospy.bag.reader import ChunkedReader
-from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.bag.records import Connection, read_version
-from minirospy.bag.repair import Repair
-from minirospy.bag.writer import BagWriter, Continued
 from minirospy.base.errors import BagError, BagFormatError, DefinitionError, UsageError, ValueTextError
 from minirospy.base.times import Time
+from minirospy.core.bag import compression as compressions
+from minirospy.core.bag.base import BagReader
+from minirospy.core.bag.mcap_reader import open_bag_or_mcap
+from minirospy.core.bag.mcap_repair import MAGIC, McapRepair
+from minirospy.core.bag.reader import ChunkedReader
+from minirospy.core.bag.reader12 import unindexed_bag12
+from minirospy.core.bag.records import Connection, read_version
+from minirospy.core.bag.repair import Repair
+from minirospy.core.bag.writer import BagWriter, Continued
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "Expression",
@@ -99,7 +99,7 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
     ``warn`` is called with ROS's line where the definition does not fit the md5sum, or is invalid: then the class has no
     fields. Raise DefinitionError if the type's name is not legal.
     """
-    from minirospy.idl.load import class_from_text
+    from minirospy.core.idl.load import class_from_text
 
     try:
         found = class_from_text(type_, definition)

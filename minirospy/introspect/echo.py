@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, cast
 
 from minirospy.base.errors import UsageError
 from minirospy.base.times import Time
-from minirospy.idl.protocols import is_message, is_stamped
+from minirospy.core.idl.protocols import is_message, is_stamped
 from minirospy.introspect.fields import field_type, field_value, parse_path
 from minirospy.introspect.messages import MessageClasses, fill, serialize, words_of
 from minirospy.introspect.plot import plot_header, plot_row
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.streams import Received
     from minirospy.introspect.topics import TopicField
 
@@ -82,7 +82,7 @@ class Echo:
 
     def message(self, received: Received) -> Message:
         """Return the message in what was received. Raise NotFoundError where it has no such field."""
-        from minirospy.idl.load import get_message_class
+        from minirospy.core.idl.load import get_message_class
 
         message = self._classes.read(received)
         if type(message) is not self._checked:
@@ -114,7 +114,7 @@ class Echo:
         return not self._is_type_known and not is_message(value)
 
     def _block(self, value: object) -> str:
-        from minirospy.idl.message import strify_message
+        from minirospy.core.idl.message import strify_message
 
         if self._is_shown_whole(value):
             return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy.base.errors import NotFoundError, UsageError
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["Step", "field_type", "field_value", "parse_path"]
 
@@ -70,7 +70,7 @@ def field_type(message_class: type[Message], path: str) -> str:
 
     Raise NotFoundError where the field does not exist or the class of an inner message is not installed.
     """
-    from minirospy.idl.load import message_class as load_class
+    from minirospy.core.idl.load import message_class as load_class
 
     type_: str = message_class._type
     before = Step("", None)

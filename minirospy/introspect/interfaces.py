@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from enum import Enum
 
 from minirospy.base.errors import NotFoundError
-from minirospy.idl.digest import Lookup, message_md5, service_md5
-from minirospy.idl.load import Catalogue
-from minirospy.idl.spec import MessageSpec, ServiceSpec
+from minirospy.core.idl.digest import Lookup, message_md5, service_md5
+from minirospy.core.idl.load import Catalogue
+from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.workspace.packages import Packages
 
 __all__ = ["Interfaces", "Kind", "describe"]

@@ -15,7 +15,7 @@ from minirospy.introspect.services import call_service, fill_request
 if TYPE_CHECKING:
     from roscpp.srv import GetLoggersResponse
 
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 
 __all__ = ["logger_level", "logger_levels", "set_logger_level"]

@@ -14,7 +14,7 @@ from minirospy.base.errors import MessageException, NotFoundError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.streams import Received
 
 __all__ = ["MessageClasses", "check", "fill", "serialize", "words_of"]
@@ -59,7 +59,7 @@ class MessageClasses:
 
     @staticmethod
     def _find(type_: str, md5sum: str, definition: str) -> type[Message]:
-        from minirospy.idl.load import class_from_text, get_message_class
+        from minirospy.core.idl.load import class_from_text, get_message_class
 
         installed = get_message_class(type_)
         if installed is not None and md5sum in ("*", installed._md5sum):
@@ -76,7 +76,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
     ``keys`` are words that represent a value, as ``now`` for a time. Raise MessageException.
     """
-    from minirospy.idl.message import fill_message_args
+    from minirospy.core.idl.message import fill_message_args
 
     # No value at all is a message of default values.
     try:
@@ -89,7 +89,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 def words_of(nanoseconds: int) -> dict[str, object]:
     """Return the words that represent a value: ``now`` is the time, ``auto`` a stamped header."""
     from minirospy.base.times import Time
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
 
     now = Time(*divmod(nanoseconds, 10**9))
     header = get_message_class("std_msgs/Header")

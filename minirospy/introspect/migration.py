@@ -29,7 +29,7 @@ from minirospy.introspect.migration_rules import (
 )
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "MessageMigrator",
@@ -181,7 +181,7 @@ class MessageMigrator:
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
         """Return the installed class that messages of a class become, or None."""
-        from minirospy.idl.load import get_message_class
+        from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
         if key not in self.found_targets:
@@ -347,7 +347,7 @@ class MessageMigrator:
 
     def _connect(self, end: ScaffoldNode) -> None:
         """Connect the last rule of a type to what follows it."""
-        from minirospy.idl.load import get_message_class
+        from minirospy.core.idl.load import get_message_class
 
         installed = get_message_class(end.new_class._type)
         if installed:

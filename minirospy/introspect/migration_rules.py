@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from minirospy.base.errors import DefinitionError
-from minirospy.idl.spec import PRIMITIVES, FieldType
+from minirospy.core.idl.spec import PRIMITIVES, FieldType
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "BagMigrationException",
@@ -238,7 +238,7 @@ def migration_default_value(field_type: str) -> str:
 
 def constants_from_def(core_type: str, msg_def: str) -> set[tuple[str, object, str]]:
     """Return the constants of a full text: name, value and type."""
-    from minirospy.idl.load import specs_of_text
+    from minirospy.core.idl.load import specs_of_text
 
     spec = specs_of_text(core_type, msg_def)[core_type]
     return {(each.name, each.value, each.type) for each in spec.constants}
@@ -410,7 +410,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
     """Return the classes of a full text, and the first one; nothing where a rule is for half a migration."""
-    from minirospy.idl.load import classes_from_text
+    from minirospy.core.idl.load import classes_from_text
 
     if not type_:
         return {}, None

@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection
 from typing import NamedTuple
 
-from minirospy.idl.load import Catalogue
-from minirospy.idl.spec import FieldType, MessageSpec
+from minirospy.core.idl.load import Catalogue
+from minirospy.core.idl.spec import FieldType, MessageSpec
 
 __all__ = ["prototype"]
 

@@ -14,7 +14,7 @@ from minirospy.introspect.values import message_values, parse_arguments, parse_d
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
 
 __all__ = ["publish_all", "values_to_publish"]

@@ -22,9 +22,9 @@ from minirospy.introspect.graph import Graph, in_namespace, unknown_service
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
+    from minirospy.core.wire.header import Header
     from minirospy.runtime.node.service_client import ServiceClient
-    from minirospy.wire.header import Header
 
 __all__ = [
     "ServiceNode",
@@ -96,7 +96,7 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 def service_arguments(type_: str) -> list[str]:
     """Return the names of the fields of a service type's request. Raise NotFoundError where it is not installed."""
-    from minirospy.idl.load import service_class
+    from minirospy.core.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
 
@@ -121,8 +121,8 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     ``now`` represents the time, ``auto`` a stamped header, whose ``seq`` is 1, as of the first call of a proxy.
     Raise NotFoundError where the type is not installed, MessageException where the values do not fit.
     """
-    from minirospy.idl.load import service_class
-    from minirospy.idl.message import number_header
+    from minirospy.core.idl.load import service_class
+    from minirospy.core.idl.message import number_header
     from minirospy.introspect.messages import fill, words_of
 
     request = fill(service_class(type_)._request_class(), arguments, words_of(time.time_ns()))
@@ -132,7 +132,7 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Return the response to a filled request. Raise NotFoundError, ServiceException with the handler's text."""
-    from minirospy.idl.load import service_class
+    from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize
 
     cls = service_class(type_)

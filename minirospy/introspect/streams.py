@@ -15,23 +15,23 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
 from minirospy.base.errors import MessageException, MinirospyError, RpcRefused
-from minirospy.idl.protocols import is_stamped
+from minirospy.core.idl.protocols import is_stamped
+from minirospy.core.wire.framing import Frame, serialize_frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.messages import MessageClasses, serialize
 from minirospy.introspect.topics import TopicField, find_topic
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import Frame, serialize_frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import TracebackType
 
     from minirospy.base.environment import Environment
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]

@@ -150,7 +150,7 @@ def topic_field_type(field: TopicField) -> str:
 
     Raise NotFoundError where the message has no such field, or its type is not installed here.
     """
-    from minirospy.idl.load import message_class
+    from minirospy.core.idl.load import message_class
     from minirospy.introspect.fields import field_type
 
     return field_type(message_class(field.type), field.path)

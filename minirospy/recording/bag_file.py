@@ -9,9 +9,9 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import BinaryIO, Protocol, cast
 
-from minirospy.bag.writer import BagWriter, Buffer
 from minirospy.base import private_files
 from minirospy.base.errors import BagFormatError
+from minirospy.core.bag.writer import BagWriter, Buffer
 from minirospy.recording.disk import DiskThread, QueuedFile
 from minirospy.recording.options import RecordOptions
 
@@ -172,7 +172,7 @@ class BagFile:
 def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | None) -> FileWriter:
     stream = cast(BinaryIO, file)
     if options.mcap:
-        from minirospy.bag.mcap_writer import McapWriter
+        from minirospy.core.bag.mcap_writer import McapWriter
 
         return McapWriter(stream, compression=options.compression, chunk_size=options.chunk_size)
     return BagWriter(

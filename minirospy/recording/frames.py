@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from minirospy.client.topics import AnyMsg
-from minirospy.idl.protocols import Buffer
-from minirospy.wire.framing import SplitFrame
+from minirospy.core.idl.protocols import Buffer
+from minirospy.core.wire.framing import SplitFrame
 
 __all__ = ["ReceivedFrame", "frame_class", "parts_of"]
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from minirospy.bag.base import StoredMessage
+from minirospy.core.bag.base import StoredMessage
 from minirospy.recording.precise import PreciseWait
 from minirospy.recording.schedule import PlayOptions, Schedule, State
 from minirospy.recording.sources import Bags, ReadAhead, Selection

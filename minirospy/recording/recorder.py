@@ -23,7 +23,7 @@ from minirospy import client
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import BagFormatError, MasterUnreachableError, RpcError
 from minirospy.client.session import current_session
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 from minirospy.recording.bag_file import BagFile
 from minirospy.recording.disk import DiskThread
 from minirospy.recording.frames import ReceivedFrame, parts_of

@@ -14,10 +14,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.bag.base import BagReader, StoredMessage
-from minirospy.bag.mcap_reader import open_bag_or_mcap
-from minirospy.bag.records import Connection
 from minirospy.base.errors import BagError, BagUnindexedError, NotFoundError
+from minirospy.core.bag.base import BagReader, StoredMessage
+from minirospy.core.bag.mcap_reader import open_bag_or_mcap
+from minirospy.core.bag.records import Connection
 
 __all__ = ["Bags", "ReadAhead", "Selection", "open_reader"]
 

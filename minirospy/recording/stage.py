@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Protocol
 
 from minirospy import client
-from minirospy.bag.base import StoredMessage
-from minirospy.bag.records import Connection
 from minirospy.base.escape import SafeTerminal
+from minirospy.core.bag.base import StoredMessage
+from minirospy.core.bag.records import Connection
 from minirospy.recording.frames import ReceivedFrame, frame_class
 from minirospy.recording.keys import read_keys
 from minirospy.recording.schedule import PlayOptions

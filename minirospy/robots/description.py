@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError, UrdfError
-from minirospy.urdf.model import Robot
-from minirospy.urdf.read import parse_robot
+from minirospy.core.urdf.model import Robot
+from minirospy.core.urdf.read import parse_robot
 
 __all__ = ["DescriptionError", "robot_of_parameter"]
 

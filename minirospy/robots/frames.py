@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from minirospy.urdf.model import JointType, Robot
-from minirospy.urdf.poses import Pose, Segment
+from minirospy.core.urdf.model import JointType, Robot
+from minirospy.core.urdf.poses import Pose, Segment
 
 __all__ = ["LinkPose", "RobotFrames", "prefixed"]
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from minirospy.base.errors import MinirospyError, UrdfError
-from minirospy.urdf.elements import Element, parse_xml
-from minirospy.urdf.values import NotANumberError, as_float
+from minirospy.core.urdf.elements import Element, parse_xml
+from minirospy.core.urdf.values import NotANumberError, as_float
 
 __all__ = [
     "Dependent",

@@ -17,9 +17,9 @@ from tf2_msgs.msg import TFMessage
 
 from minirospy import client as rospy
 from minirospy.base.times import Time
+from minirospy.core.urdf.model import JointType, Robot
 from minirospy.robots.description import DescriptionError, robot_of_parameter
 from minirospy.robots.frames import LinkPose, RobotFrames, prefixed
-from minirospy.urdf.model import JointType, Robot
 
 __all__ = ["StatePublisher", "main"]
 

@@ -12,8 +12,8 @@ from rosserial_msgs.msg import TopicInfo
 
 from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError
-from minirospy.idl.load import get_message_class, get_service_class
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.load import get_message_class, get_service_class
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["EndpointError", "Publisher", "ServiceClient", "ServiceServer", "Subscriber", "to_bytes"]
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from minirospy.base.errors import BuildError, DefinitionError, NotFoundError
 from minirospy.base.suggestions import did_you_mean
-from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
-from minirospy.idl.spec import MessageSpec
+from minirospy.core.idl.load import Catalogue, compile_package, read_definition, write_if_changed
+from minirospy.core.idl.spec import MessageSpec
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import naming_warning
@@ -225,7 +225,10 @@ class _Builder:
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
         # What generated code depends on: definitions, what CMakeLists.txt says of them, and the compiler.
         ours = Path(__file__).parents[1]
-        compiler = [*(ours / "idl").glob("*.py"), *(ours / "compat" / "dynamic_reconfigure").glob("*.py")]
+        compiler = [
+            *(ours / "core" / "idl").glob("*.py"),
+            *(ours / "compat" / "dynamic_reconfigure").glob("*.py"),
+        ]
         made_of = [
             path for plan in plans for path in (*plan.definitions, *_option_files(plan), plan.cmake_lists)
         ]

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 
-from minirospy.idl.load import read_definition
+from minirospy.core.idl.load import read_definition
 from minirospy.workspace.plan import Plan
 
 __all__ = ["with_unlisted"]

@@ -18,7 +18,7 @@ from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError, Serve
 from minirospy.actionlib.aio import server as server_module
 from minirospy.actionlib.spec import ActionException
 from minirospy.base.errors import ROSException, ROSInterruptException
-from minirospy.graph.goals import GoalState
+from minirospy.core.graph.goals import GoalState
 from tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("master")

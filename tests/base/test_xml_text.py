@@ -15,9 +15,9 @@ from minirospy.base.xml_text import XmlError, XmlSyntaxError, check_xml, parse_x
 from minirospy.cli.catkin.test_results import read_counts
 from minirospy.compat.roslib import manifest as old_manifest
 from minirospy.compat.urdf_parser_py.urdf import URDF
+from minirospy.core.urdf.read import parse_robot
 from minirospy.launch.document import parse_document
 from minirospy.testing import junit
-from minirospy.urdf.read import parse_robot
 from minirospy.workspace.manifest import parse_manifest
 
 LAUGHS = (

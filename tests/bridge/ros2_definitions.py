@@ -8,9 +8,9 @@ from typing import Any
 from rosbags.typesys import Stores, get_typestore
 
 from minirospy.bridge.ros2.layouts import ros2_spec
-from minirospy.idl.load import Catalogue
-from minirospy.idl.own_packages import own_definitions
-from minirospy.idl.spec import MessageSpec
+from minirospy.core.idl.load import Catalogue
+from minirospy.core.idl.own_packages import own_definitions
+from minirospy.core.idl.spec import MessageSpec
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
 

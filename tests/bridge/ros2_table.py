@@ -5,7 +5,7 @@ from __future__ import annotations
 from minirospy.base.errors import DefinitionError
 from minirospy.bridge.ros2.layouts import TypesDiffer, layout_of
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.idl.spec import MessageSpec
+from minirospy.core.idl.spec import MessageSpec
 from tests.bridge.ros2_definitions import catalogue, ros2_lookup, typestore
 
 

@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.base.errors import ServiceException
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.idl.load import class_from_text
+from minirospy.core.idl.load import class_from_text
 from tests.bridge.fleet import SECONDS, Fleet, Place
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")

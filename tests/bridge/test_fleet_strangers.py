@@ -25,8 +25,8 @@ from minirospy.bridge.fleet.keys import (
 )
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
 from minirospy.bridge.fleet.rules import GatewayRules
-from minirospy.idl.load import class_from_text
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.load import class_from_text
+from minirospy.core.wire.tcpros import InterfaceType
 from tests.bridge.fleet import Fleet
 from tests.bridge.test_fleet_gateways import collect, fleet, publisher
 from tests.bridge.test_fleet_hostile import stub

@@ -23,9 +23,9 @@ from minirospy.bridge.access import Access
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.types import type_of_text
-from minirospy.idl.load import class_from_text, classes_from_text
+from minirospy.core.idl.load import class_from_text, classes_from_text
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.tcpros import InterfaceType
 from minirospy.workspace.packages import Packages
 from tests.conftest import write_files
 from tests.waiting import until

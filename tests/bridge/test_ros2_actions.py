@@ -41,7 +41,7 @@ from minirospy.bridge.ros2.rclpy_actions import ActionClient as Ros2ActionClient
 from minirospy.bridge.ros2.rclpy_actions import ActionServer as Ros2ActionServer
 from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.side import RclpySide
-from minirospy.graph.goals import GoalState
+from minirospy.core.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
@@ -111,7 +111,7 @@ def test_messages_of_actions_that_end_too_early_are_refused() -> None:
     "name", ["actionlib_tutorials/FibonacciResult", "nav_msgs/Odometry", "std_msgs/Header", "sensor_msgs/Imu"]
 )
 def test_an_empty_message_is_that_of_the_generated_class(name: str) -> None:
-    from minirospy.idl.load import message_class
+    from minirospy.core.idl.load import message_class
 
     assert empty_message(catalogue().message(name), catalogue().message) == data_of(message_class(name)())
 

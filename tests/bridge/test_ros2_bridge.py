@@ -31,9 +31,9 @@ from minirospy.bridge.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
 from minirospy.bridge.ros2.side import large_message_settings
 from minirospy.bridge.ros2.statics import StaticTransforms
 from minirospy.cli.ros2_bridge import main
-from minirospy.idl.load import message_class
+from minirospy.core.idl.load import message_class
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
 from tests.waiting import until
 

@@ -11,7 +11,7 @@ from minirospy.base.errors import DeserializationError
 from minirospy.bridge.ros2.cdr_values import decode, encode
 from minirospy.bridge.ros2.definitions import Definitions
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.idl.type_hash import Fields
+from minirospy.core.idl.type_hash import Fields
 from tests.bridge.ros2_definitions import catalogue
 
 STORE: Any = get_typestore(Stores.ROS2_KILTED)

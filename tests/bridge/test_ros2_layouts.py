@@ -14,11 +14,11 @@ from rosbags.typesys import Stores, get_typestore
 from minirospy.base.errors import DeserializationError
 from minirospy.bridge.ros2.layouts import TypesDiffer, layout_of, ros2_field_type, ros2_spec, transcoder
 from minirospy.bridge.ros2.rules import BUILT_IN
-from minirospy.idl.cdr import CDR_HEADER, Transcoder, make_transcoder
-from minirospy.idl.load import class_from_text, classes_from_text, message_class, specs_of_text
-from minirospy.idl.spec import FieldType, MessageSpec
+from minirospy.core.idl.cdr import CDR_HEADER, Transcoder, make_transcoder
+from minirospy.core.idl.load import class_from_text, classes_from_text, message_class, specs_of_text
+from minirospy.core.idl.spec import FieldType, MessageSpec
 from tests.bridge.ros2_definitions import catalogue, ros2_lookup, typestore
-from tests.idl.test_codec import fill, full_texts, messages, serialized
+from tests.core.idl.test_codec import fill, full_texts, messages, serialized
 
 # Not these: rosbags does not convert them, or ROS 2 lacks them, and each has a test below.
 SPECIAL = {"std_msgs/Time", "std_msgs/Duration", "sensor_msgs/BatteryState", "sensor_msgs/Range"}

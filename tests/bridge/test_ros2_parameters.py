@@ -23,7 +23,7 @@ from minirospy.bridge.ros2.parameter_values import (
     ros2_name,
     ros2_value,
 )
-from minirospy.idl.load import service_class
+from minirospy.core.idl.load import service_class
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
 

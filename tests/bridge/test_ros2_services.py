@@ -19,10 +19,10 @@ from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Direction
 from minirospy.bridge.ros2.rules import BUILT_IN
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
 from minirospy.cli.ros2_bridge import main
-from minirospy.idl.load import service_class
-from minirospy.wire.header import Header, serialize_header
-from minirospy.wire.service import serialize_response
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.load import service_class
+from minirospy.core.wire.header import Header, serialize_header
+from minirospy.core.wire.service import serialize_response
+from minirospy.core.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import catalogue
 from tests.bridge.test_ros2_bridge import FakeSide
 from tests.waiting import until

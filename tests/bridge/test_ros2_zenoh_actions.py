@@ -28,8 +28,8 @@ from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
 from minirospy.bridge.ros2.zenoh_keys import attachment
 from minirospy.bridge.ros2.zenoh_side import ZenohSide
 from minirospy.bridge.zenoh_library import NetworkOptions
-from minirospy.graph.goals import GoalState
-from minirospy.idl.load import service_class
+from minirospy.core.graph.goals import GoalState
+from minirospy.core.idl.load import service_class
 from tests.bridge.ros2_definitions import catalogue, typestore
 from tests.bridge.test_ros2_zenoh import GID, LIMIT, RmwNode, called, domain, endpoint, node, zenoh
 from tests.bridge.test_ros2_zenoh_keys import ACTION_HASHES, SERVICE_HASHES

@@ -21,7 +21,7 @@ from minirospy.bridge.ros2.zenoh_keys import (
     reply_attachment,
 )
 from minirospy.bridge.ros2.zenoh_node import Graph
-from minirospy.idl.type_hash import type_hash
+from minirospy.core.idl.type_hash import type_hash
 from tests.bridge.ros2_definitions import catalogue
 
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"

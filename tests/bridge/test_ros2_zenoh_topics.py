@@ -15,8 +15,8 @@ from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.bridge.ros2.bridge import Ros2Bridge, _ToRos2
 from minirospy.bridge.ros2.links import Direction
-from minirospy.idl.load import message_class
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.load import message_class
+from minirospy.core.wire.tcpros import InterfaceType
 from tests.bridge.ros2_definitions import typestore
 from tests.bridge.test_ros2_zenoh import LIMIT, RmwNode, domain, endpoint, node, zenoh
 from tests.bridge.test_ros2_zenoh_actions import bridged, in_thread

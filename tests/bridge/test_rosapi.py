@@ -24,7 +24,7 @@ from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import describe
 from minirospy.bridge.tf_republisher.pairs import FramePair
 from minirospy.bridge.tf_republisher.republisher import Republisher
-from minirospy.idl.load import message_class
+from minirospy.core.idl.load import message_class
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running

@@ -32,7 +32,7 @@ from minirospy.bridge.access import Access
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosbridge import png, protocol
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.wire.tcpros import InterfaceType
 from tests.waiting import until, wait_until
 
 if TYPE_CHECKING:
@@ -315,7 +315,7 @@ def test_unsubscribe_ends_with_the_last_id(bridge: Running) -> None:
 
 def test_topic_of_an_uninstalled_type_is_decoded_by_its_text(bridge: Running) -> None:
     type_ = InterfaceType("elsewhere_msgs/Pair", "cd60a26494a087f577976f0329fa120e", "int32 a\nint32 b\n")
-    from minirospy.idl.load import class_from_text
+    from minirospy.core.idl.load import class_from_text
 
     made = class_from_text(type_.name, type_.definition)
     node = bridge.node("foreign")

@@ -14,9 +14,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty
 
 from minirospy.bridge.graph import SharedGraph
+from minirospy.core.wire.header import serialize_header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot
-from minirospy.wire.header import serialize_header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from tests.bridge.conftest import Running

@@ -23,7 +23,7 @@ from minirospy.bridge.graph import SharedGraph
 from minirospy.bridge.ros2.bridge import Ros2Bridge
 from minirospy.bridge.ros2.links import Ros2Topic
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.graph.goals import GoalState
+from minirospy.core.graph.goals import GoalState
 from tests.bridge.test_fleet_hostile import CLAIM, stub
 from tests.bridge.test_ros2_actions import SEND_GOAL, end_of
 from tests.bridge.test_ros2_bridge import STRING, FakeActionClient, FakePublisher, FakeSide, bridged, raw

@@ -18,11 +18,11 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import ServiceException
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 BIN = Path(sys.executable).parent
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.cli.ros import rostopic
-from tests.bag.bags import Given, connection, make_bag
+from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command
 

@@ -21,7 +21,7 @@ from minirospy.cli.completion.complete import candidates, main
 from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, Entry
 from minirospy.cli.verbs import Command, Family, Verb
-from minirospy.idl.load import Catalogue, message_class
+from minirospy.core.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
 from minirospy.introspect.prototype import prototype
 from minirospy.runtime.rpc.master_proxy import MasterProxy

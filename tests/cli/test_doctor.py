@@ -15,10 +15,10 @@ from std_msgs.msg import Bool, String
 
 from minirospy.base.environment import Environment
 from minirospy.cli import doctor
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.tcpros import InterfaceType
 from tests.conftest import free_port
 
 Start = Callable[[Sequence[str]], Any]

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.header import serialize_header
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.header import serialize_header
 from tests.cli.conftest import BIN
 
 MARK = "OWNED"

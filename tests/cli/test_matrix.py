@@ -24,11 +24,11 @@ from roscpp.srv import GetLoggers, GetLoggersResponse
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc import master_proxy
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.tcpros import InterfaceType
 
 from .conftest import Result, Robot, without_ros_words
 

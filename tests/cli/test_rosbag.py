@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag.reader import open_bag
-from minirospy.bag.writer import BagWriter
 from minirospy.cli.ros import rosbag
-from tests.bag.bags import Given, connection, make_bag
+from minirospy.core.bag.reader import open_bag
+from minirospy.core.bag.writer import BagWriter
+from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command
 
@@ -263,7 +263,7 @@ def test_encryption_is_refused_by_name(command: Command, bag: Path, verb: str) -
 
 
 def test_old_bags_become_new_ones(command: Command, bag: Path) -> None:
-    from tests.bag.test_reader12 import make_bag12
+    from tests.core.bag.test_reader12 import make_bag12
 
     bag.write_bytes(make_bag12([("/a", 1, string("one")), ("/b", 2, string("two"))], indexed=False))
     assert "version: 1.2 (unindexed)\n" in command("rosbag", "info", "a.bag").out

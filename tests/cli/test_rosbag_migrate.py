@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag.reader import open_bag
 from minirospy.cli.ros import rosbag
-from minirospy.idl.load import class_from_text, message_class
-from tests.bag.bags import Given, connection, make_bag
+from minirospy.core.bag.reader import open_bag
+from minirospy.core.idl.load import class_from_text, message_class
+from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command
 

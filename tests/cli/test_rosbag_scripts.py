@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag.reader import open_bag
-from minirospy.bag.records import Connection
 from minirospy.cli.ros.rosbag_scripts import SCRIPTS, main
-from minirospy.idl.load import class_from_text
-from tests.bag.bags import STRING_MD5, Given, connection, make_bag
+from minirospy.core.bag.reader import open_bag
+from minirospy.core.bag.records import Connection
+from minirospy.core.idl.load import class_from_text
+from tests.core.bag.bags import STRING_MD5, Given, connection, make_bag
 
 GIVEN = [[Given(0, 5, b"\x01\0\0\0a"), Given(1, 6, b"\x01\0\0\0b")], [Given(0, 1, b"\x01\0\0\0c")]]
 FOLDER = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "rosbag" / "scripts"

@@ -18,8 +18,8 @@ from gazebo_msgs.srv import SetLightProperties
 from mavros_msgs.srv import CommandVtolTransition
 
 from minirospy.cli.ros.rosservice import main
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.tcpros import InterfaceType
 
 from .conftest import own_lines
 

@@ -18,10 +18,10 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
 
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import wait_until
 
 from .conftest import own_lines

@@ -10,7 +10,7 @@ import pytest
 
 from minirospy.cli.ros import urdf
 
-ARM = Path(__file__).parents[1] / "urdf" / "arm.urdf"
+ARM = Path(__file__).parents[1] / "core" / "urdf" / "arm.urdf"
 GRAPH = ARM.with_suffix(".gv").read_text(encoding="utf-8")
 
 

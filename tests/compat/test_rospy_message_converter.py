@@ -21,7 +21,7 @@ from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Header
 
 from minirospy.base.errors import NotFoundError
-from minirospy.idl.load import Catalogue, message_class
+from minirospy.core.idl.load import Catalogue, message_class
 
 MSGS = Path(__file__).parents[2] / "msgs"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
-from minirospy.bag.writer import BagWriter
+from minirospy.core.bag.writer import BagWriter
 
 SECOND = 10**9
 START = 1_700_000_000 * SECOND

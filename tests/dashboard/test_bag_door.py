@@ -19,9 +19,9 @@ from std_msgs.msg import String
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from minirospy.bag.timeline import Timeline
 from minirospy.base.errors import BagFormatError
 from minirospy.bridge.access import Access
+from minirospy.core.bag.timeline import Timeline
 from minirospy.dashboard import bag_door, recording
 from minirospy.dashboard.bag_door import SUBPROTOCOL, BagSession
 from minirospy.dashboard.bag_folder import BagFolder

@@ -1,4 +1,4 @@
-"""tf2_ros in programs: listeners, waits, time that jumps, buffer servers. What tf2 itself does is in tests/tf2."""
+"""tf2_ros in programs: listeners, waits, time that jumps, buffer servers. What tf2 itself does is in tests/core/tf2."""
 
 from __future__ import annotations
 

@@ -16,12 +16,12 @@ from tf2_msgs.msg import TFMessage
 from tf2_msgs.srv import FrameGraph
 
 from minirospy import Node
+from minirospy.core.tf2.buffer import TransformBuffer
+from minirospy.core.tf2.listing import frames_as_dot
+from minirospy.core.urdf.poses import quaternion_from_rpy
 from minirospy.frames.tools import echo, monitor, static_publisher, view
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.frames.tools.monitor import Delays
-from minirospy.tf2.buffer import TransformBuffer
-from minirospy.tf2.listing import frames_as_dot
-from minirospy.urdf.poses import quaternion_from_rpy
 from tests.robots.conftest import SECONDS, Start, python
 
 STATIC = ("tf2_ros", "static_transform_publisher")

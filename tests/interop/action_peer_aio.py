@@ -9,7 +9,7 @@ from actionlib_msgs.msg import GoalID
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
-from minirospy.graph.goals import GoalState
+from minirospy.core.graph.goals import GoalState
 
 SECONDS = 200.0
 

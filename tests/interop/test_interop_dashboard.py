@@ -38,7 +38,9 @@ needs_node = pytest.mark.skipif(
     not shutil.which("node"), reason="node is not installed: apt-get install nodejs"
 )
 TYPES = sorted(
-    json.loads((Path(__file__).parents[1] / "idl" / "golden.json").read_text(encoding="utf-8"))["msg"]
+    json.loads((Path(__file__).parents[1] / "core" / "idl" / "golden.json").read_text(encoding="utf-8"))[
+        "msg"
+    ]
 )
 NUMBERS = {"int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
            "int64": "q", "uint64": "Q"}  # fmt: skip

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import ConnectivityException, ExtrapolationException, TransformException
+from minirospy.core.tf2.buffer import TransformBuffer
 from minirospy.dashboard.files import FOLDER
-from minirospy.tf2.buffer import TransformBuffer
 from tests.interop.conftest import PATIENCE
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import needs_node
@@ -181,8 +181,8 @@ def test_frames_of_a_bag_that_starts_again_replace_the_old_ones() -> None:
 
 
 def test_poses_of_links_agree_with_our_urdf() -> None:
-    from minirospy.urdf.poses import Segment
-    from minirospy.urdf.read import parse_robot
+    from minirospy.core.urdf.poses import Segment
+    from minirospy.core.urdf.read import parse_robot
 
     text = ARM.read_text(encoding="utf-8")
     robot = parse_robot(text)

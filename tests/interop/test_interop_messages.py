@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 
 from minirospy.base.errors import DefinitionError, DeserializationError, MessageException, SerializationError
 from minirospy.base.times import Duration, Time
-from minirospy.idl.digest import full_text, service_md5
-from minirospy.idl.emit import python_name
-from minirospy.idl.load import (
+from minirospy.core.idl.digest import full_text, service_md5
+from minirospy.core.idl.emit import python_name
+from minirospy.core.idl.load import (
     Catalogue,
     class_from_text,
     message_class,
@@ -32,8 +32,8 @@ from minirospy.idl.load import (
     specs_of_text,
     write_package,
 )
-from minirospy.idl.message import fill_message_args, strify_message
-from minirospy.idl.spec import FieldType, MessageSpec
+from minirospy.core.idl.message import fill_message_args, strify_message
+from minirospy.core.idl.spec import FieldType, MessageSpec
 
 HERE = Path(__file__).parent
 REAL_PYTHON = "/usr/bin/python3"

@@ -1,6 +1,6 @@
 """Debian's programs for robots and frames beside ours: the same transforms, the same words, the same exit statuses.
 
-`RECORD=1 pytest tests/interop/test_interop_robots.py` records tests/urdf/check_urdf.json again.
+`RECORD=1 pytest tests/interop/test_interop_robots.py` records tests/core/urdf/check_urdf.json again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import OUR_BIN, PATIENCE, REAL_PYTHON, start, stop
 
-URDFS = Path(__file__).parents[1] / "urdf"
+URDFS = Path(__file__).parents[1] / "core" / "urdf"
 ARM = (URDFS / "arm.urdf").read_text(encoding="utf-8")
 GOLDEN = URDFS / "check_urdf.json"
 STACKS = ("real", "ours")

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.bag.compression import compress, decompress
-from tests.bag.bags import Given, connection, make_bag
+from minirospy.core.bag.compression import compress, decompress
+from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import HERE, OUR_BIN, PATIENCE, REAL_BIN, REAL_PYTHON
 

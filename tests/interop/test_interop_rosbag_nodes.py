@@ -14,8 +14,8 @@ from typing import NamedTuple
 import pytest
 from rosbags.rosbag1 import Reader
 
-from minirospy.bag.writer import BagWriter
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.bag.writer import BagWriter
+from minirospy.core.wire.tcpros import InterfaceType
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 from tests.recording.conftest import STRING, Talker, connected, said, say
 from tests.waiting import wait_until

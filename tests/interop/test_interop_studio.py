@@ -25,7 +25,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 from minirospy.aio.topics import Subscription
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 from tests.bridge.conftest import Running, run_bridge
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.test_interop_foreign import FOREIGN, modules

@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 
 from minirospy.compat.tf import transformations
+from tests.core.tf2.conversation import difference, edge_cases, query_real, questions, shortened
+from tests.core.tf2.ours import our_answers
 from tests.frames import transformations_calls
 from tests.interop.conftest import HERE, PATIENCE, REAL_PYTHON, compiled, start, stop
-from tests.tf2.conversation import difference, edge_cases, query_real, questions, shortened
-from tests.tf2.ours import our_answers
 
-RECORDED = HERE.parent / "tf2" / "recorded.json"
+RECORDED = HERE.parent / "core" / "tf2" / "recorded.json"
 
 OUR_PEER = """
 import sys, rospy, tf2_ros

@@ -8,7 +8,7 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import NotFoundError
-from minirospy.idl.load import get_message_class, get_service_class
+from minirospy.core.idl.load import get_message_class, get_service_class
 from minirospy.introspect.interfaces import Interfaces, Kind
 from minirospy.workspace.packages import Packages
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.idl.load import class_from_text, message_class
+from minirospy.core.idl.load import class_from_text, message_class
 from minirospy.introspect.bag_migration import check_classes
 from minirospy.introspect.migration import MessageMigrator
 from minirospy.introspect.migration_rules import (

@@ -29,7 +29,7 @@ def node(master: str) -> Iterator[ToolNode]:
     """Run a node that publishes /flag and serves /set_flag."""
     from io import BytesIO
 
-    from minirospy.wire.tcpros import InterfaceType
+    from minirospy.core.wire.tcpros import InterfaceType
 
     def handle(body: memoryview, _: object) -> bytes:
         request = SetBoolRequest()

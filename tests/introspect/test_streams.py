@@ -14,13 +14,13 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from minirospy.base.environment import Environment
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
 from minirospy.introspect.doctor.own_node import DoctorNode
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
 
 
 @pytest.fixture

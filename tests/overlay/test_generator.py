@@ -12,7 +12,7 @@ import genpy.generator
 import genpy.genpy_main
 import pytest
 
-from minirospy.idl.own_packages import own_definitions
+from minirospy.core.idl.own_packages import own_definitions
 
 
 @pytest.fixture

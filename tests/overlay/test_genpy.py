@@ -23,7 +23,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool
 
-from minirospy.idl.load import Catalogue, class_from_text, message_class, service_class
+from minirospy.core.idl.load import Catalogue, class_from_text, message_class, service_class
 
 ROOT = Path(__file__).parents[2]
 

@@ -26,7 +26,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from minirospy.base.errors import SerializationError
 from minirospy.base.installation import install_command
-from minirospy.idl.load import class_from_text
+from minirospy.core.idl.load import class_from_text
 
 
 def wire(message: Any) -> bytes:

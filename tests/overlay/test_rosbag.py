@@ -16,7 +16,7 @@ import rospy
 from rosbag.bag import BagMessage, ROSBagEncryptNotSupportedException
 from std_msgs.msg import Int32, String
 
-from tests.bag.bags import Given, connection, make_bag
+from tests.core.bag.bags import Given, connection, make_bag
 
 
 def at(seconds: float) -> rospy.Time:

@@ -14,7 +14,7 @@ from urdf_parser_py.urdf import URDF, Box, Link, Visual
 from minirospy.base.errors import UrdfError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
-URDFS = Path(__file__).parents[1] / "urdf"
+URDFS = Path(__file__).parents[1] / "core" / "urdf"
 ARM = (URDFS / "arm.urdf").read_text(encoding="utf-8")
 
 

@@ -13,10 +13,10 @@ import pytest
 from rosbags.rosbag1 import Reader
 
 from minirospy.base.environment import Environment
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import wait_until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

@@ -15,14 +15,14 @@ from unittest.mock import Mock
 
 import pytest
 
-from minirospy.bag.writer import BagWriter
 from minirospy.base.environment import Environment
+from minirospy.core.bag.writer import BagWriter
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.streams import ToolNode
 from minirospy.recording.player import Player
 from minirospy.recording.schedule import PlayOptions
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 from tests.recording.conftest import GUARD, STRING, Start, Talker, connected, read_until, said
 from tests.waiting import wait_until
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag import records
-from minirospy.bag.writer import BagWriter
 from minirospy.base.installation import install_command
+from minirospy.core.bag import records
+from minirospy.core.bag.writer import BagWriter
 from tests.recording.conftest import (
     GUARD,
     STRING,
@@ -295,7 +295,7 @@ def test_a_chunk_that_cannot_be_compressed_leaves_a_readable_bag(
     """One of 10 KB fails while it records, one of 4 MB when the file is completed."""
     chatter = talker.advertise("/chatter")
     no_memory = (
-        "from minirospy.bag import writer\n"
+        "from minirospy.core.bag import writer\n"
         "compress = writer.compress\n"
         "def refuse(name, data):\n"
         "    if b'0100x' in data:\n"
@@ -408,8 +408,8 @@ def test_too_little_space_is_refused(master: str, start: Start) -> None:
 
 
 def test_simulated_time_is_waited_for(talker: Talker, start: Start, tmp_path: Path) -> None:
+    from minirospy.core.wire.tcpros import InterfaceType
     from minirospy.runtime.rpc.master_proxy import MasterProxy
-    from minirospy.wire.tcpros import InterfaceType
 
     proxy = MasterProxy(talker.node.environment.master_uri, "/test")
     proxy.set_param("/use_sim_time", True)

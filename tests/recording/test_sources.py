@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bag.base import StoredMessage
-from minirospy.bag.records import Connection
 from minirospy.base.errors import BagFormatError
+from minirospy.core.bag.base import StoredMessage
+from minirospy.core.bag.records import Connection
 from minirospy.introspect.bag_convert import convert
 from minirospy.recording.sources import Bags, ReadAhead, Selection
-from tests.bag.bags import Given, make_bag
+from tests.core.bag.bags import Given, make_bag
 
 
 @pytest.mark.parametrize("suffix", [".bag", ".mcap"])

@@ -250,7 +250,7 @@ REASONS = {
     "ROS_BOOST_ROOT": "of rosbuild",
     "PIPE": "passed on from subprocess",
     "generate_dynamic": "genpy.dynamic has it",
-    "msg_generator": "genpy's own compiler; ours is minirospy.idl",
+    "msg_generator": "genpy's own compiler; ours is minirospy.core.idl",
     "get_depends": "the inside of load_manifest",
     **dict.fromkeys(("log", "log_verbose", "plog"), "the log of genmsg's own tools"),
     "find_packages": "catkin_pkg has it",
@@ -549,7 +549,7 @@ def reason_of(module: str) -> str:
 
 
 NOT_OFFERED = {
-    "genpy": "genpy's own compiler; ours is minirospy.idl",
+    "genpy": "genpy's own compiler; ours is minirospy.core.idl",
     "genmsg": "the inside of message generators, which CMake runs",
     "catkin": "what catkin's CMake macros and its release tools run",
     "roslib": "of rosbuild: use rospkg",

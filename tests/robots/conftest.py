@@ -12,7 +12,7 @@ import pytest
 
 from minirospy.workspace.packages import Packages
 
-ARM = Path(__file__).parents[1] / "urdf" / "arm.urdf"
+ARM = Path(__file__).parents[1] / "core" / "urdf" / "arm.urdf"
 SECONDS = 100.0
 
 Start = Callable[..., "subprocess.Popen[str]"]

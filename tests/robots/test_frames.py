@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.core.urdf.read import parse_robot, read_robot
 from minirospy.robots.frames import RobotFrames, prefixed
-from minirospy.urdf.read import parse_robot, read_robot
 
-ARM = read_robot(Path(__file__).parents[1] / "urdf" / "arm.urdf")
+ARM = read_robot(Path(__file__).parents[1] / "core" / "urdf" / "arm.urdf")
 
 
 def joint(name: str, type_: str, parent: str, child: str, inside: str = "") -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from minirospy.robots.joints import Dependent, FreeJoint, JointError, JointOptions, JointStates, read_joints
 
-ARM = (Path(__file__).parents[1] / "urdf" / "arm.urdf").read_text(encoding="utf-8")
+ARM = (Path(__file__).parents[1] / "core" / "urdf" / "arm.urdf").read_text(encoding="utf-8")
 
 
 def joints_of(text: str = ARM, **options: object) -> JointStates:

@@ -13,16 +13,16 @@ from typing import Any
 import pytest
 
 from minirospy.base.environment import Environment
-from minirospy.graph.registry import PublisherUpdate
+from minirospy.core.graph.registry import PublisherUpdate
+from minirospy.core.wire.http import serialize_request
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.wire.http import serialize_request
-from minirospy.wire.tcpros import InterfaceType
-from minirospy.wire.xmlrpc import serialize_call
 from tests.manual_loop import ManualLoop, run_manually, until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

@@ -13,8 +13,8 @@ import pytest
 from minirospy.base.errors import BuildError, DefinitionError, ManifestError, SourceError
 from minirospy.cli.catkin.make import catkin_make, catkin_make_isolated
 from minirospy.cli.catkin.tool import catkin
-from minirospy.idl import load
-from minirospy.idl.load import read_definition
+from minirospy.core.idl import load
+from minirospy.core.idl.load import read_definition
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
 from minirospy.workspace.packages import Packages, built_in_roots
 

@@ -19,7 +19,7 @@
     async with ActionServer(node, "run_led", runningLedAction, execute):
         await node.spin()
 
-On the wire they are actionlib's. Which state follows which is in `minirospy.graph.goals`. Source:
+On the wire they are actionlib's. Which state follows which is in `minirospy.core.graph.goals`. Source:
 http://wiki.ros.org/actionlib/DetailedDescription. Examples: docs/actions.md.
 """
 

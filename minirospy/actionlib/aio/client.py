@@ -16,8 +16,8 @@ from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList, find_status
 from minirospy.aio import Publisher, Subscription
 from minirospy.base.errors import ROSException, ROSInterruptException
-from minirospy.graph.goals import TERMINAL, GoalState
-from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.graph.goals import TERMINAL, GoalState
+from minirospy.core.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 
 __all__ = ["ActionClient", "ClientGoal"]
 

@@ -10,8 +10,8 @@ from minirospy import Node
 from minirospy.actionlib.spec import ActionTypes, action_types
 from minirospy.aio.handle import Handle
 from minirospy.base.errors import MinirospyError
-from minirospy.graph.goals import GoalState
-from minirospy.idl.protocols import Action
+from minirospy.core.graph.goals import GoalState
+from minirospy.core.idl.protocols import Action
 
 __all__ = ["WAITING", "ActionClass", "ActionEnd", "GoalError"]
 

@@ -16,9 +16,9 @@ from minirospy.actionlib.spec import CANCEL_SECONDS, SEND_SECONDS, TAKES_FAST_AN
 from minirospy.actionlib.statuses import StatusList, status_bytes
 from minirospy.aio import Publisher, Subscription
 from minirospy.base.errors import ROSException
-from minirospy.graph.goals import SERVER_STEPS, GoalEvent, GoalState, is_meant
-from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
-from minirospy.idl.service import to_response
+from minirospy.core.graph.goals import SERVER_STEPS, GoalEvent, GoalState, is_meant
+from minirospy.core.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.idl.service import to_response
 
 __all__ = ["ActionServer", "ServerGoal"]
 

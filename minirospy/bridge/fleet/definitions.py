@@ -11,9 +11,9 @@ from minirospy.bridge.fleet.frames import FrameRewriter
 from minirospy.bridge.fleet.keys import definition_key
 from minirospy.bridge.fleet.network import FleetNetwork, QueryFailed
 from minirospy.bridge.types import TypeTexts
-from minirospy.idl.load import checked_text
-from minirospy.idl.spec import MessageSpec
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.load import checked_text
+from minirospy.core.idl.spec import MessageSpec
+from minirospy.core.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from minirospy.base.errors import DeserializationError
-from minirospy.idl.digest import Lookup
-from minirospy.idl.spec import PRIMITIVES, Field, MessageSpec
+from minirospy.core.idl.digest import Lookup
+from minirospy.core.idl.spec import PRIMITIVES, Field, MessageSpec
 
 __all__ = ["FrameRewriter", "prefixed", "stripped"]
 

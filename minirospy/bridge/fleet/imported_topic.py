@@ -30,12 +30,12 @@ from minirospy.bridge.fleet.network import FleetNetwork, Later
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Outflow, Sender
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

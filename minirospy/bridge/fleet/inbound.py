@@ -19,7 +19,7 @@ from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, ServiceToken, TopicT
 from minirospy.bridge.fleet.network import QueryFailed
 from minirospy.bridge.fleet.rules import STOP_SECONDS
 from minirospy.bridge.fleet.stopping import CommandStream
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:

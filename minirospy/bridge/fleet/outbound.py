@@ -11,10 +11,10 @@ from minirospy.base.errors import DeserializationError
 from minirospy.bridge.fleet.frames import FrameRewriter, prefixed
 from minirospy.bridge.fleet.keys import TopicToken, out_key
 from minirospy.bridge.fleet.sender import Outflow
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

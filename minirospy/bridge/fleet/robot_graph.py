@@ -15,8 +15,8 @@ from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken, TopicT
 from minirospy.bridge.fleet.rules import Export, GatewayRules, exported_services, exported_topics
 from minirospy.bridge.node_queries import NodeQueries
 from minirospy.bridge.tasks import Faults
+from minirospy.core.wire.header import Header
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.wire.header import Header
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -38,10 +38,10 @@ from minirospy.bridge.fleet.ros1_topic import Ros1Topic, Shared
 from minirospy.bridge.fleet.rules import GatewayRules, is_logger_service
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.bridge.tasks import Faults, keep_running
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -319,7 +319,7 @@ def _error_in(resource: Resource, answer: bytes) -> str:
 
     Where the type is installed here: what is not a response of it, to the last byte, and is text.
     """
-    from minirospy.idl.load import get_service_class
+    from minirospy.core.idl.load import get_service_class
 
     text = answer[:_MOST_ERROR].decode(errors="replace")
     if not answer or len(answer) > _MOST_ERROR or not "".join(text.split()).isprintable():

@@ -15,7 +15,7 @@ from minirospy.bridge.fleet.outbound import OutboundTopic
 from minirospy.bridge.fleet.ros1_keys import SharedTopic, data_key
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
-from minirospy.wire.header import Header
+from minirospy.core.wire.header import Header
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from minirospy.bridge.foxglove.protocol import Channel, Schema, ServiceOffer
 from minirospy.bridge.graph import SharedGraph
 from minirospy.bridge.types import ServiceInfo
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Channels", "Services"]
 

@@ -17,8 +17,8 @@ from minirospy.bridge.foxglove.parameters import Parameters
 from minirospy.bridge.foxglove.protocol import Channel, GraphTables, PlaybackControl, PlaybackState
 from minirospy.bridge.foxglove.session import FoxgloveSession
 from minirospy.bridge.graph import Arrival, SharedGraph
+from minirospy.core.wire.header import Header
 from minirospy.introspect.snapshot import Changes
-from minirospy.wire.header import Header
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.connection import WebClient

@@ -20,7 +20,7 @@ from minirospy.bridge.foxglove import parsing, protocol, serializing
 from minirospy.bridge.foxglove.protocol import Channel, Event, Parameter, StatusLevel
 from minirospy.bridge.graph import Arrival, Publication
 from minirospy.bridge.web.files import FileAnswer
-from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.bridge.foxglove.door import FoxgloveDoor

@@ -18,11 +18,11 @@ from minirospy.bridge.ros2.action_messages import (
 )
 from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
 from minirospy.bridge.tasks import Faults
-from minirospy.graph.goals import TERMINAL, GoalState
-from minirospy.idl.cdr import CDR_HEADER
+from minirospy.core.graph.goals import TERMINAL, GoalState
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.action_links import ActionLink
     from minirospy.bridge.ros2.actions import ActionCodec
     from minirospy.bridge.ros2.interface import Ros2Handle, Ros2Side
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["MOST_GOALS", "GoalsToRos1"]
 

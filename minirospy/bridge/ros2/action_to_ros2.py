@@ -19,11 +19,11 @@ from minirospy.bridge.ros2.action_messages import (
 from minirospy.bridge.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
 from minirospy.bridge.ros2.reach import Reach
 from minirospy.bridge.tasks import Faults, keep_running
-from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
-from minirospy.idl.cdr import CDR_HEADER
+from minirospy.core.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.ros2.action_links import ActionLink
     from minirospy.bridge.ros2.actions import ActionCodec
     from minirospy.bridge.ros2.interface import Ros2Side
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["MOST_GOALS", "GoalsToRos2"]
 

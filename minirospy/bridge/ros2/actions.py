@@ -15,17 +15,17 @@ from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
 from minirospy.bridge.ros2.link_table import LinkTable, Pair, pairs
 from minirospy.bridge.ros2.links import Direction
 from minirospy.bridge.ros2.rules import Rules
-from minirospy.idl.cdr import Transcoder
-from minirospy.idl.digest import Lookup, full_text, message_md5
-from minirospy.idl.protocols import Message
-from minirospy.idl.spec import FieldType, MessageSpec
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.cdr import Transcoder
+from minirospy.core.idl.digest import Lookup, full_text, message_md5
+from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.spec import FieldType, MessageSpec
+from minirospy.core.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.base.name_filter import NameFilter
     from minirospy.bridge.ros2.interface import Ros2Side
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
     from minirospy.introspect.snapshot import Snapshot
 
 __all__ = ["ActionBridge", "ActionCodec", "empty_message"]

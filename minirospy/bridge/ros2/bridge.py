@@ -30,17 +30,17 @@ from minirospy.bridge.ros2.services import ServiceBridge
 from minirospy.bridge.ros2.statics import MOST_BYTES, MOST_FRAMES, TF_TYPES, StaticTransforms
 from minirospy.bridge.tasks import Faults, keep_running
 from minirospy.bridge.types import TypeTexts
-from minirospy.idl.cdr import Transcoder
-from minirospy.idl.codec import keeps_buffer
-from minirospy.idl.digest import Lookup, full_text, message_md5
-from minirospy.idl.load import Catalogue, specs_of_text
-from minirospy.idl.protocols import Message
-from minirospy.idl.spec import MessageSpec
+from minirospy.core.idl.cdr import Transcoder
+from minirospy.core.idl.codec import keeps_buffer
+from minirospy.core.idl.digest import Lookup, full_text, message_md5
+from minirospy.core.idl.load import Catalogue, specs_of_text
+from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.spec import MessageSpec
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -1,7 +1,7 @@
 """Values of a message of ROS 2 in CDR, by the fields of its type: for what the bridge itself says and reads. Pure.
 
-What is only passed on is converted by ``idl/cdr.py``, which is faster. Numbers are int, float or bool, arrays of bytes bytes,
-other arrays lists, messages dicts.
+What is only passed on is converted by ``core/idl/cdr.py``, which is faster. Numbers are int, float or bool, arrays of
+bytes bytes, other arrays lists, messages dicts.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping, Sized
 from typing import cast
 
 from minirospy.base.errors import DeserializationError
-from minirospy.idl.cdr import CDR_HEADER
-from minirospy.idl.type_hash import Fields
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.idl.type_hash import Fields
 
 __all__ = ["decode", "encode"]
 

@@ -12,9 +12,9 @@ from types import MappingProxyType
 from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.bridge.ros2.layouts import TypesDiffer
 from minirospy.bridge.ros2.rules import Rules, snake_case
-from minirospy.idl.load import Catalogue
-from minirospy.idl.spec import FieldType, MessageSpec, ServiceSpec
-from minirospy.idl.type_hash import Fields, type_hash
+from minirospy.core.idl.load import Catalogue
+from minirospy.core.idl.spec import FieldType, MessageSpec, ServiceSpec
+from minirospy.core.idl.type_hash import Fields, type_hash
 
 __all__ = ["NO_HASH", "Definitions"]
 

@@ -1,7 +1,7 @@
 """Messages of ROS 1 whose fields are in another order than in ROS 2: the bytes of the fields, put into the other order. Pure.
 
 A message of ROS 1 has no padding, so that the bytes of a field do not depend on its place. The generated functions of
-:mod:`minirospy.idl.cdr` then convert a message whose fields are in ROS 2's order.
+:mod:`minirospy.core.idl.cdr` then convert a message whose fields are in ROS 2's order.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-_SPARE = 10_000  # elements without bytes that a message may have beyond one for each of its bytes, as in idl/cdr.py
+_SPARE = 10_000  # elements without bytes that a message may have beyond one for each of its bytes, as in core/idl/cdr.py
 
 
 @dataclass(frozen=True)

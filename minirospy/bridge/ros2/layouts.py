@@ -12,7 +12,7 @@ from minirospy.bridge.ros2.field_order import Array, Node, Reordered, inverse, r
 from minirospy.bridge.ros2.field_order import Fixed as Wide
 from minirospy.bridge.ros2.field_order import Text as String
 from minirospy.bridge.ros2.rules import Rules, TypeRule, snake_case
-from minirospy.idl.cdr import (
+from minirospy.core.idl.cdr import (
     CDR_HEADER,
     Fixed,
     Item,
@@ -23,9 +23,9 @@ from minirospy.idl.cdr import (
     Transcoder,
     make_transcoder,
 )
-from minirospy.idl.digest import Lookup
-from minirospy.idl.spec import Field, FieldType, MessageSpec
-from minirospy.idl.validate import MOST_LEVELS, check_types
+from minirospy.core.idl.digest import Lookup
+from minirospy.core.idl.spec import Field, FieldType, MessageSpec
+from minirospy.core.idl.validate import MOST_LEVELS, check_types
 
 __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcoder"]
 

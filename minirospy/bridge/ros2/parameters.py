@@ -20,14 +20,14 @@ from minirospy.bridge.ros2.parameter_values import (
     ros2_name,
     ros2_value,
 )
-from minirospy.idl.digest import service_md5
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.digest import service_md5
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.ros2.interface import Ros2Handle, Ros2Side
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
 
 __all__ = ["ParameterBridge", "Ros1Parameters"]
 

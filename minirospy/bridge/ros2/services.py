@@ -28,12 +28,12 @@ from minirospy.bridge.ros2.reach import Reach
 from minirospy.bridge.ros2.rules import Rules
 from minirospy.bridge.ros2.service_links import ServiceLink, service_links
 from minirospy.bridge.tasks import Faults
-from minirospy.idl.cdr import CDR_HEADER, Transcoder
-from minirospy.idl.digest import service_md5
-from minirospy.idl.load import Catalogue
-from minirospy.idl.spec import MessageSpec, ServiceSpec
-from minirospy.wire.header import Header
-from minirospy.wire.tcpros import InterfaceType
+from minirospy.core.idl.cdr import CDR_HEADER, Transcoder
+from minirospy.core.idl.digest import service_md5
+from minirospy.core.idl.load import Catalogue
+from minirospy.core.idl.spec import MessageSpec, ServiceSpec
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

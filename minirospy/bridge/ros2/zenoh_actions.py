@@ -22,9 +22,9 @@ from minirospy.bridge.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
 from minirospy.bridge.ros2.zenoh_calls import ZenohClient, ZenohServer
 from minirospy.bridge.ros2.zenoh_keys import Kind
 from minirospy.bridge.ros2.zenoh_topics import ZenohPublisher, subscribe
-from minirospy.graph.goals import is_meant
-from minirospy.idl.cdr import CDR_HEADER
-from minirospy.idl.type_hash import Fields
+from minirospy.core.graph.goals import is_meant
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.idl.type_hash import Fields
 
 if TYPE_CHECKING:
     from minirospy.bridge.ros2.rclpy_actions import Accept, GoalOfRos1, Ros2Goal

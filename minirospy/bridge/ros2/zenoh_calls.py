@@ -19,8 +19,8 @@ from minirospy.base.errors import BridgeError, DeserializationError, MinirospyEr
 from minirospy.base.escape import escaped
 from minirospy.bridge.ros2.zenoh_keys import Kind, reply_attachment
 from minirospy.bridge.ros2.zenoh_node import Handle, ZenohNode
-from minirospy.idl.cdr import CDR_HEADER
-from minirospy.idl.type_hash import Fields
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.idl.type_hash import Fields
 
 if TYPE_CHECKING:
     from minirospy.bridge.ros2.zenoh_keys import Entity

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError
 from minirospy.bridge.ros2.cdr_values import decode, encode
 from minirospy.bridge.ros2.parameter_values import FIELDS, ParameterService, Value, listed
-from minirospy.idl.type_hash import Fields
+from minirospy.core.idl.type_hash import Fields
 
 if TYPE_CHECKING:
     from minirospy.bridge.ros2.interface import Ros2Side

@@ -47,9 +47,9 @@ from minirospy.bridge.json_text import load_json
 from minirospy.bridge.node_queries import AT_ONCE
 from minirospy.bridge.rosapi.typedefs import TypeDefinition, describe
 from minirospy.bridge.rosbridge.types import message_class, service_class
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.tcpros import ANY
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.wire.tcpros import ANY
 
 if TYPE_CHECKING:
     from rosapi.srv import (

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["TypeDefinition", "describe"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from minirospy.aio.handle import serialized
 from minirospy.aio.node import Node
 from minirospy.aio.topics import Publisher
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 if TYPE_CHECKING:
     from minirospy.bridge.rosbridge.session import RosbridgeSession

@@ -17,7 +17,7 @@ from typing import Any
 from minirospy.base.errors import BridgeProtocolError
 from minirospy.base.times import Duration, Time
 from minirospy.bridge.rosbridge.cbor import TYPED_ARRAYS, typed_array
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["ConversionError", "cbor_values", "fill", "request_values", "values"]
 
@@ -223,7 +223,7 @@ def _from_time(
 
 
 def _maker(type_: str) -> Callable[[], object]:
-    from minirospy.idl.load import message_class
+    from minirospy.core.idl.load import message_class
 
     return Time if type_ == "time" else Duration if type_ == "duration" else message_class(type_)
 

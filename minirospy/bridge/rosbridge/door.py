@@ -17,7 +17,7 @@ from minirospy.bridge.rosbridge.cbor import encode_cbor
 from minirospy.bridge.rosbridge.services import ClientService
 from minirospy.bridge.rosbridge.session import RosbridgeSession
 from minirospy.bridge.rosbridge.types import ArrivingTypes
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 

@@ -13,7 +13,7 @@ from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.bridge.graph import SharedGraph
 from minirospy.bridge.rosbridge import conversion, protocol
 from minirospy.bridge.rosbridge.types import service_class
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 if TYPE_CHECKING:
     from minirospy.aio.services import Service

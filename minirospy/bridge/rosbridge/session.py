@@ -29,9 +29,9 @@ from minirospy.bridge.rosbridge.subscription import Fragments, Room
 from minirospy.bridge.rosbridge.topic import MOST_IDS, ClientTopic
 from minirospy.bridge.rosbridge.types import message_class
 from minirospy.bridge.tasks import Faults
-from minirospy.idl.protocols import Message, is_stamped
+from minirospy.core.idl.protocols import Message, is_stamped
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.graph import why_illegal
-from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.bridge.rosbridge.door import RosbridgeDoor

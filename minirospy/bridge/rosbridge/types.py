@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from minirospy.base.errors import BridgeError, MinirospyError
-from minirospy.idl.load import class_from_text, get_message_class, get_service_class
-from minirospy.idl.protocols import Message, ServiceClass
-from minirospy.wire.header import Header
+from minirospy.core.idl.load import class_from_text, get_message_class, get_service_class
+from minirospy.core.idl.protocols import Message, ServiceClass
+from minirospy.core.wire.header import Header
 
 __all__ = ["ArrivingTypes", "UnknownTypeError", "message_class", "service_class"]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BridgeError
 from minirospy.bridge.video.options import Picture
-from minirospy.images.compressed import Options, decode, encode, opencv
-from minirospy.images.encodings import converted, is_converted_by_opencv
-from minirospy.images.sizes import size_of
-from minirospy.images.view import pixels
+from minirospy.core.images.compressed import Options, decode, encode, opencv
+from minirospy.core.images.encodings import converted, is_converted_by_opencv
+from minirospy.core.images.sizes import size_of
+from minirospy.core.images.view import pixels
 
 if TYPE_CHECKING:
-    from minirospy.images.encodings import Pixels
+    from minirospy.core.images.encodings import Pixels
 
 __all__ = ["COMPRESSED", "IMAGE", "MAX_PIXELS", "encoded", "work_of"]
 

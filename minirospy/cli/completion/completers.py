@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from roscpp.srv import GetLoggersResponse
 
     from minirospy.cli.ros.rospack import _Verb as PackVerb
-    from minirospy.idl.load import Catalogue
-    from minirospy.idl.spec import MessageSpec
+    from minirospy.core.idl.load import Catalogue
+    from minirospy.core.idl.spec import MessageSpec
     from minirospy.introspect.graph import Graph
     from minirospy.workspace.packages import Packages
 
@@ -384,7 +384,7 @@ def loggers(cursor: Cursor) -> Iterable[str]:
 
 
 def _catalogue() -> Catalogue:
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
 
     return Catalogue(_packages().folders())
 

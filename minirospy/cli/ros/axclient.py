@@ -17,7 +17,7 @@ from minirospy.cli.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.actionlib import SimpleActionClient
-    from minirospy.idl.protocols import Action, Message
+    from minirospy.core.idl.protocols import Action, Message
 
 __all__ = ["COMMAND", "action_class", "main", "read_answer"]
 
@@ -97,7 +97,7 @@ def action_class(type_: str) -> type[Action]:
 
     Raises NotFoundError.
     """
-    from minirospy.idl.load import get_message_class, message_class
+    from minirospy.core.idl.load import get_message_class, message_class
 
     name = type_.replace("/msg/", "/").replace("/action/", "/")
     found = get_message_class(name)
@@ -156,7 +156,7 @@ class _Progress:
         """Send the goal and wait for its end; return the exit status."""
         from actionlib_msgs.msg import GoalStatus
 
-        from minirospy.idl.message import strify_message
+        from minirospy.core.idl.message import strify_message
 
         client = self._client
         self._tell("Sent")

@@ -42,7 +42,7 @@ def _parser() -> Parser:
 def _axserver(action: str, type: str) -> None:
     from minirospy import client as rospy
     from minirospy.actionlib import SimpleActionServer
-    from minirospy.idl.message import strify_message
+    from minirospy.core.idl.message import strify_message
 
     cls = action_class(type)
     rospy.init_node("axserver", anonymous=True, disable_signals=True, disable_rosout=True)

@@ -17,7 +17,7 @@ from minirospy.cli.command import RosText, WordedError
 from minirospy.introspect.bags import open_reader
 
 if TYPE_CHECKING:
-    from minirospy.bag.base import BagReader
+    from minirospy.core.bag.base import BagReader
     from minirospy.introspect.echo import Echo, Filter
     from minirospy.introspect.topics import TopicField
 
@@ -144,7 +144,7 @@ def _global(topic: str) -> str:
 
 def show_bag(path: str, type_: str, *, raw: bool) -> None:
     """Print the definition of a type as a bag has it: unfolded, or as it is stored."""
-    from minirospy.idl.load import specs_of_text
+    from minirospy.core.idl.load import specs_of_text
     from minirospy.introspect.interfaces import describe
 
     with _opened(path, "ERROR: ") as reader:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple, TypeVar
 
 from minirospy.base.errors import MessageException, ValueTextError
-from minirospy.idl.protocols import Message, is_message
+from minirospy.core.idl.protocols import Message, is_message
 from minirospy.introspect.messages import check, fill
 from minirospy.introspect.values import parse_value
 

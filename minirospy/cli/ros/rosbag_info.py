@@ -60,7 +60,7 @@ def _info(bags: list[str], yaml: bool, key: str | None, freq: bool) -> int:
         raise Misuse("a bag file is missing", "You must specify at least 1 bag file.")
     if key and not yaml:
         raise Misuse("-k needs -y", "You can only specify key when printing in YAML format.")
-    from minirospy.bag import info
+    from minirospy.core.bag import info
     from minirospy.introspect.bags import open_reader
 
     for number, path in enumerate(bags):

@@ -16,7 +16,7 @@ from minirospy.cli.ros.rosbag_info import report, unreadable
 from minirospy.cli.verbs import Verb
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.migration import MessageMigrator, Migration
     from minirospy.introspect.migration_rules import MessageUpdateRule
 
@@ -132,7 +132,7 @@ def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpd
 
 def _ask_new_class(old_type: str) -> type[Message] | None:
     """Return the class of the type that is typed; None at the end of the input."""
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
 
     print(f"The message type {old_type} appears to have moved.  Please enter the type to migrate it to.")
     while True:

@@ -196,8 +196,8 @@ def _record(
 def _run(options: RecordOptions, *, quiet: bool) -> int:
     # Imported here: the help needs none of it.
     from minirospy import client
-    from minirospy.bag.compression import check_compression
-    from minirospy.bag.mcap_writer import check_mcap
+    from minirospy.core.bag.compression import check_compression
+    from minirospy.core.bag.mcap_writer import check_mcap
     from minirospy.recording.recorder import Recorder
 
     if options.mcap:

@@ -17,7 +17,7 @@ from minirospy.cli.parser import Parser
 from minirospy.cli.ros.rosbag_info import report
 
 if TYPE_CHECKING:
-    from minirospy.bag.records import Connection
+    from minirospy.core.bag.records import Connection
 
 __all__ = ["SCRIPTS", "main"]
 
@@ -66,7 +66,7 @@ def _with_md5sum_of_definition(connection: Connection) -> Connection:
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
     """Return the connection with the definition that its md5sum belongs to, if rules or packages have it."""
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
     from minirospy.introspect.migration import MessageMigrator
 
@@ -148,7 +148,7 @@ def _migrated(source: str, target: str, rule_files: Sequence[str]) -> bool:
 
 
 def _savemsg(words: list[str]) -> int:
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import open_reader
 
     parser = Parser("savemsg.py", "", "savemsg.py [-b <bagfile] type", missing="Message type not specified.")
@@ -180,7 +180,7 @@ def _savemsg(words: list[str]) -> int:
 
 def _makerule(words: list[str]) -> int:
     from minirospy.cli.ros import rosbag_migrate
-    from minirospy.idl.load import class_from_text
+    from minirospy.core.idl.load import class_from_text
     from minirospy.introspect.bag_migration import check_classes
 
     usage = "makerule.py msg.saved [-a] output_rulefile [rulefile1, rulefile2, ...] [-n]"

@@ -82,7 +82,7 @@ def _rosmsg_proto(
 
 
 def _prototype(mode: str, name: str, without: Sequence[str], empty_arrays: bool) -> str:
-    from minirospy.idl.load import Catalogue
+    from minirospy.core.idl.load import Catalogue
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.introspect.prototype import prototype
     from minirospy.workspace.packages import Packages

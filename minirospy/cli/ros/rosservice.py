@@ -18,7 +18,7 @@ from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     from minirospy.base.names import Arguments
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["FAMILY", "main"]
 
@@ -216,8 +216,8 @@ def _filled_request(type_: str, values: Sequence[object]) -> Message:
     try:
         return services.fill_request(type_, values)
     except MessageException as error:
-        from minirospy.idl.load import service_class
-        from minirospy.idl.message import get_printable_message_args
+        from minirospy.core.idl.load import service_class
+        from minirospy.core.idl.message import get_printable_message_args
 
         expected = get_printable_message_args(service_class(type_)._request_class())
         given = [f" * {value} (type {type(value).__name__})" for value in values]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from minirospy.base.names import Arguments
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
 
 __all__ = ["VERB"]
@@ -206,7 +206,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
 
 
 def _message_class(type_: str) -> type[Message]:
-    from minirospy.idl.load import message_class
+    from minirospy.core.idl.load import message_class
 
     try:
         return message_class(type_)
@@ -240,7 +240,7 @@ def _ros_argument_error(text: str) -> str:
 
 
 def _filled(cls: type[Message], values: list[object]) -> Message:
-    from minirospy.idl.message import get_printable_message_args
+    from minirospy.core.idl.message import get_printable_message_args
     from minirospy.introspect.echo import fill_message
 
     try:

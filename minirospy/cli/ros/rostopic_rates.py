@@ -11,7 +11,7 @@ from minirospy.base.errors import NotFoundError
 from minirospy.cli.command import tool_node, warn_unpublished
 from minirospy.cli.parser import Parser, integer
 from minirospy.cli.verbs import Verb
-from minirospy.idl.protocols import is_stamped
+from minirospy.core.idl.protocols import is_stamped
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.topics import find_topic
 

@@ -17,9 +17,9 @@ from minirospy.base.escape import escaped
 from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.urdf.describe import dot_graph, error_lines, problem_lines, tree_lines
-from minirospy.urdf.model import Robot
-from minirospy.urdf.poses import quaternion_from_rpy, rpy_from_quaternion
+from minirospy.core.urdf.describe import dot_graph, error_lines, problem_lines, tree_lines
+from minirospy.core.urdf.model import Robot
+from minirospy.core.urdf.poses import quaternion_from_rpy, rpy_from_quaternion
 
 __all__ = ["CHECK", "GRAPHIZ", "GRAPHVIZ", "check_urdf", "urdf_to_graphiz", "urdf_to_graphviz"]
 
@@ -119,7 +119,7 @@ def _picture(robot: Robot) -> str:
 
 def _read(file: str) -> Robot:
     """Return the robot of a file, its problems printed. Raises WordedError."""
-    from minirospy.urdf.read import read_robot
+    from minirospy.core.urdf.read import read_robot
 
     try:
         robot = read_robot(file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from minirospy.compat.cv_bridge.core import CvBridge, CvBridgeError
-from minirospy.images.encodings import type_of_encoding
+from minirospy.core.images.encodings import type_of_encoding
 
 __all__ = ["CvBridge", "CvBridgeError", "getCvType"]
 

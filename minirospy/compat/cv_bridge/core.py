@@ -9,14 +9,14 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from minirospy.base.installation import install_command
-from minirospy.images.compressed import decode, encode, opencv
-from minirospy.images.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
-from minirospy.images.view import pixels
+from minirospy.core.images.compressed import decode, encode, opencv
+from minirospy.core.images.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
+from minirospy.core.images.view import pixels
 
 if TYPE_CHECKING:
     import numpy
 
-    from minirospy.images.encodings import Pixels
+    from minirospy.core.images.encodings import Pixels
 
 __all__ = ["CvBridge", "CvBridgeError"]
 

@@ -19,7 +19,7 @@ from minirospy.compat.diagnostic_updater._update_functions import (
     TimeStampStatus,
     TimeStampStatusParam,
 )
-from minirospy.idl.protocols import Stamped
+from minirospy.core.idl.protocols import Stamped
 
 __all__ = ["DiagnosedPublisher", "HeaderlessTopicDiagnostic", "TopicDiagnostic"]
 

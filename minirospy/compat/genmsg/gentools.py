@@ -5,7 +5,7 @@ from __future__ import annotations
 from minirospy.compat.genmsg.msg_loader import MsgContext, lookup_in, parsed_message, parsed_service
 from minirospy.compat.genmsg.msgs import MsgSpec
 from minirospy.compat.genmsg.srvs import SrvSpec
-from minirospy.idl import digest
+from minirospy.core.idl import digest
 
 __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 

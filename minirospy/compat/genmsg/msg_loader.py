@@ -23,9 +23,9 @@ from minirospy.compat.genmsg.msgs import (
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
 from minirospy.compat.roslib.names import package_resource_name
-from minirospy.idl import digest
-from minirospy.idl.parse import parse_message, parse_service
-from minirospy.idl.spec import MessageSpec, ServiceSpec
+from minirospy.core.idl import digest
+from minirospy.core.idl.parse import parse_message, parse_service
+from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 
 __all__ = [
     "MsgContext",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import DefinitionError
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["generate_dynamic"]
 
@@ -17,7 +17,7 @@ def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
 
     Raises InvalidMsgSpec, MsgNotFound where the text lacks a type, MsgGenerationException where a part of it is unnamed.
     """
-    from minirospy.idl import load
+    from minirospy.core.idl import load
 
     try:
         return dict(load.classes_from_text(core_type, msg_cat))

@@ -24,7 +24,7 @@ from minirospy.compat.genmsg.msg_loader import (
 from minirospy.compat.genmsg.msgs import Constant, MsgSpec
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
-from minirospy.idl.emit import emit_message, emit_service
+from minirospy.core.idl.emit import emit_message, emit_service
 
 __all__ = [
     "Generator",

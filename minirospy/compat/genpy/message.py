@@ -11,7 +11,7 @@ import struct
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message, ServiceClass
+    from minirospy.core.idl.protocols import Message, ServiceClass
 
 __all__ = [
     "RosMsgUnicodeErrors",
@@ -55,14 +55,14 @@ def register_unicode_errors() -> None:
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Message] | None:
     """Return the class of ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
-    from minirospy.idl import load
+    from minirospy.core.idl import load
 
     return load.get_message_class(_checked(message_type))
 
 
 def get_service_class(service_type: str, reload_on_error: bool = False) -> ServiceClass | None:
     """Return the class of the service ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
-    from minirospy.idl import load
+    from minirospy.core.idl import load
 
     return load.get_service_class(_checked(service_type))
 

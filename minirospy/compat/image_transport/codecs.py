@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from sensor_msgs.msg import CompressedImage, Image
 
 from minirospy.compat.cv_bridge.core import CvBridge, CvBridgeError
-from minirospy.images.compressed import Options, decode, encode
+from minirospy.core.images.compressed import Options, decode, encode
 
 if TYPE_CHECKING:
-    from minirospy.images.encodings import Pixels
+    from minirospy.core.images.encodings import Pixels
 
 __all__ = [
     "CodecError",

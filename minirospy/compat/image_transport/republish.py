@@ -27,7 +27,7 @@ from minirospy.compat.image_transport.codecs import (
     uncompressed,
     uncompressed_depth,
 )
-from minirospy.images.compressed import require_library
+from minirospy.core.images.compressed import require_library
 
 __all__ = ["Republisher", "list_main", "main", "settings_of"]
 

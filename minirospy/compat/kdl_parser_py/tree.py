@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from minirospy.urdf.model import Joint as UrdfJoint
-from minirospy.urdf.model import JointType, Robot
-from minirospy.urdf.poses import Pose
-from minirospy.urdf.poses import Segment as JointSegment
+from minirospy.core.urdf.model import Joint as UrdfJoint
+from minirospy.core.urdf.model import JointType, Robot
+from minirospy.core.urdf.poses import Pose
+from minirospy.core.urdf.poses import Segment as JointSegment
 
 __all__ = ["Chain", "Joint", "Segment", "Tree", "tree_of"]
 

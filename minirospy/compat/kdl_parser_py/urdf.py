@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from minirospy.compat.kdl_parser_py.tree import Tree, tree_of
-from minirospy.urdf.read import parse_robot, read_robot
+from minirospy.core.urdf.read import parse_robot, read_robot
 
 __all__ = ["treeFromFile", "treeFromParam", "treeFromString", "treeFromUrdfModel"]
 

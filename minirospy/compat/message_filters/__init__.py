@@ -15,7 +15,7 @@ from minirospy.base.times import Duration, Time
 from minirospy.client.session import current_session
 from minirospy.client.time import is_wallclock
 from minirospy.compat.message_filters.stamps import StampQueue, closest_stamps
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,11 +14,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from minirospy.bag import compression as compressions
-from minirospy.bag import info
-from minirospy.bag.reader import ChunkedReader
-from minirospy.bag.reader12 import Reader12
-from minirospy.bag.repair import Repair
 from minirospy.base.errors import BagCompressionError, BagError
 from minirospy.compat.rosbag.exceptions import (
     ROSBagEncryptException,
@@ -38,10 +33,15 @@ from minirospy.compat.rosbag.private import (
     nanoseconds_of,
 )
 from minirospy.compat.rosbag.readers import _BagReader, _BagReader200
+from minirospy.core.bag import compression as compressions
+from minirospy.core.bag import info
+from minirospy.core.bag.reader import ChunkedReader
+from minirospy.core.bag.reader12 import Reader12
+from minirospy.core.bag.repair import Repair
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "Bag",
@@ -475,7 +475,7 @@ def _header(topic: str, kind: type[Message]) -> dict[str, str]:
 
 def _raw_header(topic: str, type_: str, md5sum: str, kind: type[Message] | None) -> dict[str, str]:
     if kind is None:
-        from minirospy.idl.load import get_message_class
+        from minirospy.core.idl.load import get_message_class
 
         kind = get_message_class(type_)
     if kind is None:

@@ -11,11 +11,11 @@ from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagFormatExce
 from minirospy.introspect.bags import class_of
 
 if TYPE_CHECKING:
-    from minirospy.bag.chunks import StoredChunk
-    from minirospy.bag.index import ConnectionIndex, Entry
-    from minirospy.bag.records import ChunkInfo, Connection
     from minirospy.client.time import Time
-    from minirospy.idl.protocols import Message
+    from minirospy.core.bag.chunks import StoredChunk
+    from minirospy.core.bag.index import ConnectionIndex, Entry
+    from minirospy.core.bag.records import ChunkInfo, Connection
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["Header", "make_time"]
 

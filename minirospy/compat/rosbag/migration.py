@@ -26,7 +26,7 @@ from minirospy.introspect.migration_rules import (
 )
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "BagMigrationException",

@@ -7,14 +7,14 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO, TypeAlias, cast
 
-from minirospy.bag.base import BagReader
-from minirospy.bag.reader import ChunkedReader, open_bag
-from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.bag.records import ChunkInfo, Connection, read_version
-from minirospy.bag.writer import BagWriter, Continued
 from minirospy.base.errors import BagUnindexedError
 from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagUnindexedException
 from minirospy.compat.rosbag.private import PrivateBag
+from minirospy.core.bag.base import BagReader
+from minirospy.core.bag.reader import ChunkedReader, open_bag
+from minirospy.core.bag.reader12 import unindexed_bag12
+from minirospy.core.bag.records import ChunkInfo, Connection, read_version
+from minirospy.core.bag.writer import BagWriter, Continued
 
 __all__ = ["CLOSED", "FileArgument", "OpenedBag"]
 

@@ -6,8 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.bag.compression import NONE
-from minirospy.bag.index import merge_entries
 from minirospy.base.names import canonicalize
 from minirospy.base.times import Time
 from minirospy.compat.rosbag.exceptions import as_ros_errors
@@ -21,11 +19,13 @@ from minirospy.compat.rosbag.internals import (
     _IndexEntry,
     make_time,
 )
+from minirospy.core.bag.compression import NONE
+from minirospy.core.bag.index import merge_entries
 
 if TYPE_CHECKING:
-    from minirospy.bag.base import BagReader, Position
     from minirospy.client.time import Time as RospyTime
-    from minirospy.idl.protocols import Message
+    from minirospy.core.bag.base import BagReader, Position
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["BagMessage", "BagMessageWithConnectionHeader", "ConnectionFilter", "PrivateBag", "nanoseconds_of"]
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from minirospy.bag.base import Position
     from minirospy.base.times import Time
     from minirospy.compat.rosbag.bag import Bag
     from minirospy.compat.rosbag.private import BagMessage, BagMessageWithConnectionHeader, ConnectionFilter
+    from minirospy.core.bag.base import Position
 
 __all__: list[str] = []
 

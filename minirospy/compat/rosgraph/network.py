@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from minirospy.base.environment import Environment, is_local
 from minirospy.base.errors import WireError
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
-from minirospy.wire.framing import LENGTH_BYTES, parse_length
-from minirospy.wire.header import parse_header
+from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
+from minirospy.core.wire.header import parse_header
 
 if TYPE_CHECKING:
     from io import BytesIO

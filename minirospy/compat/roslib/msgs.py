@@ -1,6 +1,6 @@
 """roslib.msgs: queries about types, with genmsg's functions under their former names."""
 
-from minirospy.idl.load import Catalogue
+from minirospy.core.idl.load import Catalogue
 from minirospy.workspace.packages import Packages
 
 __all__ = ["EXT", "SEP", "MsgSpecException", "list_msg_types"]

@@ -1,6 +1,6 @@
 """rosmaster.master_api: the Master API as an object with a method for each call, which a program may serve or call itself.
 
-The answers are those of ``graph/master_api.py``. Nodes are notified from a thread of this object.
+The answers are those of ``core/graph/master_api.py``. Nodes are notified from a thread of this object.
 Source: http://wiki.ros.org/ROS/Master_API.
 """
 
@@ -15,10 +15,10 @@ from xmlrpc.client import Error
 
 from minirospy.base.steps import Steps, finish
 from minirospy.compat.rosmaster.util import xmlrpcapi
-from minirospy.graph.calls import ERROR, Answer
-from minirospy.graph.master_api import MasterApi, Notice
-from minirospy.graph.parameters import ParameterTree, ParameterUpdate
-from minirospy.graph.registry import NodeShutdown
+from minirospy.core.graph.calls import ERROR, Answer
+from minirospy.core.graph.master_api import MasterApi, Notice
+from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
+from minirospy.core.graph.registry import NodeShutdown
 
 __all__ = ["ROSMasterHandler"]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from minirospy.graph.parameters import ParameterTree, ParameterUpdate
+from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
 
 __all__ = ["ParamDictionary"]
 

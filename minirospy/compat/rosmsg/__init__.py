@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from minirospy.compat.genmsg.msg_loader import MsgContext
     from minirospy.compat.genmsg.msgs import MsgSpec
     from minirospy.compat.rospkg.rospack import RosPack
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "MODE_MSG",

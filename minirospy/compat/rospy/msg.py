@@ -7,10 +7,10 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import DeserializationError
-from minirospy.idl.message import number_header
+from minirospy.core.idl.message import number_header
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = ["deserialize_messages", "serialize_message"]
 

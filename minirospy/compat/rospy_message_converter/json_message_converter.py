@@ -8,7 +8,7 @@ from minirospy.compat.rospy_message_converter.message_converter import (
     convert_dictionary_to_ros_message,
     convert_ros_message_to_dictionary,
 )
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["convert_json_to_ros_message", "convert_ros_message_to_json"]
 

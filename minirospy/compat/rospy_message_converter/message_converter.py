@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from minirospy import client as rospy
-from minirospy.idl.load import message_class, service_class
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.load import message_class, service_class
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["convert_dictionary_to_ros_message", "convert_ros_message_to_dictionary"]
 

@@ -21,7 +21,7 @@ from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message, ServiceClass
+    from minirospy.core.idl.protocols import Message, ServiceClass
 
 __all__ = [
     "NAME",
@@ -95,7 +95,7 @@ def get_service_args(service_name: str) -> str:
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
     """Return the class of a running service. Raises ROSServiceException where it does not exist or is not installed."""
-    from minirospy.idl.load import service_class
+    from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
         return service_class(services.service_type(graph, _sent(graph, service_name)))

@@ -20,7 +20,7 @@ from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     from minirospy.client.publisher import Publisher
-    from minirospy.idl.protocols import Message
+    from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "NAME",
@@ -84,7 +84,7 @@ def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
     """Return the same as :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
-    from minirospy.idl.load import get_message_class
+    from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
     if type_ is None:

@@ -19,7 +19,7 @@ from minirospy.introspect.rates import (
 
 if TYPE_CHECKING:
     from minirospy.client.topics import AnyMsg
-    from minirospy.idl.protocols import Stamped
+    from minirospy.core.idl.protocols import Stamped
 
 __all__ = ["ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicHz"]
 

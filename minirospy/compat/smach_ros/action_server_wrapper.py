@@ -11,7 +11,7 @@ from minirospy.actionlib.simple_server import SimpleActionServer
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
 from minirospy.compat.smach.user_data import Remapper, UserData
-from minirospy.idl.protocols import Action, Message
+from minirospy.core.idl.protocols import Action, Message
 
 __all__ = ["ActionServerWrapper"]
 

@@ -17,7 +17,7 @@ from minirospy.compat import rostopic
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.user_data import UserData
 from minirospy.compat.smach_ros.pickled import pickle_userdata, unpickle_userdata
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = [
     "INIT_TOPIC",

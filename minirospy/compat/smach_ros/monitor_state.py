@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from minirospy import client as rospy
 from minirospy.compat.smach.state import State
 from minirospy.compat.smach.user_data import Values
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["MonitorState"]
 

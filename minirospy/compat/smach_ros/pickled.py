@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 from minirospy.base.times import Duration, Time
 from minirospy.client.time import Duration as RosDuration
 from minirospy.client.time import Time as RosTime
-from minirospy.idl.load import get_message_class, get_service_class
+from minirospy.core.idl.load import get_message_class, get_service_class
 
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 

@@ -9,7 +9,7 @@ from minirospy import client as rospy
 from minirospy.compat.smach.state import State
 from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach_ros.callbacks import StateCallback
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["ServiceState"]
 

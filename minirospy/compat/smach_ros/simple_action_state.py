@@ -16,7 +16,7 @@ from minirospy.compat.smach.exceptions import InvalidStateError
 from minirospy.compat.smach.state import State
 from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach_ros.callbacks import StateCallback
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["SimpleActionState"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from minirospy import client as rospy
 from minirospy.client.topics import Publisher, SubscribeListener
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["LazyTransport", "MetaLazyTransport"]
 

@@ -18,9 +18,9 @@ from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError
 from minirospy.base.yaml_text import safe_load
 from minirospy.compat import rostopic
-from minirospy.idl.load import message_class
-from minirospy.idl.message import fill_message_args
-from minirospy.idl.protocols import Message
+from minirospy.core.idl.load import message_class
+from minirospy.core.idl.message import fill_message_args
+from minirospy.core.idl.protocols import Message
 
 __all__ = ["relay_field_main", "transform_main"]
 

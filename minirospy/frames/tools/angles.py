@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from minirospy.tf2.rotation import Quaternion, Vector
+from minirospy.core.tf2.rotation import Quaternion, Vector
 
 __all__ = ["euler_of_matrix", "rpy_of_matrix"]
 

@@ -15,12 +15,12 @@ from geometry_msgs.msg import TransformStamped
 from minirospy import client as rospy
 from minirospy.base.errors import ExtrapolationException, LookupException, TransformException
 from minirospy.base.escape import escaped
+from minirospy.core.tf2.rotation import Quaternion, Vector
+from minirospy.core.urdf.values import NotANumberError, as_float
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.frames.tools.program import ToolError, run_program
-from minirospy.tf2.rotation import Quaternion, Vector
-from minirospy.urdf.values import NotANumberError, as_float
 
 __all__ = ["main_tf", "main_tf2"]
 

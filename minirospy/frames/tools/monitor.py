@@ -15,11 +15,11 @@ from collections.abc import Iterator, Sequence
 from minirospy import client as rospy
 from minirospy.base.errors import DeserializationError, TransformException
 from minirospy.base.escape import escaped
+from minirospy.core.tf2.pending import read_transforms
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.messages import LazyTFMessage
 from minirospy.frames.tools.program import ToolError, report, run_program
-from minirospy.tf2.pending import read_transforms
 
 __all__ = ["Delays", "main"]
 

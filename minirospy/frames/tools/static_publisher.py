@@ -12,10 +12,10 @@ from std_msgs.msg import Header
 
 from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError
+from minirospy.core.urdf.poses import quaternion_from_rpy
+from minirospy.core.urdf.values import NotANumberError, as_float
 from minirospy.frames.broadcasters import StaticTransformBroadcaster, TransformBroadcaster
 from minirospy.frames.tools.program import ToolError, run_program
-from minirospy.urdf.poses import quaternion_from_rpy
-from minirospy.urdf.values import NotANumberError, as_float
 
 __all__ = ["main_tf", "main_tf2"]
 

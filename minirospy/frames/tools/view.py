@@ -19,10 +19,10 @@ from tf2_msgs.srv import FrameGraph as Tf2FrameGraph
 
 from minirospy import client as rospy
 from minirospy.base.tree_svg import Edge, tree_svg
+from minirospy.core.tf2.listing import escaped_name
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.tools.program import ToolError, run_program
-from minirospy.tf2.listing import escaped_name
 
 __all__ = ["FrameRecord", "main_tf", "main_tf2", "read_edges", "read_records", "tf2_graph"]
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import DeserializationError
+from minirospy.core.tf2.insertion import faults_of
+from minirospy.core.tf2.pending import read_transforms
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import SystemState
-from minirospy.tf2.insertion import faults_of
-from minirospy.tf2.pending import read_transforms
-from minirospy.wire.framing import Frame
-from minirospy.wire.header import Header
 
 __all__ = ["Observation", "check_frames", "frame_findings"]
 

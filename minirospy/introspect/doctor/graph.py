@@ -330,7 +330,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
     """Return what to do, where the publisher's definition of the type is another than this machine's; else ""."""
-    from minirospy.idl.load import message_class
+    from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
     try:
@@ -345,7 +345,7 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 def _probe_service(graph: Graph, name: str) -> str:
     """Return what is wrong with a service's type; "": nothing. Raise as ServiceClient, and RpcRefused where it has gone."""
-    from minirospy.idl.load import service_class
+    from minirospy.core.idl.load import service_class
     from minirospy.runtime.node.service_client import ServiceClient
 
     uri = graph.master.lookup_service(name)

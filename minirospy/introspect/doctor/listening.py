@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterator
 from io import BytesIO
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError, RpcRefused
-from minirospy.idl.load import service_class
+from minirospy.core.idl.load import service_class
+from minirospy.core.wire.header import Header
 from minirospy.introspect.doctor.findings import Finding, ok, problem
 from minirospy.introspect.doctor.graph import Answers, node_trouble
 from minirospy.introspect.doctor.master import clock_finding
@@ -33,7 +34,6 @@ from minirospy.introspect.doctor.reach import (
 from minirospy.introspect.graph import Graph
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.rpc.master_proxy import SystemState
-from minirospy.wire.header import Header
 
 __all__ = ["check_listeners", "listen", "listeners"]
 

@@ -8,11 +8,11 @@ import time
 from collections.abc import Iterator
 
 from minirospy.base.errors import MasterUnreachableError, RpcError, RpcFault
+from minirospy.core.wire.http import serialize_request
+from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import CONNECT_SECONDS, RESUME, Fault, MasterPlace, Trouble, trouble_of
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.wire.http import serialize_request
-from minirospy.wire.xmlrpc import serialize_call
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
 

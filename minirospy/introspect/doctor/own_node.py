@@ -13,7 +13,9 @@ from types import TracebackType
 from minirospy.base import names
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError
-from minirospy.idl.load import message_class, service_class
+from minirospy.core.idl.load import message_class, service_class
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.doctor.findings import Finding, ok, problem
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
@@ -30,8 +32,6 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import SlaveProxy
 from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.tcpros import InterfaceType
 
 __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unreached_finding"]
 

@@ -24,10 +24,10 @@ from minirospy.base.errors import (
     RpcUnreachable,
     WireError,
 )
+from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
+from minirospy.core.wire.header import MAX_HEADER, Header, parse_header, serialize_header
+from minirospy.core.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 from minirospy.runtime.rpc.master_proxy import SlaveProxy
-from minirospy.wire.framing import LENGTH_BYTES, parse_length
-from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
-from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 
 __all__ = [
     "CONNECT_SECONDS",

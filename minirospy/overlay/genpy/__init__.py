@@ -6,7 +6,7 @@ from genpy import message as message
 from genpy import rostime as rostime
 from minirospy.base.times import Duration, Time, TVal
 from minirospy.compat.genpy.message import struct_I
-from minirospy.idl.message import DeserializationError, Message, MessageException, SerializationError
+from minirospy.core.idl.message import DeserializationError, Message, MessageException, SerializationError
 
 __all__ = [
     "DeserializationError",

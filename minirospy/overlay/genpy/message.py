@@ -9,7 +9,7 @@ from minirospy.compat.genpy.message import (
     isstring,
     struct_I,
 )
-from minirospy.idl.message import (
+from minirospy.core.idl.message import (
     DeserializationError,
     Message,
     MessageException,

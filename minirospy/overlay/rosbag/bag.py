@@ -18,8 +18,6 @@ __all__ = [
     "ROSBagEncryptNotSupportedException", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException",
     "found_lz4",
 ]  # fmt: skip
-from minirospy.bag.info import _human_frequency as _human_readable_frequency
-from minirospy.bag.info import _human_size as _human_readable_size
 from minirospy.compat.rosbag.internals import _ChunkHeader as _ChunkHeader
 from minirospy.compat.rosbag.internals import _ChunkInfo as _ChunkInfo
 from minirospy.compat.rosbag.internals import _ConnectionInfo as _ConnectionInfo
@@ -28,3 +26,5 @@ from minirospy.compat.rosbag.internals import _IndexEntry as _IndexEntry
 from minirospy.compat.rosbag.internals import _message_types as _message_types
 from minirospy.compat.rosbag.readers import _BagReader as _BagReader
 from minirospy.compat.rosbag.readers import _BagReader200 as _BagReader200
+from minirospy.core.bag.info import _human_frequency as _human_readable_frequency
+from minirospy.core.bag.info import _human_size as _human_readable_size

@@ -13,8 +13,8 @@ from minirospy.compat.rospy.core import topics_logger as _logger
 from minirospy.compat.rospy.msg import serialize_message as serialize_message
 from minirospy.compat.rospy.passing import topics_dir as __dir__
 from minirospy.compat.rospy.passing import topics_getattr as __getattr__
-from minirospy.idl.message import Message as Message
-from minirospy.idl.message import args_kwds_to_message as args_kwds_to_message
+from minirospy.core.idl.message import Message as Message
+from minirospy.core.idl.message import args_kwds_to_message as args_kwds_to_message
 from rospy.impl.registration import Registration as Registration
 from rospy.impl.registration import get_topic_manager as get_topic_manager
 from rospy.impl.tcpros_base import DEFAULT_BUFF_SIZE as DEFAULT_BUFF_SIZE

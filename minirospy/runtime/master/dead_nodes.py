@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping
 
 from minirospy.base.errors import RpcError, RpcUnreachable
-from minirospy.graph.shares import holder_of
+from minirospy.core.graph.shares import holder_of
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 
 __all__ = ["find_dead"]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from minirospy.base import private_files
 from minirospy.base.steps import PAUSE, Steps, finish, is_small
-from minirospy.wire.journal import HEAD, Recovered, pack_in_steps, parse_journal, serialize_record
+from minirospy.core.wire.journal import HEAD, Recovered, pack_in_steps, parse_journal, serialize_record
 
 __all__ = ["RETRY_SECONDS", "Journal", "JournalBusyError", "Left", "boot_id"]
 

@@ -1,6 +1,6 @@
 """The master: its server, its calls to nodes, its journal, and the look at the nodes of a master that was killed.
 
-What it answers is in ``graph/master_api.py``.
+What it answers is in ``core/graph/master_api.py``.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ import minirospy
 from minirospy.base.closing import close_all
 from minirospy.base.errors import MinirospyError, RpcError, RpcUnreachable
 from minirospy.base.steps import ALONE, Steps, finish
-from minirospy.graph.calls import Answer
-from minirospy.graph.master_api import MasterApi, Notice, nothing
-from minirospy.graph.parameters import ParameterTree, ParameterUpdate
-from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
+from minirospy.core.graph.calls import Answer
+from minirospy.core.graph.master_api import MasterApi, Notice, nothing
+from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
+from minirospy.core.graph.registry import NodeShutdown, PublisherUpdate, Registry
+from minirospy.core.wire.http import MAX_BODY
+from minirospy.core.wire.xmlrpc import Serialized, serialize_response_in_steps
 from minirospy.runtime.master.dead_nodes import find_dead
 from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.master.notifier import Notifier
@@ -32,8 +34,6 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.http import MAX_BODY
-from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 if TYPE_CHECKING:
     from minirospy.runtime.master.journal import Journal, Left

@@ -13,13 +13,13 @@ from typing import Protocol
 
 from minirospy.base.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.base.steps import ALONE, Steps, is_small
-from minirospy.graph.master_api import PARAMETERS, Notice
-from minirospy.graph.parameters import ParameterUpdate
-from minirospy.graph.registry import PublisherUpdate
+from minirospy.core.graph.master_api import PARAMETERS, Notice
+from minirospy.core.graph.parameters import ParameterUpdate
+from minirospy.core.graph.registry import PublisherUpdate
+from minirospy.core.wire.http import MAX_BODY, Body
+from minirospy.core.wire.xmlrpc import serialize_call, serialize_call_in_steps
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.wire.http import MAX_BODY, Body
-from minirospy.wire.xmlrpc import serialize_call, serialize_call_in_steps
 
 __all__ = ["Notifier", "State"]
 

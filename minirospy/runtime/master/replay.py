@@ -10,10 +10,10 @@ from itertools import chain
 from typing import Any
 
 from minirospy.base.steps import finish
-from minirospy.graph.master_api import Notice, key_of_node
-from minirospy.graph.parameters import ParameterTree, weigh_in_steps
-from minirospy.graph.registry import NodeShutdown, Registry
-from minirospy.wire.journal import unpack
+from minirospy.core.graph.master_api import Notice, key_of_node
+from minirospy.core.graph.parameters import ParameterTree, weigh_in_steps
+from minirospy.core.graph.registry import NodeShutdown, Registry
+from minirospy.core.wire.journal import unpack
 
 __all__ = ["Replay", "changes_to", "forget_node"]
 

@@ -15,6 +15,7 @@ from typing import Any
 from minirospy.base.closing import close_all, close_each
 from minirospy.base.environment import Environment
 from minirospy.base.errors import WireError
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi
@@ -25,7 +26,6 @@ from minirospy.runtime.transport import local, tcp
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.readers import ReaderSet
 from minirospy.runtime.transport.workers import InOrder, Workers
-from minirospy.wire.tcpros import InterfaceType
 
 __all__ = ["Node"]
 

@@ -14,11 +14,11 @@ from typing import Any
 
 from minirospy.base.environment import split_uri
 from minirospy.base.errors import CallFailed, WireError
+from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
+from minirospy.core.wire.header import MAX_HEADER, Header, parse_header, serialize_header
+from minirospy.core.wire.service import RESPONSE_HEAD, parse_response_head, serialize_request
+from minirospy.core.wire.tcpros import check_service, service_client_header
 from minirospy.runtime.transport import local, sockets
-from minirospy.wire.framing import LENGTH_BYTES, parse_length
-from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
-from minirospy.wire.service import RESPONSE_HEAD, parse_response_head, serialize_request
-from minirospy.wire.tcpros import check_service, service_client_header
 
 __all__ = ["PeerEndedError", "Reader", "ServiceClient", "parse_service_uri"]
 

@@ -15,12 +15,8 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from minirospy.base.errors import CallFailed, ServiceException, ThreadLimitError, WireError
-from minirospy.runtime.node.service_client import PeerEndedError, Reader, parse_service_uri
-from minirospy.runtime.transport import local, sockets, tcp
-from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.runtime.transport.workers import Workers
-from minirospy.wire.header import Header
-from minirospy.wire.service import (
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.service import (
     REQUEST_HEAD,
     RESPONSE_HEAD,
     parse_request_head,
@@ -29,13 +25,17 @@ from minirospy.wire.service import (
     serialize_request,
     serialize_response,
 )
-from minirospy.wire.tcpros import (
+from minirospy.core.wire.tcpros import (
     InterfaceType,
     check_service,
     check_service_client,
     service_client_header,
     service_header,
 )
+from minirospy.runtime.node.service_client import PeerEndedError, Reader, parse_service_uri
+from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+from minirospy.runtime.transport.workers import Workers
 
 __all__ = [
     "AsyncHandler",

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from minirospy.base import names
-from minirospy.graph.calls import (
+from minirospy.core.graph.calls import (
     ERROR,
     FAILURE,
     SUCCESS,

@@ -28,7 +28,16 @@ from minirospy.base.errors import (
     WireError,
 )
 from minirospy.base.steps import Steps
-from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
+from minirospy.core.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
+from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame
+from minirospy.core.wire.header import Header, serialize_header
+from minirospy.core.wire.tcpros import (
+    InterfaceType,
+    check_publisher,
+    check_subscriber,
+    publisher_header,
+    subscriber_header,
+)
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
@@ -36,15 +45,6 @@ from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.readers import ReaderSet, read_frames, watch_frames, watch_frames_in_turns
 from minirospy.runtime.transport.workers import Workers
-from minirospy.wire.framing import CHUNK, Frame, LargeFrame
-from minirospy.wire.header import Header, serialize_header
-from minirospy.wire.tcpros import (
-    InterfaceType,
-    check_publisher,
-    check_subscriber,
-    publisher_header,
-    subscriber_header,
-)
 
 __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unreachable"]
 

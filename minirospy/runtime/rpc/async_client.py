@@ -12,11 +12,7 @@ from functools import partial
 from typing import Any
 
 from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
-from minirospy.runtime.rpc.client import parse_http_uri
-from minirospy.runtime.transport import local, tcp
-from minirospy.runtime.transport.deadlines import Deadlines
-from minirospy.runtime.transport.limits import explain
-from minirospy.wire.http import (
+from minirospy.core.wire.http import (
     MAX_BODY,
     Body,
     HttpMessage,
@@ -24,7 +20,11 @@ from minirospy.wire.http import (
     serialize_request,
     serialize_request_head,
 )
-from minirospy.wire.xmlrpc import parse_response, serialize_call
+from minirospy.core.wire.xmlrpc import parse_response, serialize_call
+from minirospy.runtime.rpc.client import parse_http_uri
+from minirospy.runtime.transport import local, tcp
+from minirospy.runtime.transport.deadlines import Deadlines
+from minirospy.runtime.transport.limits import explain
 
 __all__ = ["AsyncRpcClient", "Call"]
 

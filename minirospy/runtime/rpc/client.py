@@ -9,10 +9,10 @@ from typing import Any
 
 from minirospy.base.environment import split_uri
 from minirospy.base.errors import RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.core.wire.http import HttpMessage, HttpReader, serialize_request
+from minirospy.core.wire.xmlrpc import parse_response, serialize_call
 from minirospy.runtime.transport import local, sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
-from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
-from minirospy.wire.xmlrpc import parse_response, serialize_call
 
 __all__ = ["RpcClient", "parse_http_uri"]
 

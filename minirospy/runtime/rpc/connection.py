@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.base.errors import RpcFault, RpcProtocolError
 from minirospy.base.steps import ALONE, SHORT_ITEMS, Steps, is_small
-from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
-from minirospy.wire.http import (
+from minirospy.core.wire.http import (
     MAX_BODY,
     HttpMessage,
     HttpReader,
@@ -25,9 +24,10 @@ from minirospy.wire.http import (
     serialize_response,
     serialize_response_head,
 )
-from minirospy.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
-from minirospy.wire.xmlrpc import serialize_response as serialize_value
-from minirospy.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
+from minirospy.core.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
+from minirospy.core.wire.xmlrpc import serialize_response as serialize_value
+from minirospy.core.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
+from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
 
 if TYPE_CHECKING:
     from minirospy.runtime.rpc.server import RpcServer

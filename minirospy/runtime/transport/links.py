@@ -14,8 +14,8 @@ from collections import deque
 from collections.abc import Callable
 from itertools import islice
 
+from minirospy.core.wire.framing import LargeFrame
 from minirospy.runtime.transport.sockets import FAMILIES, is_writable
-from minirospy.wire.framing import LargeFrame
 
 __all__ = ["OutLink"]
 

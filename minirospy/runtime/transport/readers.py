@@ -17,8 +17,7 @@ from typing import Protocol
 
 from minirospy.base.errors import WireError
 from minirospy.base.steps import Steps
-from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
-from minirospy.wire.framing import (
+from minirospy.core.wire.framing import (
     CHUNK,
     LENGTH_BYTES,
     MAX_FRAME,
@@ -30,6 +29,7 @@ from minirospy.wire.framing import (
     parse_length,
     split_sizes,
 )
+from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 

@@ -15,11 +15,11 @@ import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 
 from minirospy.base.errors import WireError
+from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
+from minirospy.core.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 from minirospy.runtime.transport import sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import LENGTH_BYTES, parse_length
-from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [
     "MOST_HANDSHAKES",

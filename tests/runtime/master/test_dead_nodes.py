@@ -7,8 +7,8 @@ import socket
 
 import pytest
 
-from minirospy.graph.registry import Registry
-from minirospy.graph.shares import Shares
+from minirospy.core.graph.registry import Registry
+from minirospy.core.graph.shares import Shares
 from minirospy.runtime.master import dead_nodes
 from minirospy.runtime.master import master as masters
 from minirospy.runtime.master.master import Master

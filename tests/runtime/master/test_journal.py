@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 from minirospy.base.steps import PAUSE, Steps, finish
+from minirospy.core.wire.journal import HEAD, parse_journal, serialize_record, unpack
 from minirospy.runtime.master import journal as journal_module
 from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError, boot_id
-from minirospy.wire.journal import HEAD, parse_journal, serialize_record, unpack
 from tests.waiting import wait_until
 
 MIB = 1024 * 1024

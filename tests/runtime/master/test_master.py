@@ -19,10 +19,10 @@ import pytest
 
 from minirospy.base.escape import has_controls
 from minirospy.base.steps import finish
+from minirospy.core.wire.xmlrpc import Serialized, serialize_response
 from minirospy.runtime.master import notifier
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.replay import Replay, changes_to
-from minirospy.wire.xmlrpc import Serialized, serialize_response
 from tests.runtime.master.master_calls import CALLS, SCENE
 
 HERE = Path(__file__).parent

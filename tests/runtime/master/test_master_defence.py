@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from minirospy.base.environment import Environment
 from minirospy.base.errors import RpcFault, UsageError
 from minirospy.base.steps import finish
+from minirospy.core.wire.xmlrpc import parse_response, serialize_response
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.replay import Replay, changes_to
 from minirospy.runtime.node.node import Node
@@ -26,7 +27,6 @@ from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as rpc_server
 from minirospy.runtime.transport.access import Access, listening_lines
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.xmlrpc import parse_response, serialize_response
 
 DOCS = Path(__file__).parents[3] / "docs" / "master.md"
 

@@ -23,6 +23,8 @@ from xmlrpc.client import Fault, ServerProxy
 import pytest
 
 from minirospy.base.errors import RpcFault, RpcUnreachable
+from minirospy.core.wire.journal import HEAD, parse_journal
+from minirospy.core.wire.xmlrpc import parse_response, serialize_response
 from minirospy.runtime.master import journal as journal_module
 from minirospy.runtime.master import master as master_module
 from minirospy.runtime.master.journal import Journal
@@ -30,8 +32,6 @@ from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.replay import Replay
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.journal import HEAD, parse_journal
-from minirospy.wire.xmlrpc import parse_response, serialize_response
 from tests.conftest import free_port
 from tests.waiting import until, wait_until
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import pytest
 
 from minirospy.base.errors import RpcError, RpcUnreachable
-from minirospy.graph.parameters import ParameterUpdate
-from minirospy.graph.registry import NodeShutdown, PublisherUpdate
+from minirospy.core.graph.parameters import ParameterUpdate
+from minirospy.core.graph.registry import NodeShutdown, PublisherUpdate
+from minirospy.core.wire.xmlrpc import parse_call
 from minirospy.runtime.master import notifier as notifier_module
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.wire.xmlrpc import parse_call
 from tests.manual_loop import ManualLoop, run_manually
 
 ANSWER = b"<methodResponse/>"

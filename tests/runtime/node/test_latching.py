@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.tcpros import InterfaceType
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
 MEANWHILE = 0.3

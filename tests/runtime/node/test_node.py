@@ -14,6 +14,7 @@ import pytest
 from minirospy.base.environment import Environment
 from minirospy.base.errors import RpcFault
 from minirospy.base.steps import finish
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node import node as node_module
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.slave import SlaveApi
@@ -21,7 +22,6 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.wire.tcpros import InterfaceType
 
 NO_MASTER = {"ROS_MASTER_URI": "http://127.0.0.1:1", "ROS_IP": "127.0.0.1"}
 

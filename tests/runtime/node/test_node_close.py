@@ -10,13 +10,13 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import RpcFault, RpcUnreachable
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node import registration
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.wire.tcpros import InterfaceType
 from tests.manual_loop import ManualLoop, run_manually, until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

@@ -13,11 +13,11 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import CallFailed, HandshakeRefused, ServiceException, WireError
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient, parse_service_uri
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.tcpros import ANY, InterfaceType
 from tests.conftest import free_port
 
 TYPE = InterfaceType("a/B", "0" * 32)

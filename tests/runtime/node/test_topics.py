@@ -22,6 +22,9 @@ from minirospy.base.errors import (
     ThreadLimitError,
     WireError,
 )
+from minirospy.core.wire.framing import serialize_frame
+from minirospy.core.wire.header import Header, serialize_header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node import topics
 from minirospy.runtime.node.node import Node
@@ -30,9 +33,6 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.wire.framing import serialize_frame
-from minirospy.wire.header import Header, serialize_header
-from minirospy.wire.tcpros import ANY, InterfaceType
 from tests.conftest import free_port
 from tests.manual_loop import ManualLoop, run_manually, until
 
@@ -213,7 +213,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
         await tcp.receive_header(sock)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign, box = Foreign(garbage), Box()
             subscription = await subscribe_to(foreign, monkeypatch, b, box, on_loop=on_loop)
@@ -239,7 +239,7 @@ def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
         await asyncio.get_running_loop().sock_sendall(sock, answer)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign = Foreign(bad_header)
             subscription = await subscribe_to(foreign, monkeypatch, b, Box())
@@ -267,7 +267,7 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     uri: str, advice: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             subscription = b.make_subscription("/t", STRING, Box())
             subscription.publishers_changed([uri])

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
-from minirospy.graph.registry import PublisherUpdate
+from minirospy.core.graph.registry import PublisherUpdate
+from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.wire.xmlrpc import serialize_call
 from tests.waiting import until
 
 CALL = serialize_call("getPid", ["/x"])

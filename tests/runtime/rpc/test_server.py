@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
+from minirospy.core.wire.http import HttpReader, serialize_request
+from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as servers
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
-from minirospy.wire.http import HttpReader, serialize_request
-from minirospy.wire.xmlrpc import serialize_call
 from tests.waiting import until
 
 

@@ -15,6 +15,8 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import CallFailed, MasterUnreachableError, ROSException, ThreadLimitError
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.node.topics import Publication
@@ -22,8 +24,6 @@ from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import explain, naming_thread_limit
 from minirospy.runtime.transport.loop import LoopThread, new_event_loop
 from minirospy.runtime.transport.workers import InOrder, Workers
-from minirospy.wire.framing import Frame
-from minirospy.wire.tcpros import InterfaceType
 from tests.waiting import until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

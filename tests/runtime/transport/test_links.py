@@ -15,11 +15,11 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import WireError
+from minirospy.core.wire import framing
+from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable
-from minirospy.wire import framing
-from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 
 KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
 

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import WireError
+from minirospy.core.wire.header import serialize_header
 from minirospy.runtime.transport import sockets, tcp
 from minirospy.runtime.transport.loop import new_event_loop
-from minirospy.wire.header import serialize_header
 from tests.waiting import until
 
 

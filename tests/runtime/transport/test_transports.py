@@ -19,6 +19,10 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import RpcUnreachable, UsageError, WireError
+from minirospy.core.wire.framing import Pieces, SplitFrame, serialize_frame
+from minirospy.core.wire.header import Header, serialize_header
+from minirospy.core.wire.service import serialize_response
+from minirospy.core.wire.tcpros import InterfaceType, service_client_header
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
@@ -29,10 +33,6 @@ from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, sockets
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.tcp import Listener
-from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
-from minirospy.wire.header import Header, serialize_header
-from minirospy.wire.service import serialize_response
-from minirospy.wire.tcpros import InterfaceType, service_client_header
 from tests.runtime.node.test_topics import STRING, Box, graph, listen, publish, run
 from tests.waiting import until
 

@@ -8,7 +8,7 @@ from minirospy.compat.cv_bridge import getCvType
 from minirospy.compat.cv_bridge.core import CvBridgeError, _converted
 
 if TYPE_CHECKING:
-    from minirospy.images.encodings import Pixels
+    from minirospy.core.images.encodings import Pixels
 
 __all__ = ["CV_MAT_CNWrap", "CV_MAT_DEPTHWrap", "cvtColor2", "getCvType"]
 

@@ -9,7 +9,7 @@ import { language, t, errorText } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
-const PROTOCOL = "minirospy.bag.v1";
+const PROTOCOL = "minirospy.core.bag.v1";
 const IMAGES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 const HEAVY = new Set([...IMAGES, "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud"]); // measured when chosen
 const RULER = 26;

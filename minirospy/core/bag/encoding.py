@@ -1,0 +1,157 @@
+"""The records of bags: named tuples in, bytes out.
+
+Fields are written in the order of rosbag's Python writer. Source: http://wiki.ros.org/Bags/Format/2.0.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+
+from minirospy.base.errors import BagFormatError
+from minirospy.core.bag.records import (
+    BAG_HEADER_SIZE,
+    MAX_UINT32,
+    OP_BAG_HEADER,
+    OP_CHUNK,
+    OP_CHUNK_INFO,
+    OP_CONNECTION,
+    OP_INDEX_DATA,
+    OP_MESSAGE_DATA,
+    BagHeader,
+    Chunk,
+    ChunkInfo,
+    Connection,
+)
+
+__all__ = [
+    "encode_bag_header",
+    "encode_chunk_header",
+    "encode_chunk_info",
+    "encode_connection",
+    "encode_fields",
+    "encode_index_data",
+    "encode_message_header",
+    "message_prefix",
+    "message_prefixes",
+]
+
+_MAX_TIME = MAX_UINT32 * 10**9 + 999_999_999
+_BILLION = 10**9
+_UINT32 = struct.Struct("<I")
+_UINT64 = struct.Struct("<Q")
+_TIME = struct.Struct("<II")
+_PAIR = struct.Struct("<II")
+_ENTRY = struct.Struct("<III")
+_MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
+
+
+def message_prefix(connection: int) -> bytes:
+    """Return the 34 bytes in front of a message's time, which are the same for each message of a connection.
+
+    After the prefix come seconds, nanoseconds and the size of the body, 32 bits each, then the body.
+    """
+    return b"\x26\0\0\0\x04\0\0\0op=\x02\x09\0\0\0conn=" + _UINT32.pack(connection) + b"\x0d\0\0\0time="
+
+
+def message_prefixes(connection: int) -> tuple[bytes, bytes]:
+    """Return :func:`message_prefix` as Python's rosbag writes it, and as C++'s does, which sorts the fields.
+
+    So a reader recognises nearly every message by one comparison; the others are left to :func:`parse_record`.
+    """
+    number = _UINT32.pack(connection)
+    return (
+        message_prefix(connection),
+        b"\x26\0\0\0\x09\0\0\0conn=" + number + b"\x04\0\0\0op=\x02\x0d\0\0\0time=",
+    )
+
+
+def encode_fields(fields: Mapping[str, bytes]) -> bytes:
+    """Return a header with its length in front, its fields in the order of the mapping."""
+    parts = [b""]
+    for name, value in fields.items():
+        field = name.encode() + b"=" + value
+        parts += (_UINT32.pack(len(field)), field)
+    parts[0] = _UINT32.pack(sum(map(len, parts)))
+    return b"".join(parts)
+
+
+def encode_bag_header(header: BagHeader) -> bytes:
+    """Return the first record, padded to its constant size."""
+    fields = encode_fields(
+        {
+            "op": bytes((OP_BAG_HEADER,)),
+            "index_pos": _UINT64.pack(header.index_pos),
+            "conn_count": _UINT32.pack(header.connection_count),
+            "chunk_count": _UINT32.pack(header.chunk_count),
+        }
+    )
+    padding = BAG_HEADER_SIZE - (len(fields) - 4)
+    return fields + _UINT32.pack(padding) + b" " * padding
+
+
+def encode_chunk_header(chunk: Chunk) -> bytes:
+    """Return the header of a chunk and the length of its data, which comes next. Raise BagFormatError above 4 GiB."""
+    if max(chunk.size, chunk.compressed_size) > MAX_UINT32:
+        raise BagFormatError(f"a chunk of {chunk.size} bytes is larger than the format allows, 4 GiB")
+    fields = {
+        "op": bytes((OP_CHUNK,)),
+        "compression": chunk.compression.encode(),
+        "size": _UINT32.pack(chunk.size),
+    }
+    return encode_fields(fields) + _UINT32.pack(chunk.compressed_size)
+
+
+def encode_connection(connection: Connection) -> bytes:
+    """Return the record of a connection."""
+    fields = {
+        "op": bytes((OP_CONNECTION,)),
+        "topic": connection.topic.encode(),
+        "conn": _UINT32.pack(connection.id),
+    }
+    return encode_fields(fields) + encode_fields(connection.header)
+
+
+def encode_message_header(connection: int, time: int, size: int) -> bytes:
+    """Return a message's header and the length of its body, which comes next. Raise BagFormatError above the limits."""
+    if size > MAX_UINT32:
+        raise BagFormatError(f"a message of {size} bytes is larger than the format allows, 4 GiB")
+    if not 0 <= time <= _MAX_TIME:
+        raise BagFormatError(f"the time {time} ns does not fit into a bag: it must be from 0 to 2106")
+    seconds, nanoseconds = divmod(time, _BILLION)
+    return _MESSAGE_HEADER.pack(
+        38, 4, b"op=", OP_MESSAGE_DATA, 9, b"conn=", connection, 13, b"time=", seconds, nanoseconds, size
+    )
+
+
+def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> bytes:
+    """Return the index of one connection in the chunk before: pairs of time and offset, in the order of time."""
+    fields = {
+        "op": bytes((OP_INDEX_DATA,)),
+        "conn": _UINT32.pack(connection),
+        "ver": _UINT32.pack(1),
+        "count": _UINT32.pack(len(entries)),
+    }
+    data = b"".join(_ENTRY.pack(*divmod(time, _BILLION), offset) for time, offset in entries)
+    return _encode_record(fields, data)
+
+
+def encode_chunk_info(info: ChunkInfo) -> bytes:
+    """Return the summary of a chunk."""
+    fields = {
+        "op": bytes((OP_CHUNK_INFO,)),
+        "ver": _UINT32.pack(1),
+        "chunk_pos": _UINT64.pack(info.position),
+        "start_time": _TIME.pack(*divmod(info.start_time, _BILLION)),
+        "end_time": _TIME.pack(*divmod(info.end_time, _BILLION)),
+        "count": _UINT32.pack(len(info.counts)),
+    }
+    return _encode_record(fields, _encode_pairs(info.counts.items()))
+
+
+def _encode_pairs(pairs: Iterable[tuple[int, int]]) -> bytes:
+    return b"".join(_PAIR.pack(*pair) for pair in pairs)
+
+
+def _encode_record(fields: Mapping[str, bytes], data: bytes) -> bytes:
+    return encode_fields(fields) + _UINT32.pack(len(data)) + data

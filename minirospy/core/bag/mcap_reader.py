@@ -1,0 +1,381 @@
+"""An MCAP file with messages of ROS 1 in, connections and messages in the order of time out.
+
+Opening reads the summary at the file's end. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from heapq import heapify, heappop, heapreplace
+from io import BytesIO
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+
+from minirospy.base.errors import BagFormatError, McapUnindexedError
+from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
+from minirospy.core.bag.chunks import StoredChunk
+from minirospy.core.bag.compression import NONE
+from minirospy.core.bag.index import ConnectionIndex
+from minirospy.core.bag.mcap_repair import MAGIC, chunk_data, mcap_faults
+from minirospy.core.bag.mcap_writer import check_mcap
+from minirospy.core.bag.reader import open_bag
+from minirospy.core.bag.records import Chunk, ChunkInfo, Connection, Fields
+
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
+    from mcap.summary import Summary
+
+__all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
+
+_END_OF_TIME = 1 << 64
+_MAX_NAME = 32  # bytes of the name of a compression
+_HEAD = struct.Struct("<BQ")
+"""In front of each record: its opcode, and the bytes of its content."""
+_MESSAGE = struct.Struct("<HIQQ")
+"""At the start of a message: its channel, sequence, time, and the time of its publication."""
+_CHUNK_HEAD = struct.Struct("<BQQQQII")
+"""A record's head; a chunk's first and last time, bytes of its data in memory, their CRC, bytes of its compression's name."""
+_LENGTH = struct.Struct("<Q")
+_FOOTER = struct.Struct("<BQQQI")
+"""A record's head; the positions of the summary and of its offsets, the CRC."""
+
+
+def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
+    """Return a reader of the bag or MCAP file that starts at the stream's position. Raise what those raise."""
+    start = stream.tell()
+    magic = stream.read(len(MAGIC))
+    stream.seek(start)
+    return McapReader(stream) if magic == MAGIC else open_bag(stream)
+
+
+class McapReader(BagReader):
+    """An MCAP file of profile ``ros1``; its channels are the connections.
+
+    Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError where the file is damaged,
+    McapUnindexedError where its summary is missing or damaged, BagError if the extra is missing.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        check_mcap()
+        self.version = 0
+        self.stream = stream
+        self.foreign: list[str] = []
+        self.connections = {}
+        self._size = size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(size - len(MAGIC), 0))
+        if size < 2 * len(MAGIC) or stream.read() != MAGIC:
+            raise McapUnindexedError("its end is missing")
+        try:
+            with mcap_faults():
+                summary = _read_summary(stream, size)
+        except BagFormatError as error:
+            raise McapUnindexedError(error.why) from error
+        if summary is None or summary.statistics is None:
+            raise McapUnindexedError("it has no summary")
+        if len({chunk.chunk_start_offset for chunk in summary.chunk_indexes}) < len(summary.chunk_indexes):
+            raise McapUnindexedError("its summary names a chunk twice")
+        for channel in summary.channels.values():
+            schema = summary.schemas.get(channel.schema_id)
+            if channel.message_encoding == "ros1" and schema is not None:
+                self.connections[channel.id] = _connection(channel, schema)
+            else:
+                self.foreign.append(channel.topic)
+        self.statistics = summary.statistics
+        self.chunks = _chunk_infos(summary)
+        self._summary = summary
+        self._headers = {
+            chunk.chunk_start_offset: StoredChunk(
+                Chunk(chunk.compression or NONE, chunk.uncompressed_size, chunk.compressed_size),
+                chunk.chunk_start_offset,
+            )
+            for chunk in summary.chunk_indexes
+        }
+
+    @property
+    def version_name(self) -> str:
+        """The format, in place of a bag's version."""
+        return "MCAP 0"
+
+    def chunk_headers(self) -> dict[int, StoredChunk]:
+        """See :meth:`BagReader.chunk_headers`."""
+        return self._headers
+
+    def messages(
+        self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
+    ) -> Iterator[StoredMessage]:
+        """See :meth:`BagReader.messages`. Raise BagFormatError for damage, after the messages before it."""
+        chosen = self.connections if connections is None else connections
+        wanted = {number: self.connections[number] for number in chosen}
+        first = 0 if start is None else start
+        last = _END_OF_TIME if end is None else end
+        # A chunk is read when its first message may be the next one; its data is in memory once, and so are those of others
+        # only as far as they overlap with it in time.
+        # No two have one position.
+        heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
+        heapify(heap)
+        while heap:
+            _, position, at, run = heap[0]
+            if at < 0:
+                run.load(self.stream, self._size, self._summary.channels.keys(), wanted.keys(), first, last)
+            else:
+                time, _, channel, body, after = run.messages[at]
+                yield StoredMessage(wanted[channel], time, run.body(self.stream, body, after), 0)
+            if (at := at + 1) < len(run.messages):
+                heapreplace(heap, (run.messages[at][0], position, at, run))
+            else:
+                heappop(heap)
+
+    def _runs(self, wanted: Collection[int], first: int, last: int) -> list[_Run]:
+        """Return what has to be read for these channels and times. Raise BagFormatError."""
+        indexes = self._summary.chunk_indexes
+        if not indexes:
+            return self._unindexed_runs()
+        return [
+            _Run(index.chunk_start_offset, index.message_start_time)
+            for index in indexes
+            if index.message_end_time >= first
+            and index.message_start_time <= last
+            # Without message indexes, a chunk may have each channel.
+            and not (index.message_index_offsets and index.message_index_offsets.keys().isdisjoint(wanted))
+        ]
+
+    def _unindexed_runs(self) -> list[_Run]:
+        """Return the chunks, or the messages outside of chunks, of a file without chunk indexes. Raise BagFormatError."""
+        from mcap.opcode import Opcode
+
+        runs: list[_Run] = []
+        loose = _Loose(0, 0)
+        position = len(MAGIC)
+        while position + _HEAD.size <= self._size:
+            self.stream.seek(position)
+            opcode, length = _HEAD.unpack(self.stream.read(_HEAD.size))
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                break
+            if opcode == Opcode.CHUNK:
+                start = _read_chunk_header(self.stream, position, self._size).start
+                runs.append(_Run(position, start))
+            elif opcode == Opcode.MESSAGE:
+                loose.places.append((position, length))
+            position += _HEAD.size + length
+        if position > self._size:
+            raise BagFormatError("not a whole MCAP file: a record does not fit into it")
+        if runs and loose.places:
+            raise BagFormatError("messages are both inside and outside of chunks: `mcap recover` mends that")
+        return runs or [loose]
+
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """See :meth:`BagReader.blocks`."""
+        ranks = {number: rank for rank, number in enumerate(connections)}
+        for message in self.messages(connections, start, end):
+            rank = ranks[message.connection.id]
+            yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
+
+    def message_at(self, position: Position) -> StoredMessage:
+        """Raise BagFormatError: messages are read in order only."""
+        raise BagFormatError("messages of MCAP files are read in order only")
+
+    def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
+        """See :meth:`BagReader.index`; the file is read whole."""
+        indexes = {number: ConnectionIndex() for number in connections}
+        for message in self.messages(list(indexes)):
+            indexes[message.connection.id].extend([message.time], [0], 0)
+        return list(indexes.values())
+
+
+class _ChunkHeader(NamedTuple):
+    """What is in front of a chunk's data, and where the data is."""
+
+    start: int
+    compression: str
+    size: int
+    data_position: int
+    data_size: int
+
+
+class _Run:
+    """The messages of a chunk, in the order of time: time, place in the chunk, channel, start and end of the body."""
+
+    def __init__(self, position: int, start: int) -> None:
+        self.position = position
+        self.start = start
+        self.messages: list[tuple[int, int, int, int, int]] = []
+        self._data = b""
+
+    def load(
+        self,
+        stream: BinaryIO,
+        limit: int,
+        known: Collection[int],
+        wanted: Collection[int],
+        first: int,
+        last: int,
+    ) -> None:
+        """Read the chunk, and find the messages of these channels and times. Raise BagFormatError."""
+        from mcap.opcode import Opcode
+
+        with mcap_faults():
+            header = _read_chunk_header(stream, self.position, limit)
+            stream.seek(header.data_position)
+            stored = stream.read(header.data_size)
+            data = self._data = chunk_data(header.compression, stored, header.size)
+        at, size = 0, len(data)
+        while at + _HEAD.size <= size:
+            opcode, length = _HEAD.unpack_from(data, at)
+            body = at + _HEAD.size
+            after = body + length
+            if after > size:
+                break
+            if opcode == Opcode.MESSAGE:
+                self._add(data, body, after, at, known, wanted, first, last)
+            at = after
+        if at != size:
+            raise BagFormatError("not a whole MCAP file: a record does not fit into its chunk", self.position)
+        self.messages.sort()
+
+    def body(self, stream: BinaryIO, start: int, end: int) -> bytes:
+        """Return the bytes of a message."""
+        return self._data[start:end]
+
+    def _add(
+        self,
+        data: bytes,
+        start: int,
+        end: int,
+        place: int,
+        known: Collection[int],
+        wanted: Collection[int],
+        first: int,
+        last: int,
+    ) -> None:
+        if end - start < _MESSAGE.size:
+            raise BagFormatError("not a whole MCAP file: a message is too short", self.position)
+        channel, _, time, _ = _MESSAGE.unpack_from(data, start)
+        if channel not in known:
+            raise BagFormatError(
+                f"not a whole MCAP file: a message's channel {channel} is not in the summary", self.position
+            )
+        if channel in wanted and first <= time <= last:
+            self.messages.append((time, place, channel, start + _MESSAGE.size, end))
+
+
+class _Loose(_Run):
+    """The messages outside of chunks; ``places`` are positions and lengths of their records."""
+
+    def __init__(self, position: int, start: int) -> None:
+        super().__init__(position, start)
+        self.places: list[tuple[int, int]] = []
+
+    def load(
+        self,
+        stream: BinaryIO,
+        limit: int,
+        known: Collection[int],
+        wanted: Collection[int],
+        first: int,
+        last: int,
+    ) -> None:
+        """See :meth:`_Run.load`."""
+        for position, length in self.places:
+            stream.seek(position + _HEAD.size)
+            head = stream.read(min(length, _MESSAGE.size))
+            before = len(self.messages)
+            self._add(head, 0, len(head), position, known, wanted, first, last)
+            if len(self.messages) > before:
+                time, place, channel, _, _ = self.messages[-1]
+                start = position + _HEAD.size
+                self.messages[-1] = (time, place, channel, start + _MESSAGE.size, start + length)
+        self.messages.sort()
+
+    def body(self, stream: BinaryIO, start: int, end: int) -> bytes:
+        """See :meth:`_Run.body`."""
+        stream.seek(start)
+        return stream.read(end - start)
+
+
+class _Bounded:
+    """A stream for the library: it may ask for any length, and gets what there is without claiming memory for the rest."""
+
+    def __init__(self, data: bytes) -> None:
+        self._stream = BytesIO(data)
+        self._size = len(data)
+
+    def read(self, length: int) -> bytes:
+        return self._stream.read(min(length, self._size) if length >= 0 else 0)
+
+
+def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
+    """Return the summary at the file's end; None if there is none. Raise BagFormatError, and what the library raises."""
+    from mcap import records
+    from mcap.opcode import Opcode
+    from mcap.stream_reader import StreamReader
+    from mcap.summary import Summary
+
+    footer = size - len(MAGIC) - _FOOTER.size
+    stream.seek(max(footer, 0))
+    data = stream.read(_FOOTER.size)
+    opcode, length, start, _, _ = _FOOTER.unpack(data)
+    if (opcode, length) != (Opcode.FOOTER, _FOOTER.size - _HEAD.size):
+        raise BagFormatError("not a whole MCAP file: it has no footer")
+    if not start:
+        return None
+    if start > footer:
+        raise BagFormatError("not a whole MCAP file: its summary is behind its end")
+    stream.seek(start)
+    found = Summary()
+    summary = _Bounded(stream.read(size - start))
+    # Chunks have no place here, and are not decompressed.
+    for record in StreamReader(summary, skip_magic=True, emit_chunks=True).records:  # type: ignore[arg-type]
+        match record:
+            case records.Statistics():
+                found.statistics = record
+            case records.Schema():
+                found.schemas[record.id] = record
+            case records.Channel():
+                found.channels[record.id] = record
+            case records.ChunkIndex():
+                found.chunk_indexes.append(record)
+    return found
+
+
+def _read_chunk_header(stream: BinaryIO, position: int, limit: int) -> _ChunkHeader:
+    """Return the header of the chunk at a position. Raise BagFormatError."""
+    from mcap.opcode import Opcode
+
+    at = position + _CHUNK_HEAD.size
+    if at > limit:
+        raise BagFormatError("not a whole MCAP file: a chunk is behind its end")
+    stream.seek(position)
+    opcode, length, start, _, size, _, name_size = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
+    if opcode != Opcode.CHUNK:
+        raise BagFormatError("not a whole MCAP file: no chunk at the position of one", position)
+    name = stream.read(min(name_size, _MAX_NAME + 1)).decode("utf-8", "replace")
+    (data_size,) = _LENGTH.unpack(stream.read(_LENGTH.size).ljust(_LENGTH.size, b"\xff"))
+    data_position = at + name_size + _LENGTH.size
+    if name_size > _MAX_NAME or data_position + data_size > min(position + _HEAD.size + length, limit):
+        raise BagFormatError("not a whole MCAP file: a chunk's data does not fit into it", position)
+    return _ChunkHeader(start, name, size, data_position, data_size)
+
+
+def _connection(channel: Channel, schema: Schema) -> Connection:
+    header: Fields = {name: value.encode() for name, value in channel.metadata.items()}
+    header.setdefault("topic", channel.topic.encode())
+    header["type"] = schema.name.encode()
+    header.setdefault("md5sum", b"*")
+    header["message_definition"] = schema.data
+    return Connection(channel.id, channel.topic, header)
+
+
+def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
+    """Return the chunks; the first one has the counts of all, which the summary does not have for each."""
+    assert summary.statistics is not None
+    counts = dict(summary.statistics.channel_message_counts)
+    infos = []
+    for chunk in summary.chunk_indexes:
+        infos.append(
+            ChunkInfo(chunk.chunk_start_offset, chunk.message_start_time, chunk.message_end_time, counts)
+        )
+        counts = {}
+    return infos

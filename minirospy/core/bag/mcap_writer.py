@@ -1,0 +1,161 @@
+"""Messages with their times in, an MCAP file out, laid out as the MCAP tools convert bags: profile ``ros1``.
+
+A connection is a channel; what its connection header has besides the type and the definition (md5sum, callerid, latching,
+...) is the channel's metadata, the definition a schema of encoding ``ros1msg``. Needs the extra ``minirospy[mcap]``.
+Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, BinaryIO, cast
+
+from minirospy.base.errors import BagCompressionError, BagError, BagFormatError
+from minirospy.base.installation import install_command
+from minirospy.core.bag.writer import Buffer
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+__all__ = [
+    "CHUNK_SIZE",
+    "COMPRESSIONS",
+    "SCHEMA_FIELDS",
+    "McapWriter",
+    "check_mcap",
+    "check_mcap_compression",
+]
+
+CHUNK_SIZE = 4 * 1024 * 1024
+"""Bytes of a chunk before compression, as the MCAP tools have it: the summary that `rosbag info` reads has a record of each."""
+
+COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
+"""The names of the compressions of chunks, and those that the library gives them."""
+
+SCHEMA_FIELDS = ("type", "message_definition")
+"""The fields of a connection header that are the channel's schema; the others are its metadata."""
+
+_NEEDED = (*SCHEMA_FIELDS, "md5sum")
+
+
+def check_mcap() -> None:
+    """Raise BagError, which names the extra to install, unless MCAP files can be read and written."""
+    try:
+        import mcap.records  # noqa: F401 - the rest is imported where it is needed
+        import zstandard  # noqa: F401
+    except ImportError as error:
+        raise BagError(
+            f"MCAP files need the library {error.name}: {install_command('minirospy[mcap]')}"
+        ) from error
+
+
+def check_mcap_compression(name: str) -> None:
+    """Raise BagCompressionError unless chunks of MCAP files can be compressed so."""
+    if name not in COMPRESSIONS:
+        raise BagCompressionError(name, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
+
+
+class McapWriter:
+    """Writes an MCAP file into a binary stream, which it does not close. As :class:`minirospy.core.bag.writer.BagWriter`.
+
+    ``compression``: none, lz4 or zstd. Raise BagCompressionError for another, BagError if the extra is missing.
+    """
+
+    def __init__(self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_SIZE) -> None:
+        check_mcap_compression(compression)
+        check_mcap()
+        from mcap.writer import CompressionType, Writer
+
+        self._stream = stream
+        self._chunk_size = chunk_size
+        self._is_plain = compression == "none"
+        self._gathered = self._count = 0
+        self._writer: Writer = Writer(
+            cast(BinaryIO, _Whole(stream)),
+            chunk_size=chunk_size,
+            compression=CompressionType[COMPRESSIONS[compression]],
+        )
+        self._writer.start(profile="ros1", library="minirospy")
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._closed = False
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far, besides those that are yet to be compressed."""
+        return self._stream.tell() + (self._gathered if self._is_plain else 0)
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory that the stream has not been given yet."""
+        return self._gathered
+
+    def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
+        """Return the number of a new connection for :meth:`write`. Raise BagFormatError if its header lacks a field."""
+        for name in _NEEDED:
+            if name not in header:
+                raise BagFormatError(f'the connection header of {topic} has no field "{name}"')
+        text = header["message_definition"]
+        definition = text if isinstance(text, bytes) else text.encode("utf-8", "surrogateescape")
+        fields = {name: _text(value) for name, value in header.items() if name not in SCHEMA_FIELDS}
+
+        key = _text(header["type"]), definition
+        if key not in self._schemas:
+            self._schemas[key] = self._writer.register_schema(key[0], "ros1msg", definition)
+        return self._writer.register_channel(topic, "ros1", self._schemas[key], fields)
+
+    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
+        """Write a message that came at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
+        if time < 0:
+            raise BagFormatError(f"the time {time} ns is before 1970")
+        whole = b"".join((body, tail)) if tail else body
+
+        # Of all connections together, as the MCAP tools' converter counts them.
+        sequence = self._count % 2**32
+        self._gathered += len(whole)
+        self._count += 1
+        # A view is copied into the chunk by the library.
+        self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
+        if self._gathered > self._chunk_size:
+            self._gathered = 0
+
+    def write_ready(self) -> None:
+        """Do nothing: complete chunks are compressed and written immediately."""
+
+    def close(self) -> None:
+        """Complete the file: write its summary. Idempotent. Raise OSError."""
+        if not self._closed:
+            self._closed = True
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.flush()
+
+    def salvage(self, written: int | None = None) -> int:
+        """Complete a file whose stream has failed with the chunks before, read back; return how many messages are lost.
+
+        As :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise BagFormatError or OSError if not even an empty file fits.
+        """
+        from minirospy.core.bag.mcap_repair import McapRepair
+
+        self._closed = True
+        repair = McapRepair(self._stream, written)
+        for _ in repair.run():
+            pass
+        return self._count - repair.apply()
+
+
+class _Whole:
+    """A stream whose writes are whole, also those of a file without a buffer, into which the library puts its own."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.tell = stream.tell
+        self.flush = stream.flush
+
+    def write(self, data: bytes) -> int:
+        count = self._stream.write(data)
+        while count is not None and count < len(data):
+            count += self._stream.write(memoryview(data)[count:])
+        return len(data)
+
+
+def _text(value: str | bytes) -> str:
+    return value if isinstance(value, str) else value.decode("utf-8", "replace")

@@ -1,0 +1,209 @@
+"""Reading bags of version 1.2, which have no chunks: definitions and messages follow each other in the file.
+
+Such a bag has an index at its end, or, without a bag header, none. What comes out is what `minirospy.core.bag.reader` gives.
+Source: http://wiki.ros.org/Bags/Format/1.2.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator, Sequence
+from typing import BinaryIO
+
+from minirospy.base.errors import BagFormatError, BagUnindexedError
+from minirospy.core.bag import records
+from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
+from minirospy.core.bag.chunks import size_of
+from minirospy.core.bag.index import ConnectionIndex, Entry, merge_entries
+from minirospy.core.bag.records import ChunkInfo, Connection, Record
+
+__all__ = ["Reader12", "open_bag12", "unindexed_bag12"]
+
+_ENTRY = struct.Struct("<IIQ")
+
+
+class Reader12(BagReader):
+    """A bag of version 1.2: a connection for each topic.
+
+    ``start``: the position of the first record. Until :meth:`read_index` or :meth:`scan` it is not ``indexed``.
+    """
+
+    def __init__(self, stream: BinaryIO, version: int, start: int) -> None:
+        self.version = version
+        self.stream = stream
+        self.connections: dict[int, Connection] = {}
+        self.chunks: Sequence[ChunkInfo] = ()
+        self.indexed = False
+        self.start = start
+        self._by_topic: dict[str, int] = {}
+        self._indexes: dict[int, ConnectionIndex] = {}
+
+    def read_index(self) -> None:
+        """Read the index at the bag's end. Raise BagUnindexedError if there is none, or if it is damaged."""
+        try:
+            limit = size_of(self.stream)
+            self.stream.seek(self.start)
+            header = records.read_record(self.stream, limit)
+            header.expect(records.OP_BAG_HEADER)
+            position = header.uint64("index_pos")
+            if not position:
+                raise BagUnindexedError
+            if position > limit:
+                raise BagUnindexedError("the index is behind the file's end")
+            if header.end < position == limit:
+                raise BagUnindexedError("the index is missing")
+
+            while position < limit:
+                self.stream.seek(position)
+                record = records.read_record(self.stream, limit)
+                self._read_topic_index(record, limit)
+                position = record.end
+            self.indexed = True
+        except BagFormatError as error:
+            raise BagUnindexedError(str(error)) from error
+
+    def scan(self) -> Iterator[int]:
+        """Make the index from the messages; yield the position of each record. Ends at the first one that is damaged."""
+        self.connections.clear()
+        self._by_topic.clear()
+        self._indexes.clear()
+        limit = size_of(self.stream)
+        position = self.start
+
+        while position < limit:
+            yield position
+            self.stream.seek(position)
+            try:
+                record = records.read_record(self.stream, limit)
+                if record.op == records.OP_MESSAGE_DEFINITION:
+                    self._define(record)
+                elif record.op == records.OP_MESSAGE_DATA:
+                    connection = self._connection_of(record)
+                    self._indexes[connection].extend([_time_of(record)], [position])
+            except BagFormatError:
+                break
+            position = record.end
+        self.indexed = True
+
+    def prepare(self) -> None:
+        """See :meth:`BagReader.prepare`."""
+        if not self.indexed:
+            for _ in self.scan():
+                pass
+
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """See :meth:`BagReader.blocks`."""
+        ranks = {number: rank for rank, number in enumerate(connections)}
+        entries: Iterator[Entry] = merge_entries(
+            self._indexes[number].between(start, end) for number in connections
+        )
+        for entry in entries:
+            connection, time, body, position = self.message_at(entry.offset)
+            assert isinstance(position, int)
+            rank = ranks.get(connection.id)
+            if rank is None:
+                raise BagFormatError("an index entry does not point to its message", entry.offset)
+            yield Block(None, body, [(time, rank, position, 0, len(body))])
+
+    def message_at(self, position: Position) -> StoredMessage:
+        """See :meth:`BagReader.message_at`."""
+        if not isinstance(position, int):
+            raise BagFormatError("a bag of version 1.2 has no chunks")
+        limit = size_of(self.stream)
+        self._seek(position, limit)
+        record = records.read_record(self.stream, limit)
+        while record.op == records.OP_MESSAGE_DEFINITION:
+            self.stream.seek(record.end)
+            record = records.read_record(self.stream, limit)
+        record.expect(records.OP_MESSAGE_DATA)
+
+        body = self.stream.read(record.data_size)
+        return StoredMessage(
+            self.connections[self._connection_of(record)], _time_of(record), body, record.position
+        )
+
+    def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
+        """See :meth:`BagReader.index`."""
+        return [self._indexes[number] for number in connections]
+
+    def _seek(self, position: int, limit: int) -> None:
+        """Seek to a position that the index has. Raise BagFormatError if it is behind the file's end."""
+        if position > limit:
+            raise BagFormatError("an index entry is behind the file's end", position)
+        self.stream.seek(position)
+
+    def _read_topic_index(self, record: Record, limit: int) -> None:
+        record.expect(records.OP_INDEX_DATA)
+        if (version := record.uint32("ver")) != 0:
+            raise BagFormatError(f"expecting index version 0, got {version}", record.position)
+        count = record.uint32("count")
+        if not count or record.data_size < count * _ENTRY.size:
+            raise BagFormatError(f"an index of {count} messages has only {record.data_size} bytes")
+        entries = list(_ENTRY.iter_unpack(self.stream.read(count * _ENTRY.size)))
+
+        # The first message of a topic is preceded by its definition, and the index points there.
+        self._seek(entries[0][2], limit)
+        definition = records.read_record(self.stream, limit)
+        definition.expect(records.OP_MESSAGE_DEFINITION)
+        number = self._define(definition)
+        self._indexes[number].extend(
+            [records.to_nanoseconds(seconds, rest) for seconds, rest, _ in entries],
+            [offset for _, _, offset in entries],
+        )
+
+    def _define(self, record: Record) -> int:
+        topic = record.text("topic")
+        if topic not in self._by_topic:
+            header = {
+                "topic": record.field("topic"),
+                "type": record.field("type"),
+                "md5sum": record.field("md5"),
+                "message_definition": record.field("def"),
+            }
+            self._add(topic, header)
+        return self._by_topic[topic]
+
+    def _connection_of(self, record: Record) -> int:
+        topic = record.text("topic")
+        if topic not in self._by_topic:
+            # A definition is stored once for each type; other topics of the type refer to it.
+            type_ = record.text("type")
+            like = next((each for each in self.connections.values() if each.type == type_), None)
+            if like is None:
+                raise BagFormatError(
+                    f"Topic {topic} of datatype {type_} not preceded by message definition", record.position
+                )
+            self._add(topic, like.header | {"topic": record.field("topic")})
+        return self._by_topic[topic]
+
+    def _add(self, topic: str, header: records.Fields) -> None:
+        number = len(self.connections)
+        self.connections[number] = Connection(number, topic, header)
+        self._by_topic[topic] = number
+        self._indexes[number] = ConnectionIndex()
+
+
+def open_bag12(stream: BinaryIO, version: int) -> Reader12:
+    """Return a reader of the bag whose first line has been read.
+
+    A bag without a header has no index, and is scanned when it is read. Raise BagUnindexedError if it should have one.
+    """
+    start = stream.tell()
+    limit = size_of(stream)
+    stream.seek(start)
+    reader = Reader12(stream, version, start)
+    if records.read_record(stream, limit).op == records.OP_BAG_HEADER:
+        reader.read_index()
+    return reader
+
+
+def unindexed_bag12(stream: BinaryIO) -> Reader12:
+    """Return a reader of the bag at the stream's position, which is to be scanned. Raise BagFormatError."""
+    version = records.read_version(stream)
+    return Reader12(stream, version, stream.tell())
+
+
+def _time_of(record: Record) -> int:
+    return records.to_nanoseconds(record.uint32("sec"), record.uint32("nsec"))

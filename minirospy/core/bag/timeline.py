@@ -1,0 +1,112 @@
+"""A bag by time: how many messages where, and the message of a moment, for those who show it rather than play it."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left, bisect_right
+from typing import NamedTuple
+
+from minirospy.core.bag.base import BagReader, StoredMessage
+from minirospy.core.bag.records import Connection
+
+__all__ = ["Timeline", "TopicTimes"]
+
+
+class TopicTimes(NamedTuple):
+    """A topic: its connections in the bag, and the times of the messages of each, in order, in nanoseconds."""
+
+    name: str
+    connections: list[Connection]
+    times: list[array[int]]
+
+    @property
+    def messages(self) -> int:
+        """Return how many messages there are."""
+        return sum(map(len, self.times))
+
+    @property
+    def is_latched(self) -> bool:
+        """Return whether a publisher latched its last message."""
+        return any(connection.latching for connection in self.connections)
+
+
+class Timeline:
+    """The index of a bag by topic. ``topics``: those with messages, by name. Raise BagFormatError."""
+
+    def __init__(self, reader: BagReader) -> None:
+        self._reader = reader
+        numbers = list(reader.connections)
+        by_topic: dict[str, TopicTimes] = {}
+        for number, times in zip(numbers, reader.times(numbers), strict=True):
+            if times:
+                connection = reader.connections[number]
+                topic = by_topic.setdefault(connection.topic, TopicTimes(connection.topic, [], []))
+                topic.connections.append(connection)
+                topic.times.append(times)
+        self.topics = dict(sorted(by_topic.items()))
+
+    @property
+    def span(self) -> tuple[int, int] | None:
+        """Return the times of the first and the last message; None without messages."""
+        every = [times for topic in self.topics.values() for times in topic.times]
+        return (min(times[0] for times in every), max(times[-1] for times in every)) if every else None
+
+    def density(self, topic: str, start: int, end: int, bins: int) -> list[int]:
+        """Return how many messages of a topic are in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
+        counts = [0] * bins
+        borders = [start + (end + 1 - start) * number // bins for number in range(bins + 1)]
+        for times in self.topics[topic].times:
+            places = [bisect_left(times, border) for border in borders]
+            for number in range(bins):
+                counts[number] += places[number + 1] - places[number]
+        return counts
+
+    def message_at(self, topic: str, time: int) -> StoredMessage | None:
+        """Return the last message of a topic that is not later than ``time``. Raise BagFormatError."""
+        newest: tuple[int, Connection] | None = None
+        known = self.topics[topic]
+        for connection, times in zip(known.connections, known.times, strict=True):
+            at = bisect_right(times, time) - 1
+            if at >= 0 and (newest is None or times[at] >= newest[0]):
+                newest = times[at], connection
+        if newest is None:
+            return None
+
+        when, connection = newest
+        last = None
+        for message in self._reader.messages([connection.id], when, when):
+            last = message
+        return last
+
+    def time_at(self, topic: str, time: int) -> int | None:
+        """Return the time of that message."""
+        found = [times[at - 1] for times in self.topics[topic].times if (at := bisect_right(times, time))]
+        return max(found, default=None)
+
+    def count_at(self, time: int) -> int:
+        """Return how many messages there are at exactly this time."""
+        return sum(
+            bisect_right(times, time) - bisect_left(times, time)
+            for topic in self.topics.values()
+            for times in topic.times
+        )
+
+    def time_after(self, time: int) -> int | None:
+        """Return the time of the first message after ``time``; None where that is the last."""
+        found = [
+            times[at]
+            for topic in self.topics.values()
+            for times in topic.times
+            if (at := bisect_right(times, time)) < len(times)
+        ]
+        return min(found, default=None)
+
+    def time_before(self, time: int) -> int | None:
+        """Return the time of the last message before ``time``; None where that is the first."""
+        found = [
+            times[at - 1]
+            for topic in self.topics.values()
+            for times in topic.times
+            if (at := bisect_left(times, time))
+        ]
+        return max(found, default=None)

@@ -1,0 +1,428 @@
+"""Messages with their times in, the bytes of a bag out.
+
+A chunk is gathered in memory and written whole, its index behind it: a file whose writer was killed ends with at most one
+chunk that is cut off, and :mod:`minirospy.core.bag.repair` saves all that are before it. A small message is copied once, into
+the chunk; a large one that comes as ``bytes`` is written from where it is. Memory: the chunk, and some 200 bytes for
+each connection of each chunk that has been written. Source: http://wiki.ros.org/Bags/Format/2.0.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+
+from minirospy.base.errors import BagFormatError
+from minirospy.core.bag.compression import MAX_CHUNK_SIZE, NONE, check_compression, compress
+from minirospy.core.bag.encoding import (
+    encode_bag_header,
+    encode_chunk_header,
+    encode_chunk_info,
+    encode_connection,
+    encode_fields,
+    message_prefixes,
+)
+from minirospy.core.bag.records import (
+    MAGIC,
+    MAX_UINT32,
+    OP_INDEX_DATA,
+    BagHeader,
+    Chunk,
+    ChunkInfo,
+    Connection,
+    to_nanoseconds,
+)
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+__all__ = ["CHUNK_THRESHOLD", "BagWriter", "Buffer", "Continued"]
+
+Buffer = bytes | bytearray | memoryview
+
+CHUNK_THRESHOLD = 768 * 1024
+"""A chunk is complete when its data has more bytes than this, before compression. ROS's default."""
+
+_LARGE = 64 * 1024
+"""A message of so many bytes is written from where it is, instead of being copied into the chunk."""
+
+_BILLION = 10**9
+_OVERHEAD = 46
+"""Bytes of a message's record besides its body."""
+_ENTRY = struct.Struct("<III")
+_TIME = struct.Struct("<II")
+_UINT32 = struct.Struct("<I")
+
+
+class _Stream:
+    """The messages of one connection: what is in front of each, and their index in the current chunk."""
+
+    __slots__ = ("connection", "entries", "in_order", "last", "prefix", "record")
+
+    def __init__(self, connection: Connection, *, is_stored: bool) -> None:
+        self.connection = connection
+        self.prefix = message_prefixes(connection.id)[0]
+        self.record = b"" if is_stored else encode_connection(connection)
+        """The connection's record, until a chunk has it."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Start the index of the next chunk."""
+        self.entries = bytearray()
+        self.last = 0
+        self.in_order = True
+
+    def sort(self) -> tuple[int, int]:
+        """Put the entries in the order of time; return the first and the last time."""
+        if not self.in_order:
+            ordered = sorted(_ENTRY.iter_unpack(self.entries), key=lambda entry: entry[:2])
+            self.entries = bytearray().join(_ENTRY.pack(*entry) for entry in ordered)
+        first, last = (_TIME.unpack_from(self.entries, at) for at in (0, len(self.entries) - _ENTRY.size))
+        return to_nanoseconds(*first), to_nanoseconds(*last)
+
+    def encode_index(self) -> bytes:
+        """Return the record that is behind a chunk for each of its connections."""
+        fields = {
+            "op": bytes((OP_INDEX_DATA,)),
+            "conn": _UINT32.pack(self.connection.id),
+            "ver": _UINT32.pack(1),
+            "count": _UINT32.pack(len(self.entries) // _ENTRY.size),
+        }
+        return encode_fields(fields) + _UINT32.pack(len(self.entries)) + self.entries
+
+
+class _Complete(NamedTuple):
+    """A chunk that waits to be written: how to get its data, their size, and what the indexes say."""
+
+    is_ready: Callable[[], bool]
+    data: Callable[[], list[Buffer]]
+    size: int
+    start: int
+    end: int
+    counts: dict[int, int]
+    indexes: bytes
+
+
+class Continued(NamedTuple):
+    """The index of a bag that is to be continued, and its position."""
+
+    connections: Iterable[Connection]
+    chunks: Iterable[ChunkInfo]
+    index_position: int
+
+
+class BagWriter:
+    """Writes a bag of version 2.0 into a binary stream, which it does not close. For one thread at a time.
+
+    ``chunk_threshold`` in bytes may be changed at any time. ``executor``: where chunks are compressed in parallel; without
+    one, the calling thread does it. ``most_waiting``: if more chunks are waiting for that, :meth:`write` waits, too.
+    ``continued``: append to the bag that the stream has, in place of its index. Raise BagCompressionError if the compression
+    is unknown or its library missing.
+
+    After an OSError of the stream, such as a full disk, :meth:`salvage` makes a readable bag of what has been written;
+    for that the stream must be without a buffer. Buffers gain nothing here: chunks are written whole.
+    """
+
+    def __init__(
+        self,
+        stream: BinaryIO,
+        *,
+        compression: str = NONE,
+        chunk_threshold: int = CHUNK_THRESHOLD,
+        executor: Executor | None = None,
+        most_waiting: int = 4,
+        continued: Continued | None = None,
+    ) -> None:
+        self.chunk_threshold = chunk_threshold
+        self.chunks: list[ChunkInfo] = []
+        """The chunks that have been written."""
+        self._stream = stream
+        self._executor = executor
+        self._most_waiting = most_waiting
+        self._streams: dict[int, _Stream] = {}
+        self._next_id = 0
+        self._complete: deque[_Complete] = deque()
+        self._waiting = 0
+        """Bytes of the complete chunks, before compression."""
+        self._written = (0, 0)
+        """Bytes of the data of the written chunks: before compression, and as they are stored."""
+        self._closed = False
+        self._small = bytearray()
+        self._pieces: list[Buffer] = []
+        self._size = 0
+        self._used: list[_Stream] = []
+        self._set_compression(compression)
+
+        if continued is None:
+            self._header_position = stream.tell() + len(MAGIC)
+            header = encode_bag_header(BagHeader(0, 0, 0))
+            self._put([MAGIC, header])
+            self._position = self._header_position + len(header)
+            """Where the next chunk goes in the stream."""
+        else:
+            self._continue(*continued)
+
+    @property
+    def compression(self) -> str:
+        """Return the compression of chunks; a change completes the current one. Raise BagCompressionError."""
+        return self._compression
+
+    @compression.setter
+    def compression(self, name: str) -> None:
+        check_compression(name)
+        if name != self._compression:
+            self.finish_chunk()
+            self._write_complete(0)
+            self._set_compression(name)
+
+    @property
+    def connections(self) -> list[Connection]:
+        """The connections that have messages in the bag."""
+        return [one.connection for one in self._streams.values() if not one.record]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the bag so far; what is not compressed yet counts as if it shrank like the chunks before it.
+
+        Without a chunk before it, it does not count: how much it will shrink is not known.
+        """
+        if self._compression == NONE:
+            return self._position + self.gathered
+        data, stored = self._written
+        return self._position + (self.gathered * stored // data if data else 0)
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory that the stream has not been given yet."""
+        return self._size + self._waiting
+
+    def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
+        """Return the number of a new connection for :meth:`write`; ``header`` is the publisher's connection header.
+
+        It needs the fields type, md5sum and message_definition. Raise BagFormatError.
+        """
+        for name in ("type", "md5sum", "message_definition"):
+            if name not in header:
+                raise BagFormatError(f'the connection header of {topic} has no field "{name}"')
+        number = self._next_id
+        self._next_id += 1
+        fields = {
+            name: value if isinstance(value, bytes) else value.encode("utf-8", "surrogateescape")
+            for name, value in header.items()
+        }
+        self._streams[number] = _Stream(Connection(number, topic, fields), is_stored=False)
+        return number
+
+    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
+        """Write a message that came at ``time``, in nanoseconds; its bytes are those of ``body``, then of ``tail``.
+
+        Only ``bytes`` are kept until the chunk is written, and must be plain. Raise BagFormatError if the message or its time
+        does not fit, OSError if the stream fails.
+        """
+        stream = self._streams[connection]
+        length = len(body) + len(tail)
+        if self._size + len(stream.record) + _OVERHEAD + length > self._limit:
+            self._make_room(stream, length)
+
+        seconds, nanoseconds = divmod(time, _BILLION)
+        try:
+            entry = _ENTRY.pack(seconds, nanoseconds, self._size + len(stream.record))
+        except struct.error:
+            raise BagFormatError(
+                f"the time {time} ns does not fit into a bag: it must be from 0 to 2106"
+            ) from None
+
+        small = self._small
+        if stream.record:
+            small += stream.record
+            self._size += len(stream.record)
+            stream.record = b""
+        small += stream.prefix
+        small += entry[:8]
+        small += _UINT32.pack(length)
+        if length < _LARGE:
+            small += body
+            if tail:
+                small += tail
+        else:
+            self._add_large(body)
+            self._add_large(tail)
+        self._size += _OVERHEAD + length
+
+        if not stream.entries:
+            self._used.append(stream)
+        stream.entries += entry
+        if time < stream.last:
+            stream.in_order = False
+        stream.last = time
+        if self._size > self.chunk_threshold:
+            self.finish_chunk()
+
+    def finish_chunk(self) -> None:
+        """Complete the current chunk, if it has a message. Raise OSError."""
+        if not self._size:
+            return
+        counts: dict[int, int] = {}
+        indexes: list[bytes] = []
+        start, end = 2**63, 0
+        for stream in self._used:
+            counts[stream.connection.id] = len(stream.entries) // _ENTRY.size
+            first, last = stream.sort()
+            start, end = min(start, first), max(end, last)
+            indexes.append(stream.encode_index())
+            stream.clear()
+
+        pieces = [*self._pieces, self._small] if self._small else self._pieces
+        complete = _Complete(*self._data(pieces), self._size, start, end, counts, b"".join(indexes))
+        self._start_chunk()
+        self._complete.append(complete)
+        self._waiting += complete.size
+        self._write_complete(self._most_waiting)
+
+    def write_ready(self) -> None:
+        """Write the complete chunks whose compression has ended. Raise OSError."""
+        self._write_complete(len(self._complete))
+
+    def flush(self) -> None:
+        """Write all messages so far into the stream, and flush it. Raise OSError."""
+        self.finish_chunk()
+        self._write_complete(0)
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Complete the bag: write its index. The stream stays open. Idempotent. Raise OSError."""
+        if self._closed:
+            return
+        self.finish_chunk()
+        self._write_complete(0)
+        self._write_index()
+        self._closed = True
+
+    def salvage(self, written: int | None = None) -> int:
+        """Close a bag whose stream has failed; return how many messages are lost.
+
+        Chunks that are not whole go, and as many before them as the index needs room for. ``written``: bytes of the bag that
+        are known to have reached the disk, if not all before the fault have. Raise OSError if even an empty bag does not
+        fit.
+        """
+        lost = sum(len(one.entries) // _ENTRY.size for one in self._used)
+        lost += sum(sum(one.counts.values()) for one in self._complete)
+        self._complete.clear()
+        self._waiting = 0
+        self._start_chunk()
+        end = self._position if written is None else min(written, self._position)
+        self._closed = True
+
+        while True:
+            # The last chunk ends where the next one would start.
+            while self.chunks and self._position > end:
+                dropped = self.chunks.pop()
+                lost += sum(dropped.counts.values())
+                self._position = dropped.position
+            self._stream.seek(self._position)
+            self._stream.truncate()
+            kept = {number for chunk in self.chunks for number in chunk.counts}
+            for number in self._streams.keys() - kept:
+                self._streams[number].record = encode_connection(self._streams[number].connection)
+            try:
+                self._write_index()
+            except OSError:
+                if not self.chunks:
+                    raise
+                end = self._position - 1
+                continue
+            return lost
+
+    def _set_compression(self, name: str) -> None:
+        check_compression(name)
+        self._compression = name
+        # Noise becomes longer where it is compressed, and no reader of ours takes more.
+        self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
+
+    def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
+        self._streams = {one.id: _Stream(one, is_stored=True) for one in connections}
+        self._next_id = max(self._streams, default=-1) + 1
+        self.chunks.extend(chunks)
+
+        # First the header: a program that ends now leaves a bag that says it has no index.
+        self._header_position = len(MAGIC)
+        self._stream.seek(self._header_position)
+        self._put([encode_bag_header(BagHeader(0, 0, 0))])
+        self._stream.seek(end)
+        self._stream.truncate()
+        self._position = end
+
+    def _start_chunk(self) -> None:
+        self._small = bytearray()
+        self._pieces = []
+        self._size = 0
+        self._used = []
+
+    def _make_room(self, stream: _Stream, length: int) -> None:
+        """Have the message start a new chunk: the format counts a chunk's bytes in 32 bits. Raise BagFormatError."""
+        if len(stream.record) + _OVERHEAD + length > self._limit:
+            raise BagFormatError(
+                f"a message of {length} bytes on {stream.connection.topic} is too large: "
+                f"a chunk has {self._limit} bytes at most{'' if self._compression == NONE else ' where it is compressed'}"
+            )
+        self.finish_chunk()
+
+    def _add_large(self, body: Buffer) -> None:
+        if len(body) < _LARGE:
+            self._small += body
+            return
+        if self._small:
+            self._pieces.append(self._small)
+            self._small = bytearray()
+        # What is not bytes may be changed by its owner before it is written.
+        self._pieces.append(body if type(body) is bytes else bytes(body))
+
+    def _data(self, pieces: list[Buffer]) -> tuple[Callable[[], bool], Callable[[], list[Buffer]]]:
+        """Return two functions: whether the chunk's data, as it is written, is ready, and one that waits for it."""
+        name = self._compression
+        if name == NONE:
+            return (lambda: True), (lambda: pieces)
+
+        joined = b"".join(pieces)
+        if self._executor is None:
+            return (lambda: True), (lambda: [compress(name, joined)])
+        future = self._executor.submit(compress, name, joined)
+        return future.done, (lambda: [future.result()])
+
+    def _write_complete(self, left: int) -> None:
+        """Write the complete chunks that are ready, and wait for the others until so many are left."""
+        while self._complete:
+            chunk = self._complete[0]
+            if len(self._complete) <= left and not chunk.is_ready():
+                return
+            data = chunk.data()
+            stored = sum(map(len, data))
+            header = encode_chunk_header(Chunk(self._compression, chunk.size, stored))
+
+            self._put([header, *data, chunk.indexes])
+            self.chunks.append(ChunkInfo(self._position, chunk.start, chunk.end, chunk.counts))
+            self._position += len(header) + stored + len(chunk.indexes)
+            self._written = self._written[0] + chunk.size, self._written[1] + stored
+            self._complete.popleft()
+            self._waiting -= chunk.size
+
+    def _write_index(self) -> None:
+        connections = self.connections
+        self._put([encode_connection(one) for one in connections])
+        self._put([b"".join(map(encode_chunk_info, self.chunks))])
+        # What the header promises has to be there first.
+        self._stream.flush()
+        self._stream.seek(self._header_position)
+        self._put([encode_bag_header(BagHeader(self._position, len(connections), len(self.chunks)))])
+        self._stream.flush()
+        self._stream.seek(0, io.SEEK_END)
+
+    def _put(self, pieces: Iterable[Buffer]) -> None:
+        write = self._stream.write
+        for piece in pieces:
+            count = write(piece)
+            # A stream without a buffer may take a part.
+            while count is not None and count < len(piece):
+                count += write(memoryview(piece)[count:])

@@ -1,0 +1,385 @@
+"""The parameter server's tree, and the nodes to notify of a change.
+
+Pure: calls in, values and updates out. Keys are global names. Source:
+http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster where that is silent.
+"""
+
+from __future__ import annotations
+
+import sys
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from minirospy.base.errors import MinirospyError
+from minirospy.base.names import namespace_of
+from minirospy.base.steps import SMALL_ITEMS, Steps, finish, is_small
+from minirospy.core.graph.shares import Excess, Shares, holder_of
+
+__all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
+
+_MAX_DEPTH = 56
+"""Namespaces and dictionaries inside each other: XML-RPC's 64 levels hold it and the answer around it."""
+
+_MAX_INT = 2**31
+
+_STEP_ITEMS = 1000
+_ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
+"""What a number, a list without its items, and a dictionary and each entry of it take in memory, about."""
+
+MOST_BYTES = 96 * 1024 * 1024
+"""What all parameters together may take in memory."""
+
+RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
+"""What is left of it to values of no more than SMALL bytes."""
+
+MOST_SUBSCRIPTIONS, MOST_OF_ONE = 20_000, 10_000
+"""Subscriptions to parameters, of all nodes and of one host and port."""
+
+FEW_RESERVE, FEW = 5_000, 100
+"""What is left of them to hosts and ports that have no more than FEW."""
+
+_FEW_BYTES, _MANY_BYTES = 50_000, 1_000_000
+
+
+class ParametersFullError(MinirospyError):
+    """A parameter or a subscription would be beyond a limit, which ``limit`` names."""
+
+    def __init__(self, limit: str) -> None:
+        super().__init__(limit)
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"the parameter server is full: {self.limit}"
+
+
+class ParameterUpdate(NamedTuple):
+    """Notify the node at ``uri`` of the value of ``key`` (which ends in a slash), {} where it is not set."""
+
+    uri: str
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Subscriber:
+    caller_id: str
+    uri: str
+
+
+class ParameterTree:
+    """Parameters in namespaces, as nested dictionaries.
+
+    What :meth:`get` returns is never changed afterwards: it may be written to a client in steps, while others set
+    parameters. So a dictionary that was returned is copied before it is changed.
+    """
+
+    def __init__(self, most: int = MOST_BYTES, reserve: int = RESERVE) -> None:
+        self._root: dict[str, object] = {}
+        # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
+        self._own: set[int] = {id(self._root)}
+        self._subscribers: dict[str, dict[_Subscriber, None]] = {}
+        # Their keys, sorted: those below a namespace are next to each other.
+        self._keys: list[str] = []
+        self._shares = Shares(MOST_SUBSCRIPTIONS, MOST_OF_ONE, FEW_RESERVE, FEW)
+        # URI of a node -> its keys, and under how many names it subscribed to each.
+        self._keys_of: dict[str, dict[str, int]] = {}
+        self._most = most
+        self._reserve = reserve
+        # No less than what all values take in memory.
+        self._bytes = 0
+
+    def get(self, key: str) -> object:
+        """Return the value, or the dictionary of a namespace. Raises KeyError."""
+        value = self._find(_split(key))
+        if value is _UNSET:
+            raise KeyError(key)
+        if type(value) is dict:
+            self._own.clear()
+        return value
+
+    def has(self, key: str) -> bool:
+        """Return whether a parameter or namespace is set."""
+        return self._find(_split(key)) is not _UNSET
+
+    @property
+    def is_small(self) -> bool:
+        """Return whether all parameters together are few."""
+        return self._bytes < _FEW_BYTES
+
+    @property
+    def is_large(self) -> bool:
+        """Return whether a list of their names takes so much memory that only one is made at a time."""
+        return self._bytes > _MANY_BYTES
+
+    def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
+        """Return whether the value of a parameter or namespace is small, or not set; see :func:`is_small`."""
+        return is_small(self._find(_split(key)), most)
+
+    def has_room(self, weight: int) -> bool:
+        """Return whether there surely is room for a value of ``weight`` bytes."""
+        return self._bytes + weight <= self._most_for(weight)
+
+    def _most_for(self, weight: int) -> int:
+        return self._most if weight <= SMALL else self._most - self._reserve
+
+    def make_room(self, weight: int) -> Steps[None]:
+        """Count again, since values that were replaced are still counted. Raises ParametersFullError."""
+        if not self.has_room(weight):
+            before = self._bytes
+            counted = yield from weigh_in_steps("/", self.get("/"))
+            self._bytes = counted + self._bytes - before
+            if not self.has_room(weight):
+                raise ParametersFullError(f"no more than {self._most_for(weight) // 1024**2} MiB in memory")
+
+    def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
+        """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
+
+        A value in the way of a namespace is replaced by it. Raises ValueError where the root would become
+        something else than a dictionary.
+        """
+        path = _split(key)
+        if path:
+            table = self._enter(path[:-1])
+            table[path[-1]] = value
+        elif isinstance(value, dict):
+            self._root = value
+        else:
+            raise ValueError("cannot set root of parameter tree to non-dictionary")
+        self._bytes += weight + len(key) + _ENTRY_BYTES
+        return self._updates(path, caller_id)
+
+    def delete(self, key: str) -> Iterator[ParameterUpdate]:
+        """Delete a parameter or namespace. Raises KeyError, also for the root."""
+        path = _split(key)
+        if not path or self._find(path) is _UNSET:
+            raise KeyError(key)
+        del self._enter(path[:-1])[path[-1]]
+        return self._updates(path)
+
+    def search(self, namespace: str, key: str) -> str | None:
+        """Return the name of the nearest parameter ``key``, upwards from ``namespace``.
+
+        Only the first part of ``key`` has to exist, as the API demands: a node may look for a namespace
+        whose parameters come later. None where there is none.
+        """
+        if key.startswith("/"):
+            return key if self.has(key) else None
+        first = _split(key)[0]
+        while True:
+            base = namespace.rstrip("/")
+            if self.has(f"{base}/{first}"):
+                return f"{base}/{key}"
+            if not base:
+                return None
+            namespace = namespace_of(base)
+
+    def names(self) -> list[str]:
+        """Return the names of all parameters, namespaces left out."""
+        return finish(self.names_in_steps())
+
+    def names_in_steps(self) -> Steps[list[str]]:
+        """Return the same, of a tree that may be large."""
+        found: list[str] = []
+        left = _STEP_ITEMS
+        root = self.get("/")
+        assert isinstance(root, dict)
+        # The namespaces around the present one. No function that calls itself: its list would be in a cycle of
+        # references, and the master's garbage collector does not look at what lives long.
+        around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
+
+        while around:
+            prefix, items = around[-1]
+            for name, value in items:
+                left -= 1
+                if not left:
+                    left = _STEP_ITEMS
+                    yield None
+                if isinstance(value, dict):
+                    around.append((f"{prefix}{name}/", iter(value.items())))
+                    break
+                found.append(prefix + name)
+            else:
+                around.pop()
+        return found
+
+    def subscribe(self, key: str, caller_id: str, uri: str) -> object:
+        """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
+
+        Raises ParametersFullError.
+        """
+        full = _with_slash(_split(key))
+        subscriber = _Subscriber(caller_id, uri)
+        if subscriber not in self._subscribers.get(full, ()):
+            self._check_subscription(uri)
+            if full not in self._subscribers:
+                self._subscribers[full] = {}
+                insort(self._keys, full)
+            self._subscribers[full][subscriber] = None
+            self._shares.add(holder_of(uri), 1)
+            keys = self._keys_of.setdefault(uri, {})
+            keys[full] = keys.get(full, 0) + 1
+        return self.get(key) if self.has(key) else {}
+
+    def unsubscribe(self, key: str, caller_id: str, uri: str) -> bool:
+        """Notify it no more; return whether it was subscribed."""
+        full = _with_slash(_split(key))
+        if _Subscriber(caller_id, uri) not in self._subscribers.get(full, {}):
+            return False
+        self._drop(full, _Subscriber(caller_id, uri))
+        return True
+
+    def unsubscribe_node(self, caller_id: str, uri: str) -> None:
+        """Forget a node that is gone."""
+        gone = _Subscriber(caller_id, uri)
+        for key in self.subscribed_keys(uri):
+            if gone in self._subscribers[key]:
+                self._drop(key, gone)
+
+    def count_subscriptions(self) -> int:
+        """Return how many subscriptions there are."""
+        return self._shares.total
+
+    def subscribed_keys(self, uri: str) -> list[str]:
+        """Return the keys that the node at ``uri`` has subscribed to; they end in a slash."""
+        return list(self._keys_of.get(uri, ()))
+
+    def subscriptions(self) -> Iterator[tuple[str, str, str]]:
+        """(node, URI, key) of each subscription; keys end in a slash."""
+        return (
+            (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
+        )
+
+    def _check_subscription(self, uri: str) -> None:
+        match self._shares.excess(holder_of(uri), 1):
+            case Excess.ALL:
+                raise ParametersFullError(f"no more than {self._shares.most} subscriptions")
+            case Excess.ONE:
+                raise ParametersFullError(
+                    f"no more than {self._shares.largest} subscriptions of one host and port"
+                )
+            case Excess.LARGE:
+                raise ParametersFullError(
+                    f"no more than {self._shares.shared} subscriptions of all that have many"
+                )
+
+    def _find(self, path: list[str]) -> object:
+        value: object = self._root
+        for name in path:
+            value = value.get(name, _UNSET) if isinstance(value, dict) else _UNSET
+            if value is _UNSET:
+                break
+        return value
+
+    def _enter(self, path: list[str]) -> dict[str, object]:
+        """Return the dictionary at ``path``, which is made where it is not there, to be changed."""
+        table = self._root = self._owned(self._root)
+        for name in path:
+            inner = table.get(name)
+            owned = self._owned(inner if isinstance(inner, dict) else {})
+            table[name] = owned
+            table = owned
+        return table
+
+    def _owned(self, table: dict[str, object]) -> dict[str, object]:
+        if id(table) not in self._own:
+            table = dict(table)
+            self._own.add(id(table))
+        return table
+
+    def _drop(self, key: str, subscriber: _Subscriber) -> None:
+        del self._subscribers[key][subscriber]
+        self._shares.add(holder_of(subscriber.uri), -1)
+        keys = self._keys_of[subscriber.uri]
+        keys[key] -= 1
+        if not keys[key]:
+            del keys[key]
+        if not keys:
+            del self._keys_of[subscriber.uri]
+        if not self._subscribers[key]:
+            del self._subscribers[key]
+            del self._keys[bisect_left(self._keys, key)]
+
+    def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
+        """Yield the updates that a change requires, one by one: there may be many."""
+        changed = _with_slash(path)
+        for length in range(len(path) + 1):
+            # Who set it knows it.
+            for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
+                if each.caller_id != setter:
+                    yield ParameterUpdate(each.uri, changed)
+
+        # Who set the namespace is notified too: what it keeps of a parameter inside is out of date.
+        at = bisect_right(self._keys, changed)
+        while at < len(self._keys) and self._keys[at].startswith(changed):
+            key = self._keys[at]
+            for each in list(self._subscribers[key]):
+                yield ParameterUpdate(each.uri, key)
+            # Others may have subscribed meanwhile.
+            at = bisect_right(self._keys, key)
+
+
+_UNSET = object()
+
+
+def weigh_in_steps(key: str, value: object) -> Steps[int]:
+    """Return about how many bytes of memory a value takes.
+
+    Raises ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.
+    """
+    if not _split(key) and not isinstance(value, dict):
+        raise ValueError("cannot set root of parameter tree to non-dictionary")
+    # The namespaces around it, which may not be there yet.
+    weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
+    left = _STEP_ITEMS
+    # The containers around the present item: how deep their items are, and those that are still to come.
+    around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
+    while around:
+        depth, items = around[-1]
+        for item in items:
+            left -= 1
+            if not left:
+                left = _STEP_ITEMS
+                yield None
+
+            kind = type(item)
+            if depth > _MAX_DEPTH:
+                raise ValueError(f"a parameter is nested deeper than {_MAX_DEPTH} levels")
+            if kind is list:
+                weight += _LIST_BYTES + 8 * len(item)
+                around.append((depth + 1, iter(item)))
+                break
+            if kind is dict:
+                weight += _ENTRY_BYTES * (len(item) + 1)
+                around.append((depth + 1, iter(item.values())))
+                if len(item) < _STEP_ITEMS:
+                    weight += sum(map(sys.getsizeof, item))
+                else:
+                    weight += yield from _weigh_names(item)
+                break
+            if kind is int:
+                if not -_MAX_INT <= item < _MAX_INT:
+                    raise ValueError(f"the integer {item} does not fit XML-RPC's 32 bits")
+                weight += _ITEM_BYTES
+            else:
+                weight += sys.getsizeof(item)
+        else:
+            around.pop()
+    return weight
+
+
+def _weigh_names(table: dict[str, object]) -> Steps[int]:
+    weight = 0
+    for number, name in enumerate(table):
+        weight += sys.getsizeof(name)
+        if number % _STEP_ITEMS == _STEP_ITEMS - 1:
+            yield None
+    return weight
+
+
+def _split(key: str) -> list[str]:
+    return [name for name in key.split("/") if name]
+
+
+def _with_slash(path: list[str]) -> str:
+    return "/" + "".join(f"{name}/" for name in path)

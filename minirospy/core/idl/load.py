@@ -1,0 +1,443 @@
+"""Definitions on disk and classes in memory: finding, compiling, importing.
+
+A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes come from the generated modules, or are made from
+a full text at run time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.machinery
+import importlib.util
+import linecache
+import os
+import struct
+import sys
+import types
+import weakref
+import zlib
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from minirospy.base.errors import DefinitionError, NotFoundError
+from minirospy.core.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
+from minirospy.core.idl.validate import MOST_TEXT, check_type_name, check_types, is_type_name
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.emit import ClassSource
+    from minirospy.core.idl.protocols import Message, ServiceClass
+
+__all__ = [
+    "Catalogue",
+    "checked_text",
+    "class_from_text",
+    "classes_from_text",
+    "compile_package",
+    "get_message_class",
+    "get_service_class",
+    "message_class",
+    "read_definition",
+    "service_class",
+    "specs_of_text",
+    "write_if_changed",
+    "write_package",
+]
+
+_SEPARATOR = "=" * 80
+
+
+class Catalogue:
+    """The definitions of some packages: package name -> its folder. Specs are parsed once.
+
+    A package's definitions are the files in its folders msg, srv and action, or, where ``definitions`` names the
+    package, just those.
+    """
+
+    def __init__(
+        self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
+    ) -> None:
+        self.packages = packages
+        # By package and kind: a package may have hundreds, and each is looked up by its name.
+        self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
+        for package, files in (definitions or {}).items():
+            kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
+            for path in sorted(files):
+                kinds[path.suffix[1:]][path.stem] = path
+        self._specs: dict[str, MessageSpec] = {}
+
+    @classmethod
+    def below(cls, *roots: Path) -> Catalogue:
+        """Return every folder in ``roots`` that holds definitions; an earlier root hides a later one's package."""
+        found: dict[str, Path] = {}
+        for root in roots:
+            for folder in sorted(root.iterdir()) if root.is_dir() else []:
+                if any((folder / kind).is_dir() for kind in ("msg", "srv", "action")):
+                    found.setdefault(folder.name, folder)
+        return cls(found)
+
+    def files(self, package: str, kind: str) -> Mapping[str, Path]:
+        """Return a package's definitions of a kind (msg, srv, action): name -> file."""
+        if package in self._definitions:
+            return self._definitions[package][kind]
+        return {path.stem: path for path in sorted((self.packages[package] / kind).glob(f"*.{kind}"))}
+
+    def message(self, full_name: str) -> MessageSpec:
+        """Return the spec of ``pkg/Name``. Raise NotFoundError, DefinitionError."""
+        if full_name not in self._specs:
+            self._specs[full_name] = self._parse_message(full_name)
+        return self._specs[full_name]
+
+    def messages(self, package: str) -> list[MessageSpec]:
+        """Return all messages of a package, those of its actions included, by name."""
+        names = {*self.files(package, "msg")}
+        for action in self.actions(package):
+            names |= {message.name for message in action.messages}
+        return [self.message(f"{package}/{name}") for name in sorted(names)]
+
+    def services(self, package: str) -> list[ServiceSpec]:
+        """Return all services of a package, by name."""
+        return [self.service(f"{package}/{name}") for name in self.files(package, "srv")]
+
+    def service(self, full_name: str) -> ServiceSpec:
+        """Return the spec of the service ``pkg/Name``. Raise KeyError where no file defines it, DefinitionError."""
+        from minirospy.core.idl.parse import parse_service
+
+        package, _, name = full_name.partition("/")
+        path = self.files(package, "srv")[name]
+        return parse_service(read_definition(path), package, name, str(path))
+
+    def actions(self, package: str) -> list[ActionSpec]:
+        """Return all actions of a package, by name."""
+        return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
+
+    def action(self, full_name: str) -> ActionSpec:
+        """Return the spec of the action ``pkg/Name``. Raise KeyError where no file defines it, DefinitionError."""
+        from minirospy.core.idl.parse import parse_action
+
+        package, _, name = full_name.partition("/")
+        path = self.files(package, "action")[name]
+        action = parse_action(read_definition(path), package, name, str(path))
+        for message in action.messages:
+            self._specs.setdefault(message.full_name, message)
+        return action
+
+    def _parse_message(self, full_name: str) -> MessageSpec:
+        from minirospy.core.idl.parse import parse_message
+
+        package, _, name = full_name.partition("/")
+        if package not in self.packages:
+            raise NotFoundError("package", package, self.packages, f"it should define [{full_name}]")
+        files = self.files(package, "msg")
+        if name in files:
+            return parse_message(read_definition(files[name]), package, name, str(files[name]))
+        self.actions(package)
+        if full_name in self._specs:
+            return self._specs[full_name]
+        if name in _OF_OTHER_LANGUAGES and name not in files:
+            raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
+        import difflib  # only for the error
+
+        near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
+        if near and near[0] in PRIMITIVES:
+            raise NotFoundError("message type", full_name, hint=f"did you mean {near[0]}?")
+        raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
+
+
+_OF_OTHER_LANGUAGES = {
+    "int": "int32",
+    "long": "int64",
+    "short": "int16",
+    "unsigned": "uint32",
+    "uint": "uint32",
+    "float": "float32 or float64",
+    "double": "float64",
+    "str": "string",
+    "boolean": "bool",
+}
+"""Names of types in C++ and Python -> the types of ROS."""
+
+
+def read_definition(path: Path) -> str:
+    """Return the text of a definition's file. Raise DefinitionError where it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DefinitionError(str(path), 1, f"cannot be read: {error}") from error
+
+
+def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
+    """Return a package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
+
+    With them go stubs with the types of fields and constructors, and the empty ``py.typed``, which makes mypy use them
+    (PEP 561). Raise DefinitionError, NotFoundError.
+    """
+    from minirospy.core.idl.emit import emit_message, emit_package, emit_service
+    from minirospy.core.idl.stubs import emit_stub
+
+    messages, services = catalogue.messages(package), catalogue.services(package)
+    sources = {"py.typed": ""}
+    for message in messages:
+        sources[f"msg/_{message.name}.py"] = emit_message(message, catalogue.message)
+    for service in services:
+        sources[f"srv/_{service.name}.py"] = emit_service(service, catalogue.message)
+    if messages:
+        sources["msg/__init__.py"] = emit_package(package, "msg", [each.name for each in messages])
+        sources["msg/__init__.pyi"] = emit_stub(messages)
+    if services:
+        sources["srv/__init__.py"] = emit_package(
+            package, "srv", [each.name for each in services], ("", "Request", "Response")
+        )
+        parts = [message for service in services for message in (service.request, service.response)]
+        sources["srv/__init__.pyi"] = emit_stub(parts, services)
+    return sources
+
+
+def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: bool = False) -> list[Path]:
+    """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
+
+    With ``on_demand`` only the ``__init__`` modules and the stubs are written, and each message's module is made when it is
+    first imported. A file whose text would be the same is left alone. Raise DefinitionError, NotFoundError.
+    """
+    sources = compile_package(catalogue, package)
+    if on_demand:
+        sources = _on_demand(sources)
+        for kind in ("msg", "srv"):
+            # Of an earlier build, which compiled it ahead.
+            for stale in (root / package / kind).glob("_[!_]*.py"):
+                stale.unlink()
+    folder = root / package
+    if not (folder / "__init__.py").exists():
+        sources["__init__.py"] = f'"""{package}: generated by minirospy from its definitions."""\n'
+    return [path for name, source in sources.items() if write_if_changed(path := folder / name, source)]
+
+
+def _on_demand(sources: dict[str, str]) -> dict[str, str]:
+    """Return the files of a package whose modules are made when they are imported."""
+    modules = [text for name, text in sources.items() if _is_module(name)]
+    fingerprint = zlib.crc32("".join(modules).encode())
+    kept = {name: text for name, text in sources.items() if not _is_module(name)}
+    for name, text in kept.items():
+        if name.endswith("__init__.py"):
+            # What emit_package writes into each such file is here in one place.
+            names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
+            kept[name] = (
+                f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
+                f"__getattr__, __dir__, __all__ = load_package(__name__, {fingerprint}, {names!r})\n"
+            )
+    return kept
+
+
+def _is_in(module: str, init: str) -> bool:
+    return _is_module(module) and module.partition("/")[0] == init.partition("/")[0]
+
+
+def _module_name(name: str) -> str:
+    """Return ``Name`` of ``msg/_Name.py``."""
+    return name.partition("/_")[2].removesuffix(".py")
+
+
+def _is_module(name: str) -> bool:
+    return name.endswith(".py") and not name.endswith("__init__.py")
+
+
+def write_if_changed(path: Path, text: str) -> bool:
+    """Write a file unless it says that already; whether it was written.
+
+    Its time is a later second than before: by second and size Python decides whether a compiled module is of this source.
+    """
+    data = text.encode()
+    earliest = 0
+    with contextlib.suppress(OSError):
+        if path.read_bytes() == data:
+            return False
+        earliest = int(path.stat().st_mtime) + 1
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+    if path.stat().st_mtime < earliest:
+        os.utime(path, (earliest, earliest))
+    return True
+
+
+def get_message_class(name: str) -> type[Message] | None:
+    """Return the class of ``pkg/Name``, or None where no module defines it."""
+    found: type[Message] | None = _imported(name, "msg")
+    return found
+
+
+def get_service_class(name: str) -> ServiceClass | None:
+    """Return the class of the service ``pkg/Name``, or None where no module defines it."""
+    found: ServiceClass | None = _imported(name, "srv")
+    return found
+
+
+def message_class(name: str) -> type[Message]:
+    """Return the class of ``pkg/Name``. Raise NotFoundError with similar names."""
+    found = get_message_class(name)
+    if found is None:
+        raise NotFoundError("message type", name, _known("msg"), "types are written package/Type")
+    return found
+
+
+def service_class(name: str) -> ServiceClass:
+    """Return the class of the service ``pkg/Name``. Raise NotFoundError with similar names."""
+    found = get_service_class(name)
+    if found is None:
+        raise NotFoundError("service type", name, _known("srv"), "types are written package/Type")
+    return found
+
+
+def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
+    """Return the specs in a full text: the message's own, and those of all types that it needs. Raise DefinitionError."""
+    from minirospy.core.idl.parse import parse_message
+
+    if len(text) > MOST_TEXT:
+        raise DefinitionError(full_name, 1, f"its definition has more than {MOST_TEXT} characters")
+    specs: dict[str, MessageSpec] = {}
+    # The newline before a line of "=" belongs to it: a text that ends without one stays so.
+    for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
+        name, body = full_name, part
+        if number:
+            head, _, body = part.partition("\n")
+            name = head.removeprefix("MSG:").strip()
+        check_type_name(name, full_name)
+        package, _, short = name.partition("/")
+        specs.setdefault(name, parse_message(body, package, short))
+    return specs
+
+
+def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
+    """Return the specs of a full text that the message needs, each after those that it needs, and the message's md5sum.
+
+    No class is made of them. Raise DefinitionError.
+    """
+    from minirospy.core.idl.digest import message_md5
+
+    specs = specs_of_text(full_name, text)
+
+    def lookup(name: str) -> MessageSpec:
+        if name not in specs:
+            raise DefinitionError(full_name, 1, f"the full text lacks [{name}]")
+        return specs[name]
+
+    needed = {name: specs[name] for name in check_types(specs[full_name], lookup)}
+    return needed, message_md5(specs[full_name], lookup)
+
+
+def class_from_text(full_name: str, text: str) -> type[Message]:
+    """Return a message class from a full text, as a publisher sends it, for a type that is not installed.
+
+    Raise DefinitionError.
+    """
+    return classes_from_text(full_name, text)[full_name]
+
+
+@lru_cache(maxsize=256)
+def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
+    """Return the class of a full text and those of all types that it needs, by name. Raise DefinitionError."""
+    from minirospy.core.idl.emit import emit_class
+
+    specs, _ = checked_text(full_name, text)
+    made: dict[str, type[Message]] = {}
+    for name, spec in specs.items():
+        made[name] = _run(emit_class(spec, specs.__getitem__), name, made)
+    # Sent on as it came, even where ours would be written otherwise.
+    made[full_name]._full_text = text
+    return types.MappingProxyType(made)
+
+
+def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
+    """Execute the source of a class, in whose fields are classes made before."""
+    file = f"<generated {name}>"
+    module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
+    for type_, alias in emitted.classes.items():
+        module.__dict__[alias] = made[type_]
+    source = emitted.source
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    # Its names have passed `validate`, all other text is in it by `repr`: nothing of a peer's is code.
+    try:
+        exec(compile(source, file, "exec"), module.__dict__)
+    except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
+        # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
+        raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
+    found: type[Message] = module.__dict__[name.partition("/")[2]]
+    # As genpy calls it: programs that read bags look for `_sensor_msgs__Image`.
+    found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
+    found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
+    _running[id(found)] = found
+    # Its source goes with it: a publisher may send any number of definitions.
+    weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
+    return found
+
+
+_running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
+"""The classes that were made at run time, by their ids: a message that is unpickled finds its own."""
+
+
+def _reduced(message: Any) -> tuple[Any, ...]:
+    """Return how pickle and copy make a message whose class no module has: from its class's text."""
+    kind = type(message)
+    return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
+
+
+def _unpickled(key: int, type_: str, text: str) -> Message:
+    """Return a new message of a class made at run time; in another process its class is made again."""
+    found = _running.get(key)
+    if found is None or (found._type, found._full_text) != (type_, text):
+        found = class_from_text(type_, text)
+    return found.__new__(found)
+
+
+def _imported(name: str, kind: str) -> Any:
+    """Return the class ``pkg/Name`` of an installed package, or None.
+
+    The name may come from a peer, and to import a module is to execute it: so only a package with a folder (or module)
+    ``msg`` or ``srv`` is imported, never any other module that happens to have the name.
+    """
+    if name == "Header" and kind == "msg":
+        name = "std_msgs/Header"
+    if not is_type_name(name):
+        return None
+    package, _, short = name.partition("/")
+    if not _has_definitions(package, kind):
+        return None
+
+    try:
+        module = importlib.import_module(f"{package}.{kind}")
+    except ModuleNotFoundError as error:
+        if error.name and not f"{package}.{kind}".startswith(error.name):
+            raise
+        return None
+
+    found = getattr(module, short, None)
+    return found if hasattr(found, "_md5sum") and hasattr(found, "_type") else None
+
+
+def _has_definitions(package: str, kind: str) -> bool:
+    """Return whether a package holds a module of generated classes, without importing either."""
+    if f"{package}.{kind}" in sys.modules:
+        return True
+    try:
+        found = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        # ValueError: a module that was put into sys.modules by hand has no spec.
+        found = None
+    if found is None:
+        return package in sys.modules
+    if found.submodule_search_locations is None:
+        return False
+    # A package may spread over several entries of sys.path once it has been imported (pkgutil.extend_path).
+    folders = [*found.submodule_search_locations, *(os.path.join(entry, package) for entry in sys.path)]
+    return importlib.machinery.PathFinder.find_spec(f"{package}.{kind}", folders) is not None
+
+
+def _known(kind: str) -> set[str]:
+    """Return the types of minirospy's own packages, and of all on sys.path that hold generated modules."""
+    from minirospy.core.idl.own_packages import own_definitions
+
+    files = [(path.parent.parent, path.stem) for path in own_definitions().glob(f"*/{kind}/*.{kind}")]
+    for entry in sys.path:
+        modules = Path(entry or ".").glob(f"*/{kind}/_*.py")
+        files += [(path.parent.parent, path.stem[1:]) for path in modules if path.stem != "__init__"]
+    return {f"{folder.name}/{name}" for folder, name in files}

@@ -1,0 +1,36 @@
+"""The packages of definitions that come with minirospy: where they are, and which are modules of the wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["COMPILED_AHEAD", "own_definitions"]
+
+COMPILED_AHEAD = frozenset(
+    [
+        "actionlib_msgs",
+        "dynamic_reconfigure",
+        "geometry_msgs",
+        "minirospy_msgs",
+        "nav_msgs",
+        "roscpp",
+        "rosgraph_msgs",
+        "rpi_msgs",
+        "sensor_msgs",
+        "sick_safetyscanners",
+        "std_msgs",
+        "std_srvs",
+        "tf",
+        "tf2_msgs",
+        "visualization_msgs",
+    ]
+)
+"""Packages whose modules are files of the wheel: those of ROS itself and of the workshop, which most programs import."""
+
+_OURS = Path(__file__).parents[2]
+
+
+def own_definitions() -> Path:
+    """Return the folder of minirospy's own definitions: ``share/msgs`` when installed, ``msgs`` in a checkout."""
+    installed = _OURS / "share" / "msgs"
+    return installed if installed.is_dir() else _OURS.parent / "msgs"

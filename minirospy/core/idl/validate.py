@@ -1,0 +1,152 @@
+"""Checks of all text that becomes Python source: names of types and fields, and sizes, before anything is generated.
+
+A definition may come from a file or from any publisher's connection header; its names are written into source that is
+executed. So they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which leaves no
+character that could end a name or a text in Python. And a short text may mean much: a type with two fields of a type
+with two fields of ..., or an array of a billion numbers. So what a type unfolds to is counted first.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Callable
+from graphlib import CycleError, TopologicalSorter
+from typing import NamedTuple
+
+from minirospy.base.errors import DefinitionError
+from minirospy.core.idl.source import python_name
+from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
+
+__all__ = ["MOST_LEVELS", "MOST_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
+
+MOST_TEXT = 1 << 20
+"""Characters of a full text: the largest of real packages have some 30,000."""
+
+MOST_LEVELS = 50
+"""How deep messages may be nested in each other."""
+
+_MOST_FIELDS = 4_000
+"""Fields of a message, those of its inner messages included, as the generated source has them."""
+
+_MOST_FIELDS_IN_ALL = 32_000
+"""The same, of all types together that a message needs: the largest of MoveIt's has some 17,000."""
+
+_MOST_BYTES = 1 << 27
+"""Memory of a message's arrays of fixed length."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_SHOWN = 80
+
+
+def is_type_name(name: str) -> bool:
+    """Return whether a text is ``pkg/Name`` by ROS's grammar, and neither part is a Python keyword."""
+    package, slash, short = name.partition("/")
+    return bool(slash) and all(
+        _NAME.fullmatch(part) and not keyword.iskeyword(part) for part in (package, short)
+    )
+
+
+def check_type_name(name: str, where: str = "") -> None:
+    """Raise DefinitionError unless :func:`is_type_name`; ``where`` names the text that has it."""
+    if is_type_name(name):
+        return
+    shown = _shown(name)
+    why = "is not of the form package/Type in letters, digits and underscores"
+    if any(keyword.iskeyword(part) for part in name.split("/")):
+        why = "cannot be a Python class: a part of the name is a keyword of Python"
+    raise DefinitionError(_shown(where) if where else shown, 1, f"[{shown}] {why}")
+
+
+def check_spec(spec: MessageSpec) -> None:
+    """Raise DefinitionError unless all names of a message are fit for generated source."""
+    check_type_name(spec.full_name)
+
+    seen: set[str] = set()
+    for name in (*(field.name for field in spec.fields), *(constant.name for constant in spec.constants)):
+        if not _NAME.fullmatch(name):
+            raise DefinitionError(spec.full_name, 1, f"[{_shown(name)}] is not a legal field name")
+        if python_name(name) in seen:
+            raise DefinitionError(spec.full_name, 1, f"[{_shown(name)}] is declared twice in Python")
+        seen.add(python_name(name))
+
+    for field in spec.fields:
+        if field.type.base not in PRIMITIVES:
+            check_type_name(field.type.base, spec.full_name)
+
+
+def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list[str]:
+    """Return the names of a message and of all types that it needs, each after those that it needs itself.
+
+    Raise DefinitionError where a name is not legal, where a message contains itself, and where it is too large or too
+    deeply nested to make a class of; as well what ``lookup`` raises.
+    """
+    specs = {spec.full_name: spec}
+    check_spec(spec)
+    needed: dict[str, set[str]] = {}
+    waiting = [spec.full_name]
+    while waiting:
+        name = waiting.pop()
+        needed[name] = {field.type.base for field in specs[name].fields if not field.type.is_primitive}
+        for inner in needed[name] - specs.keys():
+            specs[inner] = lookup(inner)
+            check_spec(specs[inner])
+            waiting.append(inner)
+
+    try:
+        order = list(TopologicalSorter(needed).static_order())
+    except CycleError as error:
+        # graphlib names the first one twice.
+        around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
+        raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
+
+    sizes: dict[str, _Size] = {}
+    for name in order:
+        sizes[name] = _size_of(specs[name], sizes)
+        _check_size(spec.full_name, sizes[name])
+    if sum(size.fields for size in sizes.values()) > _MOST_FIELDS_IN_ALL:
+        raise DefinitionError(
+            spec.full_name, 1, f"its types have more than {_MOST_FIELDS_IN_ALL} fields in all"
+        )
+    return order
+
+
+class _Size(NamedTuple):
+    """The size of an unfolded message."""
+
+    fields: int
+    levels: int
+    bytes: int
+
+
+def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
+    """Return the size of a message whose inner messages have these ``sizes``."""
+    fields, levels, memory = 5, 1, 0
+    for field in spec.fields:
+        inner = sizes.get(field.type.base)
+        each = 1 if field.type.is_bytes else 8
+        if inner:
+            each = 64 + inner.bytes
+            levels = max(levels, inner.levels + 1)
+        fields += 1 + (inner.fields if inner else 0)
+        # Of an array without a fixed length a new message has no element.
+        memory += each * (1 if not field.type.is_array else field.type.length or 0)
+    return _Size(fields, levels, memory)
+
+
+def _check_size(where: str, size: _Size) -> None:
+    if size.fields > _MOST_FIELDS:
+        raise DefinitionError(
+            where, 1, f"it has more than {_MOST_FIELDS} fields, those of its types included"
+        )
+    if size.levels > MOST_LEVELS:
+        raise DefinitionError(where, 1, f"its types are nested deeper than {MOST_LEVELS} levels")
+    if size.bytes > _MOST_BYTES:
+        raise DefinitionError(where, 1, f"its arrays of fixed length take more than {_MOST_BYTES >> 20} MiB")
+
+
+def _shown(text: str) -> str:
+    """Return a text from a peer for an error's line: printable, and not endless."""
+    text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    # A letter of another script may look like one of ours.
+    return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

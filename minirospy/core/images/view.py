@@ -1,0 +1,52 @@
+"""The pixels of an image message, without a copy where its bytes have this machine's order. Pure."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from minirospy.core.images.encodings import DEPTHS, type_of_encoding
+
+if TYPE_CHECKING:
+    from sensor_msgs.msg import Image
+
+    from minirospy.core.images.encodings import Pixels
+
+__all__ = ["pixels"]
+
+
+def pixels(message: Image) -> Pixels:
+    """Return the image of a message: (height, width) or (height, width, channels), in the message's encoding.
+
+    It is a read-only view unless the order of bytes has to change. Bytes between the rows (``step``) are left out. Raises
+    ValueError (an unknown encoding, less data than the size needs).
+    """
+    import numpy as np
+
+    number = type_of_encoding(message.encoding)
+    channels = number // 8 + 1
+    dtype = np.dtype(list(DEPTHS.values())[number % 8]).newbyteorder(">" if message.is_bigendian else "<")
+    row = message.width * channels * dtype.itemsize
+    # Some drivers leave the step empty.
+    step = message.step if message.step >= row else row
+    needed = max(message.height - 1, 0) * step + (row if message.height else 0)
+    data = message.data
+    if isinstance(data, str):
+        data = data.encode()
+    if len(data) < needed:
+        raise ValueError(
+            f"the image of {message.width}x{message.height} [{message.encoding}] needs {needed} bytes, "
+            f"its data has {len(data)}"
+        )
+
+    shape, strides = (
+        (message.height, message.width, channels),
+        (step, channels * dtype.itemsize, dtype.itemsize),
+    )
+    dimensions = 2 if channels == 1 else 3
+    image: Pixels = np.ndarray(
+        shape[:dimensions], dtype, data if needed else bytes(1), 0, strides[:dimensions]
+    )
+    if dtype.itemsize > 1 and bool(message.is_bigendian) == (sys.byteorder == "little"):
+        image = image.astype(dtype.newbyteorder("="))
+    return image

@@ -1,0 +1,106 @@
+"""The faults of a transform, as texts of tf2's, and a log of them that does not flood.
+
+The texts are tf2's (noetic's: with the parent), since people search for them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from minirospy.core.tf2.cache import Misfit, seconds
+from minirospy.core.tf2.rotation import Quaternion, Vector
+
+__all__ = ["Refusal", "RefusalLog", "faults_of", "misfit_refusal"]
+
+_TOLERANCE = 0.01
+"""How far the squared length of a quaternion may be from 1."""
+_PAUSE = 1.0
+_MOST_KEYS = 1000
+
+
+class Refusal(NamedTuple):
+    """A transform that was not taken: the child frame, tf2's name of the fault, and its text."""
+
+    frame: str
+    kind: str
+    text: str
+    is_error: bool
+    """Whether the transform itself is wrong; else it only comes too late, or twice."""
+
+
+def faults_of(
+    parent: str, child: str, translation: Vector, rotation: Quaternion, authority: str
+) -> list[Refusal]:
+    """Return every reason why tf2 takes no such transform, from no data at all; in tf2's order."""
+    found = []
+
+    def add(kind: str, text: str) -> None:
+        found.append(Refusal(child, kind, f"{kind}: {text}", True))
+
+    if child == parent:
+        add(
+            "TF_SELF_TRANSFORM",
+            f'Ignoring transform from authority "{authority}" with frame_id and child_frame_id  "{child}" '
+            "because they are the same",
+        )
+    if not child:
+        add(
+            "TF_NO_CHILD_FRAME_ID",
+            f'Ignoring transform from authority "{authority}" because child_frame_id not set ',
+        )
+    if not parent:
+        add(
+            "TF_NO_FRAME_ID",
+            f'Ignoring transform with child_frame_id "{child}"  from authority "{authority}" because frame_id not set',
+        )
+
+    shown_rotation = " ".join(f"{each:.6f}" for each in rotation)
+    if any(math.isnan(each) for each in (*translation, *rotation)):
+        shown = " ".join(f"{each:.6f}" for each in translation)
+        add(
+            "TF_NAN_INPUT",
+            f'Ignoring transform for child_frame_id "{child}" from authority "{authority}" because of a nan value in '
+            f"the transform ({shown}) ({shown_rotation})",
+        )
+    if not abs(math.fsum(each * each for each in rotation) - 1.0) < _TOLERANCE:
+        add(
+            "TF_DENORMALIZED_QUATERNION",
+            f'Ignoring transform for child_frame_id "{child}" from authority "{authority}" because of an invalid '
+            f"quaternion in the transform ({shown_rotation})",
+        )
+    return found
+
+
+def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authority: str) -> Refusal:
+    """Return the refusal of a transform that a frame's cache did not take."""
+    text = f"{misfit.value} for frame {child} (parent {parent}) at time {seconds(stamp):.6f} according to authority {authority}"
+    return Refusal(child, misfit.value.partition(" ")[0], text, False)
+
+
+class RefusalLog:
+    """Passes a refusal on to ``write`` at most once a second for each frame and fault; the next one has the count.
+
+    ``clock`` returns seconds. tf2 writes each, which floods terminals where two nodes publish one frame.
+    """
+
+    def __init__(self, write: Callable[[str, bool], object], clock: Callable[[], float]) -> None:
+        self._write = write
+        self._clock = clock
+        self._written: dict[tuple[str, str], tuple[float, int]] = {}
+
+    def __call__(self, refusal: Refusal) -> None:
+        """Write ``write(text, is_error)``, or count."""
+        key = refusal.frame, refusal.kind
+        now = self._clock()
+        last, held_back = self._written.get(key, (-math.inf, 0))
+        if now - last < _PAUSE:
+            self._written[key] = last, held_back + 1
+            return
+
+        if len(self._written) >= _MOST_KEYS:
+            self._written.clear()
+        self._written[key] = now, 0
+        times = f" ({held_back} more like it in {now - last:.0f} s)" if held_back else ""
+        self._write(refusal.text + times, refusal.is_error)

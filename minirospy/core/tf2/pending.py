@@ -1,0 +1,234 @@
+"""TFMessages as they came -> the samples of one frame, decoded when that frame is looked up.
+
+A publisher sends the same frames in the same order again and again: two messages of one layout differ only in
+sequence numbers, stamps and transforms, which are at the same offsets. So a message of a known layout is recognised
+without decoding it, and kept as bytes. What may be dropped without decoding it is what the caches would have
+forgotten by now.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from minirospy.base.errors import DeserializationError
+from minirospy.core.tf2.rotation import Quaternion, Vector
+
+__all__ = ["Arrival", "Layout", "Layouts", "TransformSample", "read_transforms", "without_slash"]
+
+_COUNT = struct.Struct("<I")
+_HEAD = struct.Struct("<4I")
+_STAMP = struct.Struct("<2I")
+_BODY = struct.Struct("<7d")
+_BLOCK = 64
+"""After so many messages a layout drops what has expired, so many at a time."""
+_MOST_MESSAGES = 16_384
+_MOST_LAYOUTS = 16_384
+_MOST_SAME_LENGTH = 8
+
+
+class TransformSample(NamedTuple):
+    """One transform of a message; the stamp in nanoseconds."""
+
+    parent: str
+    child: str
+    stamp: int
+    translation: Vector
+    rotation: Quaternion
+
+
+class Arrival(NamedTuple):
+    """A message that is kept: which one it was in the order of all, who sent it, and its bytes."""
+
+    number: int
+    authority: str
+    data: bytes
+
+
+class _Offsets(NamedTuple):
+    """Where a transform is in a message: the offsets of its header, and of its seven numbers."""
+
+    parent: str
+    child: str
+    header: int
+    body: int
+
+
+def read_transforms(data: bytes) -> list[TransformSample]:
+    """Return the transforms of a serialised tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
+    return [_sample(data, offsets) for offsets in _find_transforms(data)]
+
+
+class Layout:
+    """The messages with the same frames in the same order."""
+
+    def __init__(self, found: list[_Offsets]) -> None:
+        self._offsets = found
+        self._index = {offsets.child: index for index, offsets in enumerate(found)}
+        self._arrivals: list[Arrival] = []
+        self._dropped = 0
+        """How many messages came before the first of the list."""
+        self._decoded = [0] * len(found)
+        """Of each transform: how many messages, counted from the first that ever came, have been decoded."""
+        self._newest = [0] * len(found)
+        """Of each transform: the stamp when expired messages were dropped last."""
+
+    @property
+    def children(self) -> list[str]:
+        """The child frames, in the order of the messages."""
+        return [offsets.child for offsets in self._offsets]
+
+    def keep(self, arrival: Arrival, span: int) -> list[str]:
+        """Keep a message, and drop what has expired; return the frames that the caller has to decode now."""
+        self._arrivals.append(arrival)
+        return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
+
+    def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
+        """Decode what has come of a frame since the last time: (number of the arrival, authority, sample)."""
+        index = self._index[child]
+        start = max(0, self._decoded[index] - self._dropped)
+        self._decoded[index] = self._dropped + len(self._arrivals)
+        offsets = self._offsets[index]
+        for arrival in self._arrivals[start:]:
+            yield arrival.number, arrival.authority, _sample(arrival.data, offsets)
+
+    def forget(self) -> None:
+        """Drop all messages."""
+        self._dropped += len(self._arrivals)
+        self._arrivals.clear()
+
+    def _drop_expired(self, span: int) -> list[str]:
+        """Drop the oldest blocks that nobody needs any more; return the frames to decode.
+
+        A frame needs no message that it has decoded, and none that its cache would have forgotten. The cache forgets what is
+        older than the newest message, if that is one that it takes: a valid one, later than those before. A frame of which it
+        is not has to be decoded; then its messages can go, too.
+        """
+        newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
+        moves_on = [
+            _is_valid(sample) and sample.stamp > before
+            for sample, before in zip(newest, self._newest, strict=True)
+        ]
+        self._newest = [sample.stamp for sample in newest]
+
+        count = 0
+        while count + _BLOCK < len(self._arrivals):
+            last = self._arrivals[count + _BLOCK - 1].data
+            needed = self._dropped + count + _BLOCK
+            if any(
+                decoded < needed and (not moves or _stamp(last, offsets) >= sample.stamp - span)
+                for decoded, moves, offsets, sample in zip(
+                    self._decoded, moves_on, self._offsets, newest, strict=True
+                )
+            ):
+                break
+            count += _BLOCK
+        del self._arrivals[:count]
+        self._dropped += count
+
+        is_full = len(self._arrivals) >= _MOST_MESSAGES
+        return [
+            offsets.child
+            for offsets, moves in zip(self._offsets, moves_on, strict=True)
+            if is_full or not moves
+        ]
+
+
+class Layouts:
+    """Every layout that has come, found by a message's bytes."""
+
+    def __init__(self) -> None:
+        self._single: dict[bytes, Layout] = {}
+        """Of messages with one transform: by the names' bytes, which are in one piece."""
+        self._several: dict[int, list[tuple[int, int, Layout]]] = {}
+        """By a message's length: a mask of the bytes that do not change, their value, the layout."""
+        self._count = 0
+
+    def __iter__(self) -> Iterator[Layout]:
+        yield from self._single.values()
+        for found in self._several.values():
+            for _, _, layout in found:
+                yield layout
+
+    def find(self, data: bytes) -> Layout | None:
+        """Return the layout of a message; None where it is a new one, or no message."""
+        if data[:4] == b"\1\0\0\0":
+            return self._single.get(data[16:-56])
+        candidates = self._several.get(len(data))
+        if candidates is None:
+            return None
+        number = int.from_bytes(data, "little")
+        for mask, value, layout in candidates:
+            if number & mask == value:
+                return layout
+        return None
+
+    def add(self, data: bytes) -> Layout | None:
+        """Make the layout of a message; None where it has no frame, one twice, or there are too many layouts."""
+        found = _find_transforms(data)
+        children = {offsets.child for offsets in found}
+        if not found or len(children) < len(found) or self._count >= _MOST_LAYOUTS:
+            return None
+
+        layout = Layout(found)
+        if len(found) == 1:
+            self._single[data[16:-56]] = layout
+        else:
+            same_length = self._several.setdefault(len(data), [])
+            if len(same_length) >= _MOST_SAME_LENGTH:
+                return None
+            mask = bytearray(b"\xff" * len(data))
+            for offsets in found:
+                mask[offsets.header : offsets.header + 12] = bytes(12)
+                mask[offsets.body : offsets.body + _BODY.size] = bytes(_BODY.size)
+            unchanged = int.from_bytes(mask, "little")
+            same_length.append((unchanged, int.from_bytes(data, "little") & unchanged, layout))
+        self._count += 1
+        return layout
+
+
+def _find_transforms(data: bytes) -> list[_Offsets]:
+    found = []
+    try:
+        (count,) = _COUNT.unpack_from(data)
+        end = 4
+        for _ in range(count):
+            header = end
+            *_, length = _HEAD.unpack_from(data, end)
+            end += 16
+            parent = data[end : end + length].decode("utf-8", "replace")
+            end += length
+            (length,) = _COUNT.unpack_from(data, end)
+            end += 4
+            child = data[end : end + length].decode("utf-8", "replace")
+            end += length
+            found.append(_Offsets(without_slash(parent), without_slash(child), header, end))
+            end += _BODY.size
+    except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
+        raise DeserializationError(error) from error
+    if end > len(data):
+        raise DeserializationError("the message ends too early")
+
+    return found
+
+
+def without_slash(name: str) -> str:
+    """Return a frame's name as tf2 knows it: without one leading slash."""
+    return name[1:] if name.startswith("/") else name
+
+
+def _sample(data: bytes, offsets: _Offsets) -> TransformSample:
+    x, y, z, qx, qy, qz, qw = _BODY.unpack_from(data, offsets.body)
+    return TransformSample(offsets.parent, offsets.child, _stamp(data, offsets), (x, y, z), (qx, qy, qz, qw))
+
+
+def _stamp(data: bytes, offsets: _Offsets) -> int:
+    secs, nsecs = _STAMP.unpack_from(data, offsets.header + 4)
+    return int(secs * 1_000_000_000 + nsecs)
+
+
+def _is_valid(sample: TransformSample) -> bool:
+    x, y, z, w = sample.rotation
+    return abs(x * x + y * y + z * z + w * w - 1.0) < 0.01 and not math.isnan(sum(sample.translation))

@@ -1,0 +1,77 @@
+"""A robot as text: its tree as `check_urdf` prints it, and as a graph for graphviz."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from minirospy.base.errors import UrdfError
+from minirospy.core.urdf.model import Problem, Robot
+from minirospy.core.urdf.poses import quaternion_from_rpy, rpy_from_quaternion
+
+__all__ = ["dot_graph", "error_lines", "problem_lines", "tree_lines"]
+
+
+def tree_lines(robot: Robot) -> Iterator[str]:
+    """Yield the lines of `check_urdf` about a robot."""
+    yield f"robot name is: {robot.name}"
+    yield "---------- Successfully Parsed XML ---------------"
+    yield f"root Link: {robot.root} has {len(robot.child_joints(robot.root))} child(ren)"
+    # A list instead of recursion, and each link's children once: neither a deep robot nor links with many parents take long.
+    shown = {robot.root}
+    waiting = [(1, *child) for child in _numbered(robot, robot.root)]
+    while waiting:
+        level, number, link = waiting.pop()
+        yield f"{'    ' * level}child({number}):  {link}"
+        if link not in shown:
+            shown.add(link)
+            waiting += [(level + 1, *child) for child in _numbered(robot, link)]
+
+
+def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
+    """Return the children of a link with their numbers, the last first."""
+    return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
+
+
+def dot_graph(robot: Robot) -> str:
+    """Return the links and joints as text for graphviz, as `urdf_to_graphviz` writes it."""
+    links, edges = [], []
+    waiting = [robot.root]
+    seen = set()
+    while waiting:
+        link = waiting.pop()
+        if link in seen:
+            continue
+        seen.add(link)
+        links.append(f"{_quoted(link)} [label={_quoted(link)}];")
+        if link != robot.root:
+            joint = robot.parent_joint(link)
+            assert joint is not None
+            x, y, z = joint.origin.xyz
+            roll, pitch, yaw = rpy_from_quaternion(quaternion_from_rpy(*joint.origin.rpy))
+            label = f"xyz: {x:g} {y:g} {z:g} \\nrpy: {roll:g} {pitch:g} {yaw:g}"
+            edges.append(f'{_quoted(joint.parent)} -> {_quoted(joint.name)} [label="{label}"]')
+            edges.append(f"{_quoted(joint.name)} -> {_quoted(link)}")
+        waiting += [joint.child for joint in reversed(robot.child_joints(link))]
+
+    head = ["digraph G {", "node [shape=box];"]
+    return "\n".join([*head, *links, "node [shape=ellipse, color=blue, fontcolor=blue];", *edges, "}"]) + "\n"
+
+
+def _quoted(name: str) -> str:
+    escaped = name.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def error_lines(error: UrdfError) -> Iterator[str]:
+    """Yield the lines of ROS's reader about a description that does not read, each with its place."""
+    for text in error.trail:
+        yield f"Error:   {text}"
+        yield f"         at line {error.line} in {error.file}" if error.line else f"         in {error.file}"
+
+
+def problem_lines(problem: Problem, file: str) -> Iterator[str]:
+    """Yield the lines of ROS's reader about a part that it leaves out."""
+    level = "Warning:" if problem.is_warning else "Error:  "
+    for text in problem.trail:
+        yield f"{level} {text}"
+        yield f"         at line {problem.line} in {file}"

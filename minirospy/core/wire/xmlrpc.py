@@ -1,0 +1,153 @@
+"""XML-RPC: calls and answers as bytes, and back.
+
+Pure; parses with expat (``core/wire/xmlrpc_reader.py``), and what is plain without it (``core/wire/xmlrpc_plain.py``). A server,
+which serves others meanwhile, reads and writes in short steps where a document is long.
+Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from minirospy.base.errors import RpcFault, RpcProtocolError
+from minirospy.base.steps import Steps
+from minirospy.core.wire.xmlrpc_plain import read_plain
+from minirospy.core.wire.xmlrpc_reader import DateTime, Reader, read_document
+from minirospy.core.wire.xmlrpc_writer import Output, escape, write, write_in_steps
+
+__all__ = [
+    "Call",
+    "DateTime",
+    "Serialized",
+    "parse_call",
+    "parse_call_in_steps",
+    "parse_response",
+    "serialize_call",
+    "serialize_call_in_steps",
+    "serialize_fault",
+    "serialize_response",
+    "serialize_response_in_steps",
+]
+
+_PLAIN_BYTES = 32768
+"""A document up to this length is read in one step where it is plain."""
+
+_STEP_BYTES = 8192
+
+_HEAD = "<?xml version='1.0'?>\n"
+
+
+class Call(NamedTuple):
+    """A method call."""
+
+    method: str
+    args: list[object]
+
+
+class Serialized:
+    """An answer that is XML already, in pieces: a long one takes long to join."""
+
+    __slots__ = ("pieces",)
+
+    def __init__(self, pieces: Sequence[bytes]) -> None:
+        self.pieces = pieces
+
+
+def serialize_call(method: str, args: Sequence[object]) -> bytes:
+    """Return a call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
+    parts = [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
+    for value in args:
+        parts.append("<param>")
+        write(value, parts, 0)
+        parts.append("</param>")
+    parts.append("</params></methodCall>\n")
+    return "".join(parts).encode()
+
+
+def serialize_response(value: object) -> bytes:
+    """Return a successful answer as XML."""
+    if type(value) is Serialized:
+        return b"".join(value.pieces)
+    parts = [_HEAD, "<methodResponse><params><param>"]
+    write(value, parts, 0)
+    parts.append("</param></params></methodResponse>\n")
+    return "".join(parts).encode()
+
+
+def serialize_fault(code: int, text: str) -> bytes:
+    """Return a fault as XML."""
+    parts = [_HEAD, "<methodResponse><fault>"]
+    write({"faultCode": code, "faultString": text}, parts, 0)
+    parts.append("</fault></methodResponse>\n")
+    return "".join(parts).encode()
+
+
+def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> Steps[list[bytes]]:
+    """Return a call as pieces of XML, as :func:`serialize_response_in_steps` does an answer."""
+    out = Output(most)
+    out.parts += [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
+    for value in args:
+        out.parts.append("<param>")
+        yield from write_in_steps(value, out, 0)
+        out.parts.append("</param>")
+    out.parts.append("</params></methodCall>\n")
+    return out.finish()
+
+
+def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
+    """Return a successful answer as pieces of XML. Raises RpcProtocolError where it has more than ``most`` bytes."""
+    out = Output(most)
+    out.parts += [_HEAD, "<methodResponse><params><param>"]
+    yield from write_in_steps(value, out, 0)
+    out.parts.append("</param></params></methodResponse>\n")
+    return out.finish()
+
+
+def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
+    """Return the call in a long ``body``. Raises RpcProtocolError."""
+    plain = read_plain(body) if len(body) <= _PLAIN_BYTES else None
+    if plain and plain[0] is not None:
+        return Call(plain[0], plain[1])
+    reader, view = Reader(), memoryview(body)
+    try:
+        for at in range(0, len(view), _STEP_BYTES):
+            reader.feed(view[at : at + _STEP_BYTES])
+            yield None
+        reader.feed(b"", is_last=True)
+    finally:
+        reader.close()
+    return _call(reader)
+
+
+def parse_call(body: bytes | bytearray) -> Call:
+    """Return the call in ``body``. Raises RpcProtocolError."""
+    plain = read_plain(body)
+    if plain and plain[0] is not None:
+        return Call(plain[0], plain[1])
+    return _call(read_document(body))
+
+
+def parse_response(body: bytes | bytearray) -> Any:
+    """Return the value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
+    plain = read_plain(body)
+    if plain and plain[0] is None and len(plain[1]) == 1:
+        return plain[1][0]
+    reader = read_document(body)
+    if reader.root != "methodResponse":
+        raise RpcProtocolError("not an XML-RPC answer")
+    if reader.is_fault:
+        match reader.params:
+            case [{"faultCode": int(code), "faultString": text}]:
+                raise RpcFault(code, str(text))
+            case _:
+                raise RpcProtocolError("an XML-RPC fault without code and text")
+    if len(reader.params) != 1:
+        raise RpcProtocolError("an XML-RPC answer without a value")
+    return reader.params[0]
+
+
+def _call(reader: Reader) -> Call:
+    if reader.root != "methodCall" or reader.method is None:
+        raise RpcProtocolError("not an XML-RPC method call")
+    return Call(reader.method, reader.params)

@@ -1,0 +1,144 @@
+"""XML-RPC of the plain kind, read without an XML parser: five times as fast, and the same.
+
+Pure. Plain is what nearly all documents of ROS are: ASCII without references; strings, numbers, booleans, arrays
+and structs, written without spaces inside the tags. Of anything else, right or wrong, nothing is said here: that
+is the parser's (``core/wire/xmlrpc_reader.py``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+__all__ = ["read_plain"]
+
+_MAX_TAGS = 2_000_000
+_MAX_OPEN = 60
+"""Within the limits of the parser, which answers for what is beyond."""
+
+_SPACE = r"[ \t\r\n]*"
+# No references, nor "]]>", and no characters that XML changes or forbids.
+_TEXT = r"[\t\n !-%'-;=?-~]*"
+_STRING = rf"<value>(?:<string>({_TEXT})</string>|({_TEXT}))</value>"
+
+
+class _Patterns(NamedTuple):
+    head: re.Pattern[str]
+    tail: re.Pattern[str]
+    token: re.Pattern[str]
+
+
+def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
+    """Return the method of the call in ``body`` (None: an answer), and the parameters; None where it is not plain."""
+    try:
+        text = body.decode("ascii")
+        if text.count("<") > _MAX_TAGS:
+            return None
+        head_of, tail_of, token_of = _patterns()
+        head, end = head_of.match(text), text.rfind("</params>")
+        tail = tail_of.fullmatch(text, max(0, end))
+        # Both are of a call, or both of an answer.
+        if not head or not tail or (head[1] is None) is not (tail[1] is None):
+            return None
+        params = _read(token_of.findall(text, head.end(), end))
+    except ValueError:
+        return None
+    return None if params is None else (head[1], params)
+
+
+def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
+    """Return the values that the tokens make up; None where they do not fit each other. Raises ValueError."""
+    if tokens and tokens[-1][4] not in {"", "</param>"}:
+        # The token of what was not expected is always the last one.
+        return None
+
+    params: list[object] = []
+    add: Callable[[object], None] = params.append
+    # What is open: the first letters of its end, how the values around it are added, and what it holds.
+    opened: list[tuple[str, Callable[[object], None], Any]] = []
+
+    for text, param_text, bare, param_bare, other in tokens:
+        if not other:
+            add(text or param_text or bare or param_bare)
+            continue
+        start = other[:10]
+        if start == "<value><ar":
+            items: list[object] = []
+            add(items)
+            opened.append(("</da", add, items))
+            add = items.append
+            if len(opened) > _MAX_OPEN:
+                return None
+        elif opened and opened[-1][0] == start[:4]:
+            end, add, content = opened.pop()
+            if end == "</me":
+                name, found = content
+                (value,) = found
+                opened[-1][2][name] = value
+        elif start in _NUMBERS:
+            at = other.index(">", 8) + 1
+            add(_NUMBERS[start](other[at : other.index("<", at)]))
+        elif start == "<value><st":
+            table: dict[str, object] = {}
+            add(table)
+            opened.append(("</st", add, table))
+            add = _refuse
+            if len(opened) > _MAX_OPEN:
+                return None
+        elif start[:4] == "<mem" and opened and opened[-1][0] == "</st":
+            found = []
+            opened.append(("</me", add, (other[other.index("<name>") + 6 : other.rindex("<")], found)))
+            add = found.append
+        elif start == "<param>" and len(opened) < _MAX_OPEN:
+            opened.append(("</pa", add, None))
+        else:
+            return None
+
+    return None if opened else params
+
+
+def _refuse(_: object) -> None:
+    raise ValueError("a value in a struct, outside its members")
+
+
+_NUMBERS: dict[str, Callable[[str], object]] = {
+    "<value><in": int,
+    "<value><i4": int,
+    "<value><bo": "1".__eq__,
+    "<value><do": float,
+}
+
+
+@cache
+def _patterns() -> _Patterns:
+    # Made when they are first needed: it takes a millisecond.
+    utf8 = "(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))?"
+    declaration = rf"<\?xml version=(?:'1\.0'|\"1\.0\"){utf8} ?\?>"
+    call = rf"Call>{_SPACE}<methodName>({_TEXT})</methodName>"
+    others = (
+        r"<value><int>[+-]?[0-9]{1,18}</int></value>",
+        r"<value><boolean>[01]</boolean></value>",
+        r"<value><double>[0-9.eE+-]+</double></value>",
+        r"<value><i4>[+-]?[0-9]{1,18}</i4></value>",
+        rf"<value><array>{_SPACE}<data>",
+        rf"</data>{_SPACE}</array>{_SPACE}</value>",
+        "</?param>",
+        rf"<member>{_SPACE}<name>{_TEXT}</name>",
+        "</member>",
+        "<value><struct>",
+        rf"</struct>{_SPACE}</value>",
+        # Text in an unexpected place, and all after it, is an unknown token.
+        "(?s:.+)",
+    )
+
+    return _Patterns(
+        re.compile(rf"(?:{declaration})?{_SPACE}<method(?:{call}|Response>){_SPACE}<params>{_SPACE}"),
+        re.compile(rf"</params>{_SPACE}</method(?:(Call)|Response)>{_SPACE}"),
+        re.compile(
+            rf"{_STRING}{_SPACE}"
+            rf"|<param>{_SPACE}{_STRING}{_SPACE}</param>{_SPACE}"
+            rf"|({'|'.join(others)}){_SPACE}"
+        ),
+    )

@@ -1,0 +1,254 @@
+"""core/wire/framing: frames in any chunks, against a slow readable reference."""
+
+from __future__ import annotations
+
+import struct
+from array import array
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from minirospy.base.errors import WireError
+from minirospy.core.wire.framing import (
+    CHUNK,
+    MAX_FRAME,
+    SPLIT,
+    FrameReader,
+    LargeFrame,
+    Pieces,
+    SplitFrame,
+    may_split,
+    serialize_frame,
+    split_sizes,
+)
+
+
+def feed(reader: FrameReader, data: bytes, step: int) -> list[bytes]:
+    """Hand ``data`` over in pieces of at most ``step`` bytes, as a socket would."""
+    frames = []
+    at = 0
+    while at < len(data):
+        space = reader.space()
+        count = min(step, len(space), len(data) - at)
+        assert count > 0
+        space[:count] = data[at : at + count]
+        at += count
+        frames += [bytes(frame) for frame in reader.received(count)]
+    return frames
+
+
+@given(st.lists(st.binary(max_size=200)), st.integers(1, 300))
+def test_frames_come_out_whole_in_any_pieces(bodies: list[bytes], step: int) -> None:
+    data = b"".join(serialize_frame(body) for body in bodies)
+    assert feed(FrameReader(), data, step) == bodies
+
+
+@pytest.mark.parametrize("size", [CHUNK - 5, CHUNK - 4, CHUNK - 3, CHUNK, CHUNK + 1, 5 * CHUNK])
+@pytest.mark.parametrize("step", [1000, CHUNK, 1 << 30])
+def test_sizes_around_the_buffer(size: int, step: int) -> None:
+    bodies = [b"first", bytes(range(256)) * (size // 256) + b"x" * (size % 256), b"", b"last"]
+    data = b"".join(serialize_frame(body) for body in bodies)
+    assert feed(FrameReader(), data, step) == bodies
+
+
+def test_a_large_frame_is_not_written_again() -> None:
+    reader = FrameReader()
+    big = b"a" * (2 * CHUNK)
+    kept: list[memoryview] = []
+    for data in (serialize_frame(big), serialize_frame(b"b" * (2 * CHUNK))):
+        at = 0
+        while at < len(data):
+            space = reader.space()
+            count = min(len(space), len(data) - at)
+            space[:count] = data[at : at + count]
+            at += count
+            kept += reader.received(count)
+    assert bytes(kept[0]) == big
+
+
+def test_a_length_over_the_limit_is_refused() -> None:
+    reader = FrameReader(limit=1 << 20)
+    with pytest.raises(WireError, match="over the limit"):
+        feed(reader, struct.pack("<I", (1 << 20) + 1), 4)
+
+
+@pytest.mark.parametrize("step", [1, 7, 99, 1000, 100_000])
+def test_a_frame_over_the_limit_is_left_out(step: int) -> None:
+    reader = FrameReader(limit=3000, skips=True, chunk=1000)
+    bodies = [b"a" * 10, b"b" * 3000, b"c" * 3001, b"d" * 5000, b"e" * 996, b"f" * 997, b""]
+    data = b"".join(map(serialize_frame, bodies))
+    assert feed(reader, data, step) == [bodies[0], bodies[1], *bodies[4:]]
+    assert reader.skipped == 2
+
+
+def test_a_frame_that_is_left_out_costs_no_memory() -> None:
+    reader = FrameReader(limit=3000, skips=True, chunk=1000)
+    feed(reader, struct.pack("<I", 1 << 31), 4)
+    for _ in range(10):
+        space = reader.space()
+        assert len(space) == 1000
+        assert list(reader.received(len(space))) == []
+
+
+def test_a_claimed_length_costs_no_memory_before_the_bytes_come() -> None:
+    reader = FrameReader()
+    feed(reader, struct.pack("<I", 1 << 30), 4)
+    assert len(reader.space()) == 16 * 1024 * 1024
+
+
+def test_a_frame_beyond_the_first_claim_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.core.wire.framing._FIRST_CLAIM", 4 * CHUNK)
+    body = bytes(range(256)) * (9 * CHUNK // 256)
+    assert feed(FrameReader(), serialize_frame(body), 50_000) == [body]
+
+
+# --- large messages, in pieces
+
+
+def pieces(*written: bytes) -> Pieces:
+    found = Pieces()
+    for each in written:
+        found.write(each)
+    return found
+
+
+@pytest.mark.parametrize("sizes", [[], [0], [3], [1, 2, 3], [CHUNK - 1], [CHUNK // 2, CHUNK // 2 - 1]])
+def test_small_message_is_one_frame(sizes: list[int]) -> None:
+    body = [bytes([number + 65]) * size for number, size in enumerate(sizes)]
+    assert pieces(*body).frame() == serialize_frame(b"".join(body))
+
+
+def test_length_of_an_array_is_that_of_its_bytes() -> None:
+    """The len() of an array of numbers is not in bytes, alone or beside others."""
+    numbers = memoryview(array("I", [1, 2, 3]))
+    for written in ([numbers], [b"ab", numbers]):
+        assert pieces(*written).frame() == serialize_frame(b"".join(map(bytes, written)))
+
+
+def test_large_pieces_are_not_joined() -> None:
+    large, other = b"L" * CHUNK, b"M" * (CHUNK + 5)
+    frame = pieces(b"a", b"b", large, other, b"c", b"d").frame()
+    assert isinstance(frame, LargeFrame)
+    assert frame == ((b"ab", large, other, b"cd"), 2 * CHUNK + 9)
+    assert frame.pieces[1] is large
+    assert pieces(large).frame() == ((large,), CHUNK)
+    assert pieces(b"a", large).frame() == ((b"a", large), CHUNK + 1)
+
+
+def test_large_piece_that_can_change_is_copied() -> None:
+    changing = bytearray(b"x" * CHUNK)
+    frame = pieces(changing).frame()
+    assert isinstance(frame, LargeFrame)
+    changing[0] = 0
+    assert frame.pieces == (b"x" * CHUNK,)
+    assert type(frame.pieces[0]) is bytes
+
+
+def test_many_small_pieces_of_a_large_message_are_joined() -> None:
+    frame = pieces(*[b"x" * 1000] * 100).frame()
+    assert frame == ((b"x" * 100_000,), 100_000)
+
+
+def test_buffers_of_a_large_message() -> None:
+    head, tail = b"head" + CHUNK.to_bytes(4, "little"), b"t" * CHUNK
+    frame = LargeFrame((head, tail), CHUNK + 8)
+    length = struct.pack("<I", CHUNK + 8)
+    assert frame.buffers(split=False) == [length, head, tail]
+    # 1 in the highest bit of the length, and then the size of the array.
+    assert frame.buffers(split=True) == [struct.pack("<II", CHUNK + 8 + 0x80000000, CHUNK) + head, tail]
+    for others in [(tail,), (b"head", tail), (head, tail, b"more")]:
+        whole = LargeFrame(others, sum(map(len, others)))
+        assert whole.buffers(split=True) == [struct.pack("<I", whole.size), *others]
+
+
+@pytest.mark.parametrize(
+    ("head", "tail", "begins"),
+    [
+        (CHUNK.to_bytes(4, "little"), CHUNK, True),
+        (b"x" + CHUNK.to_bytes(4, "little"), CHUNK, True),
+        (CHUNK.to_bytes(4, "big"), CHUNK, False),
+        ((CHUNK - 1).to_bytes(4, "little"), CHUNK - 1, False),
+        ((CHUNK + 1).to_bytes(4, "little"), CHUNK, False),
+        (b"\0\0\1", CHUNK, False),
+        (b"", CHUNK, False),
+    ],
+)
+def test_may_split_where_the_head_ends_with_the_length_of_the_array(
+    head: bytes, tail: int, begins: bool
+) -> None:
+    assert may_split(head, tail) == begins
+
+
+def test_split_sizes_of_a_frame() -> None:
+    assert split_sizes(CHUNK + 10, CHUNK) == (10, CHUNK)
+    assert split_sizes(CHUNK + 4, CHUNK) == (4, CHUNK)
+    for size, tail in [(CHUNK + 3, CHUNK), (CHUNK + 10, CHUNK - 1), (10, CHUNK)]:
+        with pytest.raises(
+            WireError, match=f"split message of {size} bytes says that it ends with an array of {tail}"
+        ):
+            split_sizes(size, tail)
+
+
+def test_split_frame_is_read_as_the_whole() -> None:
+    head, tail = b"0123456789", b"abcdefghij"
+    frame, whole = SplitFrame(head, tail), head + tail
+    assert (len(frame), bytes(frame), frame.tail) == (20, whole, tail)
+    for start in range(-1, 22):
+        assert frame[start:] == whole[start:]
+        for stop in range(-1, 22):
+            assert frame[start:stop] == whole[start:stop]
+            assert frame[start:stop:2] == whole[start:stop:2]
+    for number in range(20):
+        assert frame[number] == whole[number]
+    # The array becomes the field without a copy.
+    assert frame[10:20] is tail
+    assert frame[10:] is tail
+
+
+def test_limits_of_the_wire_are_as_documented() -> None:
+    assert (CHUNK, MAX_FRAME, SPLIT) == (65536, 2**30, 2**31)
+
+
+def test_large_frame_may_be_left_to_the_caller() -> None:
+    reader = FrameReader(gathers=False)
+    data = serialize_frame(b"small") + struct.pack("<I", 2 * CHUNK) + b"begin"
+    assert feed(reader, data, 1 << 20) == [b"small"]
+    assert reader.unfinished == (2 * CHUNK, b"begin")
+    reader.unfinished = None
+    assert feed(reader, serialize_frame(b"next"), 3) == [b"next"]
+    assert reader.unfinished is None
+
+
+def test_frame_that_just_fits_is_not_left_to_the_caller() -> None:
+    reader = FrameReader(gathers=False)
+    body = b"x" * (CHUNK - 4)
+    assert feed(reader, serialize_frame(body), 1000) == [body]
+    assert reader.unfinished is None
+    feed(reader, serialize_frame(body + b"y"), 1 << 20)
+    assert reader.unfinished == (CHUNK - 3, body)
+
+
+def test_bytes_that_are_put_back_come_first() -> None:
+    reader = FrameReader()
+    data = serialize_frame(b"one") + serialize_frame(b"two")
+    reader.put_back(data[:5])
+    assert feed(reader, data[5:], 2) == [b"one", b"two"]
+
+
+def test_memory_of_a_large_frame_doubles_as_its_bytes_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.core.wire.framing._FIRST_CLAIM", 2 * CHUNK)
+    reader = FrameReader()
+    assert feed(reader, struct.pack("<I", 9 * CHUNK), 4) == []
+    room = []
+    for _ in range(3):
+        space = reader.space()
+        room.append(len(space))
+        list(reader.received(len(space)))
+    assert room == [2 * CHUNK, 2 * CHUNK, 4 * CHUNK]
+    assert len(reader.space()) == CHUNK
+
+
+def test_frame_at_the_limit_is_taken() -> None:
+    body = b"x" * (2 * CHUNK)
+    assert feed(FrameReader(limit=2 * CHUNK), serialize_frame(body), CHUNK) == [body]
