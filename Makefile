@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
 CHECKED := tests/core/graph tests/core/wire tests/core/idl tests/introspect tests/overlay \
   tests/runtime/master/test_master.py tests/runtime/node/test_topics.py tests/runtime/node/test_services.py \
   tests/test_architecture.py tests/test_layers.py tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py \
-  tests/base/test_environment.py tests/base/test_escape.py tests/base/test_private_files.py tests/test_scanner.py
+  tests/base/test_environment.py tests/base/test_escape.py tests/base/test_private_files.py tests/board/test_scanner.py
 
 .PHONY: demo check test interop ros2 ros2-core windows pythons lint guard bench fuzz mutants site release clean help
 
@@ -55,7 +55,7 @@ interop: $(STAMP)
 
 # The environment is kept in build/windows; tests that need no Unix run in there, too.
 WINDOWS_TESTS := tests/core/wire tests/core/graph tests/core/idl/test_parse.py tests/base/test_child_lifetime.py tests/base/test_signal_dispatch.py \
-  tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py tests/base/test_environment.py tests/base/test_open_files.py tests/gpio \
+  tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py tests/base/test_environment.py tests/base/test_open_files.py tests/board \
   tests/runtime/node/test_topics.py
 windows: $(STAMP)
 	@sh tests/windows/install_wine.sh

@@ -33,8 +33,7 @@ LAYERS = [
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
-    {"core", "gpio"},
-    {"scanner"},
+    {"core", "board"},
     {"base"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.gpio.board import Board
-from minirospy.gpio.model import Function
+from minirospy.board.board import Board
+from minirospy.board.model import Function
 
 TESTS = Path(__file__).parent
 LISTINGS = TESTS / "workshop"

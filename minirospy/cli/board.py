@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 from minirospy.base.escape import own_output
 from minirospy.base.keyboard import Keys
+from minirospy.board.board import Board, BoardState
+from minirospy.board.model import BUTTONS, LEDS, Function, Pin, Position, Pull
+from minirospy.board.place import Place
+from minirospy.board.scanner import FIELDS, Circle
 from minirospy.cli.command import run, warn
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.gpio.board import Board, BoardState
-from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Position, Pull
-from minirospy.gpio.place import Place
-from minirospy.scanner import FIELDS, Circle
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult

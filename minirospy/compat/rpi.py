@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from minirospy.gpio import rpigpio
-from minirospy.gpio.raspberry import warn_of_missing_library
+from minirospy.board import rpigpio
+from minirospy.board.raspberry import warn_of_missing_library
 
 __all__: list[str] = []
 

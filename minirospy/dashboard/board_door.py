@@ -16,11 +16,11 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import BoardError
+from minirospy.board.board import Board
+from minirospy.board.model import BUTTONS, LEDS, PINS, Function
+from minirospy.board.place import Place
+from minirospy.board.scanner import FIELDS
 from minirospy.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number
-from minirospy.gpio.board import Board
-from minirospy.gpio.model import BUTTONS, LEDS, PINS, Function
-from minirospy.gpio.place import Place
-from minirospy.scanner import FIELDS
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient

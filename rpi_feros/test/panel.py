@@ -3,7 +3,7 @@
 import time
 import unittest
 
-from minirospy.gpio.board import Board
+from minirospy.board.board import Board
 
 LEDS = range(2, 8)  # BCM
 PATIENCE = 40.0  # s

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base import private_files
-from minirospy.gpio.server import _LogOnDemand
+from minirospy.board.server import _LogOnDemand
 
 
 @pytest.fixture

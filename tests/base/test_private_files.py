@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base import private_files
-from minirospy.gpio.place import Place
+from minirospy.board.place import Place
 from minirospy.launch.output import Output
 from minirospy.launch.process import start_process
 from minirospy.runtime.master.journal import Journal

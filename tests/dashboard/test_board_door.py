@@ -10,10 +10,10 @@ import pytest
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from minirospy.board.board import Board
 from minirospy.bridge.access import Access
 from minirospy.dashboard import board_door
 from minirospy.dashboard.board_door import SUBPROTOCOL
-from minirospy.gpio.board import Board
 from tests.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:

@@ -566,7 +566,7 @@ def test_graph_shows_nodes_and_topics_and_their_details(
 
 @needs_chromium
 def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
-    from minirospy.gpio.board import Board
+    from minirospy.board.board import Board
 
     served = serve()
     with Board() as board:

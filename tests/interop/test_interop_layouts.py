@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Twist, Vector3
 
+from minirospy.board.board import Board
 from minirospy.dashboard.views import LAYOUTS, VIEWS
-from minirospy.gpio.board import Board
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script

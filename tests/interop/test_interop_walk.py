@@ -17,8 +17,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from turtlesim.msg import Color, Pose
 
+from minirospy.board.board import Board
 from minirospy.dashboard.views import VIEWS
-from minirospy.gpio.board import Board
 from tests.dashboard.bags import make_bag
 from tests.dashboard.conftest import Served, serve
 from tests.interop import robot_scene

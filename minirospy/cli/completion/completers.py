@@ -507,7 +507,7 @@ def on_one_line(text: str) -> str:
 
 def pins(cursor: Cursor) -> Iterable[str]:
     """Return the pins of the virtual board that have something on them; to press, those of buttons."""
-    from minirospy.gpio.model import BUTTONS, LEDS
+    from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 

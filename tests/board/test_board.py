@@ -15,11 +15,11 @@ import psutil
 import pytest
 
 from minirospy.base.errors import BoardError
-from minirospy.gpio import link
-from minirospy.gpio.board import Board
-from minirospy.gpio.model import Function
-from minirospy.gpio.place import Place
-from minirospy.gpio.rpigpio import BCM, OUT, Gpio
+from minirospy.board import link
+from minirospy.board.board import Board
+from minirospy.board.model import Function
+from minirospy.board.place import Place
+from minirospy.board.rpigpio import BCM, OUT, Gpio
 from tests.waiting import wait_until
 
 
@@ -112,7 +112,7 @@ def test_two_processes_share_a_board_and_the_pins_outlive_them(board: Board) -> 
 
 
 def test_many_start_one_server() -> None:
-    code = "from minirospy.gpio.board import Board\nwith Board() as b:\n print(b.name, flush=True)\n input()"
+    code = "from minirospy.board.board import Board\nwith Board() as b:\n print(b.name, flush=True)\n input()"
     children = [
         subprocess.Popen(
             [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from minirospy.gpio.events import CallbackThread, Detector, Slope
+from minirospy.board.events import CallbackThread, Detector, Slope
 
 
 @pytest.mark.parametrize(

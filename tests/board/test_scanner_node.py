@@ -16,11 +16,11 @@ from sensor_msgs.msg import LaserScan
 from sick_safetyscanners.msg import OutputPathsMsg, RawMicroScanDataMsg
 
 from minirospy import Node
-from minirospy.gpio.board import Board
-from minirospy.scanner import BEAMS
+from minirospy.board.board import Board
+from minirospy.board.scanner import BEAMS
 from tests.waiting import until
 
-NODE = Path(__file__).parents[1] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
+NODE = Path(__file__).parents[2] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
 SECONDS = 100.0
 FREE, WARNING, PROTECTIVE = [True, True], [True, False], [False, False]
 

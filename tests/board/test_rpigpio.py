@@ -14,11 +14,11 @@ from types import FrameType
 import pytest
 
 from minirospy.base.signal_dispatch import dispatching_signal
-from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
-from minirospy.gpio.board import Board
-from minirospy.gpio.model import Function, Setup
-from minirospy.gpio.rpigpio import Gpio
-from minirospy.gpio.wave import Wave
+from minirospy.board import rpigpio as GPIO  # noqa: N812 - as users know it
+from minirospy.board.board import Board
+from minirospy.board.model import Function, Setup
+from minirospy.board.rpigpio import Gpio
+from minirospy.board.wave import Wave
 
 
 @pytest.fixture

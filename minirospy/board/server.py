@@ -1,4 +1,4 @@
-"""The process that holds one board: `python -m minirospy.gpio.server FOLDER NAME`.
+"""The process that holds one board: `python -m minirospy.board.server FOLDER NAME`.
 
 The first client starts it and it ends by itself shortly after the last one left; a lock file lets exactly one
 live. The board is written to a file when it changes, so the next server goes on where this one stopped.
@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from minirospy.base import private_files
-from minirospy.gpio.model import BoardModel, Operation, OperationError
-from minirospy.gpio.place import Place
-from minirospy.gpio.protocol import (
+from minirospy.board.model import BoardModel, Operation, OperationError
+from minirospy.board.place import Place
+from minirospy.board.protocol import (
     VERSION,
     Changed,
     Done,

@@ -16,10 +16,10 @@ import pytest
 from rich.console import Console
 
 from minirospy.base.installation import install_command
+from minirospy.board.board import Board
+from minirospy.board.raspberry import model_name, warn_of_missing_library
+from minirospy.board.rpigpio import BCM, IN, OUT, PUD_UP, Gpio
 from minirospy.cli.board import main, render
-from minirospy.gpio.board import Board
-from minirospy.gpio.raspberry import model_name, warn_of_missing_library
-from minirospy.gpio.rpigpio import BCM, IN, OUT, PUD_UP, Gpio
 
 
 def test_press_get_release(capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,12 +16,12 @@ import weakref
 from collections.abc import Sequence
 
 from minirospy.base.signal_dispatch import is_dispatching_signal
-from minirospy.gpio.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
-from minirospy.gpio.events import Callback, CallbackThread, Detector, Slope
-from minirospy.gpio.link import Edge, Link
-from minirospy.gpio.model import PINS, Function, Pull, Setup
-from minirospy.gpio.place import Place
-from minirospy.gpio.wave import Wave
+from minirospy.board.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
+from minirospy.board.events import Callback, CallbackThread, Detector, Slope
+from minirospy.board.link import Edge, Link
+from minirospy.board.model import PINS, Function, Pull, Setup
+from minirospy.board.place import Place
+from minirospy.board.wave import Wave
 
 __all__ = [
     "BCM",

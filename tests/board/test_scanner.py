@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.scanner import ANGLE_INCREMENT, ANGLE_MIN, BEAMS, RANGE_MIN, Circle, Room, Wall
+from minirospy.board.scanner import ANGLE_INCREMENT, ANGLE_MIN, BEAMS, RANGE_MIN, Circle, Room, Wall
 
 AHEAD = round(-ANGLE_MIN / ANGLE_INCREMENT)
 SQUARE = (Wall(2, -2, 2, 2), Wall(2, 2, -2, 2), Wall(-2, 2, -2, -2), Wall(-2, -2, 2, -2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 
-from minirospy.gpio.events import Detector, Slope
+from minirospy.board.events import Detector, Slope
 
 __all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of"]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import msgpack  # type: ignore[import-untyped]
 
-from minirospy.gpio.model import (
+from minirospy.board.model import (
     PINS,
     Force,
     Function,

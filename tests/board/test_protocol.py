@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.gpio.model import BoardModel, Force, Press, Setup, Write
-from minirospy.gpio.protocol import (
+from minirospy.board.model import BoardModel, Force, Press, Setup, Write
+from minirospy.board.protocol import (
     VERSION,
     Changed,
     Done,

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from minirospy.base.errors import BoardError
-from minirospy.gpio.link import Edge, Link
-from minirospy.gpio.model import PINS, BoardModel, Force, Function, Pin, Position, Press, Release, Setup
-from minirospy.gpio.place import Place
-from minirospy.gpio.protocol import MovePerson
+from minirospy.board.link import Edge, Link
+from minirospy.board.model import PINS, BoardModel, Force, Function, Pin, Position, Press, Release, Setup
+from minirospy.board.place import Place
+from minirospy.board.protocol import MovePerson
 
 __all__ = ["Board", "BoardState", "Edge"]
 

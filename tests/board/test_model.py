@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.gpio.model import (
+from minirospy.board.model import (
     BUTTONS,
     PINS,
     BoardModel,

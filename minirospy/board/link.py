@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy.base import private_files
 from minirospy.base.child_lifetime import start_outside_of_job
 from minirospy.base.errors import BoardError
-from minirospy.gpio.model import Function, Operation, Pin, Position, Setup, Write
-from minirospy.gpio.place import Place
-from minirospy.gpio.protocol import (
+from minirospy.board.model import Function, Operation, Pin, Position, Setup, Write
+from minirospy.board.place import Place
+from minirospy.board.protocol import (
     VERSION,
     Changed,
     Done,
@@ -58,10 +58,10 @@ MAX_UNACKNOWLEDGED = 10_000
 _SERVE = """\
 import sys
 sys.path.append(sys.argv[1])
-from minirospy.gpio.server import main
+from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""`python -m minirospy.gpio.server`, which also finds a package that is imported from the current folder."""
+"""`python -m minirospy.board.server`, which also finds a package that is imported from the current folder."""
 
 
 class Edge(NamedTuple):
