@@ -19,6 +19,7 @@ LAYERS = [
     {"launch"},
     {"bridge"},
     {"frames"},
+    {"command"},
     {
         "introspect",
         "actionlib",

@@ -16,9 +16,9 @@ from minirospy.board.board import Board, BoardState
 from minirospy.board.model import BUTTONS, LEDS, Function, Pin, Position, Pull
 from minirospy.board.place import Place
 from minirospy.board.scanner import FIELDS, Circle
-from minirospy.cli.command import run, warn
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.command import run, warn
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Family, Verb
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult

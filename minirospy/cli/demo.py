@@ -19,8 +19,8 @@ from minirospy.base.child_lifetime import guard_children
 from minirospy.base.errors import MinirospyError
 from minirospy.base.escape import own_output
 from minirospy.board.board import Board
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -14,8 +14,8 @@ from functools import partial
 from pathlib import Path
 
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.cli.parser import AssignmentParser, Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import AssignmentParser, Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
 
 __all__ = ["DOCTOR", "ROSWTF", "main", "roswtf"]

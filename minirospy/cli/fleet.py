@@ -7,8 +7,8 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Family, Verb
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

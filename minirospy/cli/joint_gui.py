@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from minirospy.cli.dashboard import _main, _parser, _serve
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 __all__ = ["JOINT_STATE_PUBLISHER_GUI", "main"]
 

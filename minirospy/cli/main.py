@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import minirospy
 from minirospy.base.errors import UsageError
 from minirospy.base.suggestions import did_you_mean
-from minirospy.cli.command import run
 from minirospy.cli.registry import COMMANDS, find_verb
+from minirospy.command.command import run
 
 __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb that was typed; return the exit status as in minirospy.cli.command."""
+    """Run the verb that was typed; return the exit status as in minirospy.command.command."""
     words = list(sys.argv[1:] if argv is None else argv)
     return run("minirospy", lambda: _dispatch(words))
 

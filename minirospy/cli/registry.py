@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from minirospy.cli.verbs import Command, Family
+    from minirospy.command.verbs import Command, Family
 
 __all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "find_script", "find_verb"]
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node

@@ -104,7 +104,7 @@ def test_command_on_a_terminal_shows_escape_codes_of_a_peer() -> None:
 
     master, slave = os.openpty()
     code = (
-        "import sys\nfrom minirospy.cli.command import run\nfrom minirospy.base.errors import NotFoundError\n"
+        "import sys\nfrom minirospy.command.command import run\nfrom minirospy.base.errors import NotFoundError\n"
         "def body():\n    print('/topic\\x1b[2J')\n    raise NotFoundError('topic', 'x\\x1b]0;t\\x07')\nsys.exit(run('t', body))"
     )
     status = subprocess.run([sys.executable, "-c", code], stdout=slave, stderr=slave, check=False).returncode
@@ -119,7 +119,7 @@ def test_command_on_a_terminal_shows_escape_codes_of_a_peer() -> None:
 
 def test_error_of_a_command_is_escaped_in_a_file_too(capsys: pytest.CaptureFixture[str]) -> None:
     from minirospy.base.errors import NotFoundError
-    from minirospy.cli.command import run
+    from minirospy.command.command import run
 
     def body() -> None:
         raise NotFoundError("topic", "x\x1b[2J")
@@ -134,7 +134,7 @@ def test_picture_on_a_terminal_moves_the_cursor() -> None:
 
     master, slave = os.openpty()
     code = (
-        "import sys\nfrom rich.console import Console\nfrom minirospy.cli.command import run\n"
+        "import sys\nfrom rich.console import Console\nfrom minirospy.command.command import run\n"
         "from minirospy.base.escape import own_output\n"
         "def body():\n    print('a', end='')\n    Console(file=own_output()).show_cursor(False)\n    print('b')\n"
         "sys.exit(run('t', body))"

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.cli.command import run
 from minirospy.cli.ros import master
+from minirospy.command.command import run
 from minirospy.testing.bare import interrupt_noted
 
 

@@ -18,9 +18,9 @@ import yaml
 from minirospy.base.environment import Environment
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.complete import candidates, main
-from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, Entry
-from minirospy.cli.verbs import Command, Family, Verb
+from minirospy.command.parser import completer_of
+from minirospy.command.verbs import Command, Family, Verb
 from minirospy.core.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
 from minirospy.introspect.prototype import prototype

@@ -18,10 +18,10 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import MasterUnreachableError
-from minirospy.cli.command import warn
 from minirospy.cli.ros import master as commands
 from minirospy.cli.ros.master import main, roscore
 from minirospy.cli.ros.rostopic import main as rostopic
+from minirospy.command.command import warn
 from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 
 from minirospy.base.errors import UsageError
-from minirospy.cli.command import warn
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import warn
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 __all__ = [
     "CREATE",

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import read_manifest
@@ -43,7 +43,7 @@ _WITH_PROJECT = ("etc", "include", "libexec", "share")
 
 
 def catkin_find(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return FIND.main(argv)
 
 
@@ -53,7 +53,7 @@ def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
 
 
 def catkin_topological_order(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return TOPOLOGICAL_ORDER.main(argv)
 
 

@@ -24,9 +24,9 @@ from minirospy.cli.catkin.workspace import (
     spaces,
     without_cmake,
 )
-from minirospy.cli.command import INTERRUPTED
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import INTERRUPTED
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.workspace.build import Workspace
 
 __all__ = ["MAKE", "MAKE_ISOLATED", "catkin_make", "catkin_make_isolated"]

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 from minirospy.base.errors import MinirospyError
 from minirospy.base.xml_text import XmlError, check_xml
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 __all__ = ["COMMAND", "Counts", "main", "read_counts", "results_below"]
 

@@ -24,9 +24,9 @@ from minirospy.cli.catkin.workspace import (
     spaces,
     without_cmake,
 )
-from minirospy.cli.command import INTERRUPTED
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.command import INTERRUPTED
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Family, Verb
 from minirospy.workspace.build import Workspace, find_workspace, read_plans
 
 __all__ = ["CATKIN", "catkin"]

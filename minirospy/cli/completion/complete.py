@@ -6,7 +6,7 @@ each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none;
 candidates as PowerShell writes them). One that ends in ``/`` or ``=`` goes on; after any other comes a space.
 
 Verbs and options come from the command's own parser, not from a second list. So does what completes an
-argument or an option's value: see minirospy.cli.parser.Parser.add_argument. Nothing here ends in an error, and the
+argument or an option's value: see minirospy.command.parser.Parser.add_argument. Nothing here ends in an error, and the
 answer of a master is awaited no longer than a person waits. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
 
@@ -24,15 +24,15 @@ from minirospy.base.escape import has_controls
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.completers import Completer, Cursor
 from minirospy.cli.completion.words import POSIX, POWERSHELL, Shell
-from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
-from minirospy.cli.verbs import Family
+from minirospy.command.parser import completer_of
+from minirospy.command.verbs import Family
 
 if TYPE_CHECKING:
     import argparse
 
-    from minirospy.cli.parser import Parser
-    from minirospy.cli.verbs import Command, Verb
+    from minirospy.command.parser import Parser
+    from minirospy.command.verbs import Command, Verb
 
 
 __all__ = ["candidates", "main"]

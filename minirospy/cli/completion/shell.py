@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from minirospy.base.errors import UsageError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.workspace.build import own_set_up
 from minirospy.workspace.setup_files import SHELLS, shell_text
 
@@ -17,7 +17,7 @@ __all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from minirospy.base.errors import ROSException, UsageError
-from minirospy.cli.parser import Parser
 from minirospy.cli.ros.form import ask_for, fields, flow
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.actionlib import SimpleActionClient

@@ -10,10 +10,10 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.cli.parser import Parser
 from minirospy.cli.ros.axclient import NodeParser, action_class, read_answer
 from minirospy.cli.ros.form import ask_for
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.actionlib import SimpleActionServer

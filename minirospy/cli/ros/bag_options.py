@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.errors import BagError, MinirospyError, NotFoundError
-from minirospy.cli.command import RosText, WordedError
+from minirospy.command.command import RosText, WordedError
 from minirospy.introspect.bags import open_reader
 
 if TYPE_CHECKING:

@@ -24,9 +24,9 @@ from minirospy.base.environment import DISTRO, ROS_VERSION, Environment, is_loca
 from minirospy.base.errors import MinirospyError, RpcError, RpcFault, RpcLate, RpcUnreachable
 from minirospy.base.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.cli.command import warn
-from minirospy.cli.parser import Misuse, Parser, attach_completer, split_assignments
-from minirospy.cli.verbs import Command
+from minirospy.command.command import warn
+from minirospy.command.parser import Misuse, Parser, attach_completer, split_assignments
+from minirospy.command.verbs import Command
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.master.master import Master

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 from minirospy.base.errors import UsageError
 from minirospy.base.suggestions import did_you_mean
-from minirospy.cli.command import INTERRUPTED, complain
 from minirospy.cli.ros import (
     rosbag_convert,
     rosbag_info,
@@ -20,7 +19,8 @@ from minirospy.cli.ros import (
     rosbag_record,
     rosbag_rewrite,
 )
-from minirospy.cli.verbs import Family, HelpStatus
+from minirospy.command.command import INTERRUPTED, complain
+from minirospy.command.verbs import Family, HelpStatus
 
 __all__ = ["FAMILY", "main"]
 

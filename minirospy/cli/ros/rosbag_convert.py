@@ -6,8 +6,8 @@ import os
 
 from minirospy.base.errors import BagError, BagUnindexedError, NotFoundError
 from minirospy.base.installation import install_command
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Verb
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Verb
 
 __all__ = ["VERB"]
 

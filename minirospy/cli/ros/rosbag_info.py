@@ -15,9 +15,9 @@ from minirospy.base.errors import (
     ValueTextError,
 )
 from minirospy.base.escape import escaped
-from minirospy.cli.command import complain
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Verb
+from minirospy.command.command import complain
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Verb
 
 __all__ = ["VERBS", "report"]
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from minirospy.base import private_files
 from minirospy.base.errors import BagEncryptedError, BagError, MessageException, MinirospyError
-from minirospy.cli.command import complain
-from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.ros.rosbag_info import report, unreadable
-from minirospy.cli.verbs import Verb
+from minirospy.command.command import complain
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Verb
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message

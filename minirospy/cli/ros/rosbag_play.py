@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import ROSInterruptException, UsageError
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command, Verb
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command, Verb
 
 if TYPE_CHECKING:
     from minirospy.recording.schedule import PlayOptions

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from minirospy.base.errors import BagCompressionError, ROSInterruptException, UsageError
-from minirospy.cli.parser import Misuse, Parser, attach_completer
-from minirospy.cli.verbs import Command, Verb
+from minirospy.command.parser import Misuse, Parser, attach_completer
+from minirospy.command.verbs import Command, Verb
 
 if TYPE_CHECKING:
     from minirospy.recording.options import RecordOptions

@@ -11,10 +11,10 @@ from collections.abc import Callable
 
 from minirospy.base import private_files
 from minirospy.base.errors import BagError, BagUnindexedError, MinirospyError
-from minirospy.cli.command import warn
-from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.ros.rosbag_info import report, unreadable
-from minirospy.cli.verbs import Verb
+from minirospy.command.command import warn
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Verb
 from minirospy.core.bag import compression
 
 __all__ = ["VERBS"]

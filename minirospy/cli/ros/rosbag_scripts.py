@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BagError, DefinitionError, MinirospyError
-from minirospy.cli.command import run
-from minirospy.cli.parser import Parser
 from minirospy.cli.ros.rosbag_info import report
+from minirospy.command.command import run
+from minirospy.command.parser import Parser
 
 if TYPE_CHECKING:
     from minirospy.core.bag.records import Connection

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.base.errors import MinirospyError, UsageError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Family, Verb
 
 __all__ = ["FAMILY", "disk_usage", "human_size", "main"]
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, cast
 
 from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.base.log_levels import LEVEL_NAMES
-from minirospy.cli.command import tool_node, warn, warn_unpublished
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.command import tool_node, warn, warn_unpublished
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Family, Verb
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.loggers import logger_level, logger_levels, set_logger_level
 from minirospy.introspect.nodes import list_nodes

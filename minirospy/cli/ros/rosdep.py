@@ -18,8 +18,8 @@ from pathlib import Path
 
 from minirospy.base.errors import UsageError
 from minirospy.base.installation import install_command
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Family, Verb
 
 __all__ = ["FAMILY", "main"]
 

@@ -11,9 +11,9 @@ import time
 from collections.abc import Sequence
 from typing import NoReturn
 
-from minirospy.cli.command import NO_MASTER
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import NO_MASTER
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.nodes import Neighbours, neighbours
 
@@ -24,7 +24,7 @@ _PAUSE_SECONDS = 1.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from minirospy.base import private_files
 from minirospy.base.environment import Environment
 from minirospy.base.errors import LaunchError, MinirospyError, NotFoundError, UsageError
-from minirospy.cli.command import RosText, WordedError, warn
-from minirospy.cli.parser import AssignmentParser, Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import RosText, WordedError, warn
+from minirospy.command.parser import AssignmentParser, Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.launch.arg_docs import resolved_arg_docs
 from minirospy.launch.command import shell_line
 from minirospy.launch.files import LaunchFileNotFoundError, find_files
@@ -70,7 +70,7 @@ class LaunchOptions(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command, 1 also where a required node died of a fault."""
+    """Run the command; return the exit status as in minirospy.command.command, 1 also where a required node died of a fault."""
     return COMMAND.main(argv)
 
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from minirospy.base.errors import MinirospyError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.launch.check import faults_of, problem_line
 from minirospy.testing.junit import failure_junit_xml, success_junit_xml
 from minirospy.workspace.packages import Packages, package_name

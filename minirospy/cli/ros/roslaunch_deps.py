@@ -9,9 +9,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from minirospy.cli.command import warn as print_warning
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import warn as print_warning
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.launch.depends import FileNeeds, file_needs, missing_declarations, package_of
 from minirospy.workspace.packages import Packages
 

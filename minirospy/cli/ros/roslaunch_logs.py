@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from minirospy.base.environment import Environment, run_folder
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["COMMAND", "get_run_id", "main"]

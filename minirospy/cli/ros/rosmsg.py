@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from functools import partial
 
 from minirospy.base.errors import NotFoundError
-from minirospy.cli.command import RosText, WordedError
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.command.command import RosText, WordedError
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Family, HelpStatus, Verb
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 __all__ = ["ROSMSG", "ROSSRV", "main", "main_srv"]

@@ -9,8 +9,8 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.base.errors import DefinitionError, NotFoundError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 
 __all__ = ["COMMAND", "main"]
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 from minirospy.base.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
 from minirospy.base.escape import escaped
-from minirospy.cli.command import RosText, WordedError, complain
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.command.command import RosText, WordedError, complain
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Family, HelpStatus, Verb
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.nodes import (
     NodeDetail,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.errors import MinirospyError, NotFoundError
 from minirospy.base.suggestions import did_you_mean
-from minirospy.cli.command import run
+from minirospy.command.command import run
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, crawl_times, package_name
 

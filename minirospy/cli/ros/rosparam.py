@@ -10,9 +10,9 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.base.errors import NotFoundError, ValueTextError
-from minirospy.cli.command import RosText, WordedError
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.command.command import RosText, WordedError
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Family, HelpStatus, Verb
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import format_pretty, format_value, parse_value

@@ -13,7 +13,7 @@ from pathlib import Path
 from minirospy.base.child_lifetime import guard_children
 from minirospy.base.environment import export_local
 from minirospy.base.errors import NotFoundError, UsageError
-from minirospy.cli.command import RosText, WordedError, run, warn
+from minirospy.command.command import RosText, WordedError, run, warn
 from minirospy.workspace.packages import NotExecutableError, Packages, why_ros_refuses, with_prefix
 
 __all__ = ["become", "main"]
@@ -36,7 +36,7 @@ _NO_EXECUTABLE = 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the program's exit status, or as in minirospy.cli.command where it cannot be run."""
+    """Run the command; return the program's exit status, or as in minirospy.command.command where it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
     # The program decides which signals it ignores.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)

@@ -10,9 +10,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import CallFailed, MessageException, ServiceException, UsageError
-from minirospy.cli.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.command.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Family, HelpStatus, Verb
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 

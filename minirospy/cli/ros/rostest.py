@@ -14,8 +14,8 @@ from pathlib import Path
 from minirospy.base import private_files
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
-from minirospy.cli.parser import AssignmentParser, Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import AssignmentParser, Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.testing.junit import Result, report
 from minirospy.testing.unit import begin_results, rostest_name_from_path
 from minirospy.workspace.packages import Packages, package_name

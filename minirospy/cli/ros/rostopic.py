@@ -11,9 +11,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import NotFoundError
-from minirospy.cli.command import RosText, WordedError, tool_node, warn_unpublished
-from minirospy.cli.parser import Misuse, Parser, integer
-from minirospy.cli.verbs import Family, HelpStatus, Verb, deferred_verb
+from minirospy.command.command import RosText, WordedError, tool_node, warn_unpublished
+from minirospy.command.parser import Misuse, Parser, integer
+from minirospy.command.verbs import Family, HelpStatus, Verb, deferred_verb
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 

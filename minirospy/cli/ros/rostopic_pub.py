@@ -18,9 +18,9 @@ from minirospy.base.errors import (
     ValueTextError,
 )
 from minirospy.base.yaml_text import safe_load
-from minirospy.cli.command import RosText, WordedError, tool_node, warn, warn_no_subscribers
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Verb
+from minirospy.command.command import RosText, WordedError, tool_node, warn, warn_no_subscribers
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Verb
 from minirospy.introspect.graph import Graph, why_illegal
 
 if TYPE_CHECKING:

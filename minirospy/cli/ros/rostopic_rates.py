@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import NotFoundError
-from minirospy.cli.command import tool_node, warn_unpublished
-from minirospy.cli.parser import Parser, integer
-from minirospy.cli.verbs import Verb
+from minirospy.command.command import tool_node, warn_unpublished
+from minirospy.command.parser import Parser, integer
+from minirospy.command.verbs import Verb
 from minirospy.core.idl.protocols import is_stamped
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.topics import find_topic

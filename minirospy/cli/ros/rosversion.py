@@ -11,8 +11,8 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.base.errors import NotFoundError
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
@@ -21,7 +21,7 @@ __all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from minirospy.base.errors import MinirospyError, UrdfError, UsageError
 from minirospy.base.escape import escaped
-from minirospy.cli.command import RosText, WordedError
-from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import RosText, WordedError
+from minirospy.command.parser import Parser
+from minirospy.command.verbs import Command
 from minirospy.core.urdf.describe import dot_graph, error_lines, problem_lines, tree_lines
 from minirospy.core.urdf.model import Robot
 from minirospy.core.urdf.poses import quaternion_from_rpy, rpy_from_quaternion

@@ -15,7 +15,7 @@ from pathlib import Path
 from minirospy.base.errors import MinirospyError, NotFoundError
 from minirospy.base.installation import install_command
 from minirospy.base.xml_text import check_xml
-from minirospy.cli.command import run
+from minirospy.command.command import run
 
 __all__ = ["main"]
 

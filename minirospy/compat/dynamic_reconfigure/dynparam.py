@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.base.yaml_text import safe_load
-from minirospy.cli.command import NO_MASTER
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.command import NO_MASTER
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.compat.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,

@@ -69,7 +69,7 @@ def get_topic_type(
         name = graph.resolve(topic)
         field = topics.find_topic(graph, name)
         if field is None and blocking:
-            from minirospy.cli.command import warn_unpublished
+            from minirospy.command.command import warn_unpublished
 
             warn_unpublished(graph, name)
             while field is None and not _is_shutdown():

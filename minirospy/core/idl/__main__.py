@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Command
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
 from minirospy.core.idl.load import Catalogue, write_package
 from minirospy.core.idl.own_packages import COMPILED_AHEAD, own_definitions
 
@@ -21,7 +21,7 @@ _PACKAGE = Path(__file__).parents[2]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.command.command."""
     return Command("minirospy.core.idl", _parser, _compile).main(argv)
 
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.base.names import parse_arguments
 from minirospy.base.suggestions import did_you_mean
-from minirospy.cli.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
-from minirospy.cli.parser import CommandLineError, Misuse, Parser
+from minirospy.command.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
+from minirospy.command.parser import CommandLineError, Misuse, Parser
 
 __all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
 
@@ -32,7 +32,7 @@ class Command(NamedTuple):
     misuse_status: int = 2
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the command; return the exit status as :func:`minirospy.cli.command.run` does."""
+        """Run the command; return the exit status as :func:`minirospy.command.command.run` does."""
         words = sys.argv[1:] if argv is None else argv
         return run(self.name, lambda: self._run(words), self.interrupted, self.wording)
 
@@ -98,7 +98,7 @@ class Family(NamedTuple):
     shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the verb that was typed; return the exit status as :func:`minirospy.cli.command.run` does."""
+        """Run the verb that was typed; return the exit status as :func:`minirospy.command.command.run` does."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 

@@ -36,7 +36,7 @@ from minirospy.base.errors import (
 from minirospy.base.escape import SafeTerminal, escaped
 from minirospy.base.ros1_imports import prefer_ros1
 from minirospy.base.suggestions import did_you_mean
-from minirospy.cli.parser import CommandLineError
+from minirospy.command.parser import CommandLineError
 
 if TYPE_CHECKING:
     from minirospy.base.names import Arguments
