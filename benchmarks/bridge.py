@@ -209,7 +209,7 @@ async def relay(port: int) -> None:
     import foxglove
 
     from minirospy import Node
-    from minirospy.bridge.types import installed_type
+    from minirospy.introspect.type_texts import installed_type
 
     foxglove.set_log_level("ERROR")
     server = foxglove.start_server(host="127.0.0.1", port=port, name="peer", supported_encodings=["ros1"])

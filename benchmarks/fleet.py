@@ -42,16 +42,8 @@ async def robots(endpoint, first, count):
     # A thread of Zenoh waits 10 s when it closes a dead link. Of a robot that is one: here each has a thread, too.
     pools = ", ".join(f"{pool}: (worker_threads: {count})" for pool in ("rx", "tx", "net", "acc", "app"))
     os.environ.setdefault("ZENOH_RUNTIME", f"({pools})")
-    from minirospy.bridge.fleet.keys import (
-        ROOT,
-        Claim,
-        ServiceToken,
-        TopicToken,
-        claim_key,
-        service_key,
-        topic_key,
-    )
-    from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
+    from minirospy.fleet.keys import ROOT, Claim, ServiceToken, TopicToken, claim_key, service_key, topic_key
+    from minirospy.fleet.network import FleetNetwork, NetworkOptions
 
     async def robot(number):
         name, gateway = f"robot{number}", f"{number:016x}"
@@ -102,8 +94,8 @@ async def control(endpoint, expected):
     """Show the fleet; print how long it takes, and, at each line of the standard input, how long until all is shown again."""
     from minirospy import Node
     from minirospy.base.errors import MasterUnreachableError
-    from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
-    from minirospy.bridge.fleet.network import NetworkOptions
+    from minirospy.fleet.gateway import Gateway, GatewayOptions
+    from minirospy.fleet.network import NetworkOptions
     from minirospy.runtime.master.master import Master
 
     master = Master()

@@ -203,9 +203,9 @@ def _flood(port: int, request: bytes, count: int, end: float) -> None:
 async def serve() -> None:
     """Role: the dashboard with rosbridge; print its ports and the URI of its node, and run until standard input ends."""
     from minirospy import Node
-    from minirospy.bridge.access import Access
-    from minirospy.bridge.bridge import BridgeOptions
-    from minirospy.dashboard.dashboard import Dashboard
+    from minirospy.web.access import Access
+    from minirospy.web.bridge import BridgeOptions
+    from minirospy.web.dashboard.dashboard import Dashboard
 
     access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
@@ -213,7 +213,7 @@ async def serve() -> None:
         dashboard = Dashboard(node, options)
         await dashboard.start()
         with contextlib.suppress(ImportError):  # older trees
-            from minirospy.bridge.serve import prefer_the_loop
+            from minirospy.web.serve import prefer_the_loop
 
             prefer_the_loop()
         listeners = dashboard.bridge.listeners

@@ -137,8 +137,8 @@ class Kind(NamedTuple):
 
 def kinds() -> Mapping[str, Kind]:
     """Return the inputs by the name of the listener that gets them."""
-    from minirospy.bridge.rosbridge.cbor import encode_cbor, typed_array
-    from minirospy.bridge.rosbridge.protocol import encode
+    from minirospy.web.rosbridge.cbor import encode_cbor, typed_array
+    from minirospy.web.rosbridge.protocol import encode
 
     texts = [json.dumps(each).encode() for each in OPERATIONS]
     pictures = [str(encode(each, "png")).encode() for each in OPERATIONS[:4]]
@@ -181,9 +181,9 @@ class Target:
         self._loop.close()
 
     async def _take(self, kind: str, data: bytes) -> None:
-        from minirospy.bridge.web.connection import Connection
-        from minirospy.bridge.web.listener import Relay
-        from minirospy.bridge.web.pipe import PlainPipe
+        from minirospy.web.server.connection import Connection
+        from minirospy.web.server.listener import Relay
+        from minirospy.web.server.pipe import PlainPipe
 
         if self._count % INPUTS_PER_BRIDGE == 0:
             await self._end()
@@ -238,9 +238,9 @@ class Target:
         from std_srvs.srv import SetBool
 
         from minirospy import Node
-        from minirospy.bridge.bridge import Bridge, BridgeOptions
-        from minirospy.bridge.rosbridge.door import RosbridgeOptions
         from minirospy.runtime.master.master import Master
+        from minirospy.web.bridge import Bridge, BridgeOptions
+        from minirospy.web.rosbridge.door import RosbridgeOptions
 
         master = Master()
         await master.start()
@@ -284,7 +284,7 @@ class Steady:
     may_write = True
 
     def __init__(self) -> None:
-        from minirospy.bridge.web.queue import SendQueue
+        from minirospy.web.server.queue import SendQueue
 
         self.queue = SendQueue()
 

@@ -273,9 +273,7 @@ def yaml_readers() -> dict[str, Reader]:
 
     from minirospy.base.errors import BridgeError, MinirospyError, RvizFileError, ValueTextError
     from minirospy.base.yaml_text import safe_load
-    from minirospy.bridge.ros2.rules import parse_rules
     from minirospy.compat.camera_calibration_parsers.texts import CalibrationError, parse_yaml
-    from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
     from minirospy.introspect.configurations import parameter_values
     from minirospy.introspect.values import (
         check_parameter,
@@ -286,6 +284,8 @@ def yaml_readers() -> dict[str, Reader]:
     )
     from minirospy.launch.substitution import convert
     from minirospy.maps.grid import MapError, read_settings
+    from minirospy.ros2.rules import parse_rules
+    from minirospy.web.dashboard.rviz_file import format_rviz, parse_rviz
 
     def text(read: Callable[[str], object]) -> Callable[[bytes], object]:
         return lambda data: read(data.decode("utf-8", "replace"))

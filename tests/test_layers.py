@@ -15,9 +15,11 @@ LAYERS = [
     {"compat"},
     {"cli"},
     {"testing"},
-    {"dashboard"},
+    {"web"},
+    {"fleet"},
+    {"ros2"},
     {"launch"},
-    {"bridge"},
+    {"zenoh"},
     {"frames"},
     {"command"},
     {
@@ -42,7 +44,7 @@ BYTES_ONLY = [PACKAGE / "runtime", PACKAGE / "core" / "wire"]
 PURE = {"core"}
 PURE_FILES = (
     {
-        PACKAGE / "bridge" / name
+        PACKAGE / "web" / name
         for name in (
             "access.py",
             "foxglove/channels.py",
@@ -58,11 +60,11 @@ PURE_FILES = (
             "tf_republisher/pairs.py",
             "video/options.py",
             "video/pictures.py",
-            "web/queue.py",
+            "server/queue.py",
         )
     }
     | {
-        PACKAGE / "bridge" / "ros2" / name
+        PACKAGE / "ros2" / name
         for name in (
             "action_links.py",
             "action_messages.py",
@@ -75,11 +77,10 @@ PURE_FILES = (
             "service_links.py",
             "xxh3.py",
             "zenoh_keys.py",
-            "statics.py",
         )
     }
     | {
-        PACKAGE / "bridge" / "fleet" / name
+        PACKAGE / "fleet" / name
         for name in (
             "clocks.py",
             "contents.py",
@@ -92,7 +93,7 @@ PURE_FILES = (
             "rules.py",
         )
     }
-    | {PACKAGE / "dashboard" / "views.py"}
+    | {PACKAGE / "web" / "dashboard" / "views.py"}
     | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 )
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}

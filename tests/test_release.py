@@ -19,9 +19,9 @@ SOURCES = [
     "pyproject.toml",
     "minirospy_overlay.pth",
     "minirospy/__init__.py",
-    "minirospy/dashboard/page/vendor/versions.json",
-    "minirospy/dashboard/page/vendor/uplot/LICENSE.txt",
-    "minirospy/dashboard/page/vendor/uplot/uPlot.js",
+    "minirospy/web/dashboard/page/vendor/versions.json",
+    "minirospy/web/dashboard/page/vendor/uplot/LICENSE.txt",
+    "minirospy/web/dashboard/page/vendor/uplot/uPlot.js",
     "msgs/std_msgs/package.xml",
     "msgs/std_msgs/msg/Bool.msg",
     "tests/test_release.py",
@@ -34,9 +34,9 @@ def contents() -> dict[str, int]:
     names = [
         "minirospy_overlay.pth",
         "minirospy/__init__.py",
-        "minirospy/dashboard/page/vendor/versions.json",
-        "minirospy/dashboard/page/vendor/uplot/LICENSE.txt",
-        "minirospy/dashboard/page/vendor/uplot/uPlot.js",
+        "minirospy/web/dashboard/page/vendor/versions.json",
+        "minirospy/web/dashboard/page/vendor/uplot/LICENSE.txt",
+        "minirospy/web/dashboard/page/vendor/uplot/uPlot.js",
         "minirospy/overlay/std_msgs/msg/_Bool.py",
         "minirospy/overlay/std_msgs/msg/__init__.pyi",
         "minirospy/overlay/std_msgs/py.typed",
@@ -82,10 +82,10 @@ def test_file_that_is_left_out_is_named(contents: dict[str, int]) -> None:
 
 
 def test_licences_are_required(contents: dict[str, int]) -> None:
-    contents["minirospy/dashboard/page/vendor/uplot/LICENSE.txt"] = 0
+    contents["minirospy/web/dashboard/page/vendor/uplot/LICENSE.txt"] = 0
     del contents["minirospy-0.1.0.dist-info/licenses/LICENSE"]
     assert faults_of_wheel(contents, 1000, SOURCES) == [
-        "minirospy/dashboard/page/vendor/uplot: its LICENSE.txt is missing or empty",
+        "minirospy/web/dashboard/page/vendor/uplot: its LICENSE.txt is missing or empty",
         "the licence of minirospy is missing",
     ]
 

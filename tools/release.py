@@ -37,7 +37,7 @@ _INCLUDED = {
 }
 """Folders of the wheel and where their files are in the sources, as in hatch_build.py."""
 
-_VENDORED = "minirospy/dashboard/page/vendor/"
+_VENDORED = "minirospy/web/dashboard/page/vendor/"
 
 
 class ReleaseError(Exception):

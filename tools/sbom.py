@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 
 __all__ = ["SbomError", "make_sbom"]
 
-VENDOR = "minirospy/dashboard/page/vendor/"
+VENDOR = "minirospy/web/dashboard/page/vendor/"
 DEFINITIONS = "minirospy/share/msgs/"
 
 Json = dict[str, object]

@@ -12,8 +12,8 @@ from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.bridge import Bridge, BridgeOptions
-    from minirospy.bridge.tokens import Tokens
+    from minirospy.web.bridge import Bridge, BridgeOptions
+    from minirospy.web.tokens import Tokens
 
 __all__ = ["COMMAND", "main"]
 
@@ -176,7 +176,7 @@ def _bridge(
     status: bool,
     json: bool,
 ) -> int:
-    from minirospy.bridge.serve import require_libraries
+    from minirospy.web.serve import require_libraries
 
     token = _given_token("token", token, "MINIROSPY_BRIDGE_TOKEN")
     read_token = _given_token("read-token", read_token, "MINIROSPY_BRIDGE_READ_TOKEN")
@@ -198,13 +198,13 @@ def _bridge(
     require_libraries()
 
     from minirospy.base.name_filter import NameFilter
-    from minirospy.bridge.access import Access, is_loopback
-    from minirospy.bridge.addresses import host_names
-    from minirospy.bridge.bridge import Bridge, BridgeOptions
-    from minirospy.bridge.foxglove.door import CAPABILITIES
-    from minirospy.bridge.graph import Filters
-    from minirospy.bridge.serve import run
-    from minirospy.bridge.web.connection import Limits
+    from minirospy.web.access import Access, is_loopback
+    from minirospy.web.addresses import host_names
+    from minirospy.web.bridge import Bridge, BridgeOptions
+    from minirospy.web.foxglove.door import CAPABILITIES
+    from minirospy.web.graph import Filters
+    from minirospy.web.serve import run
+    from minirospy.web.server.connection import Limits
 
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
     if not is_loopback(address) and not listen:
@@ -269,7 +269,7 @@ def _given_token(option: str, given: str | None, variable: str) -> str:
 
 def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
     from minirospy.base.environment import Environment
-    from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.web.tokens import Tokens, kept_tokens
 
     if write or read:
         return Tokens(write, read)
@@ -279,8 +279,8 @@ def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
 
 
 def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
-    from minirospy.bridge.access import is_loopback
-    from minirospy.bridge.addresses import links, own_addresses, qr_code
+    from minirospy.web.access import is_loopback
+    from minirospy.web.addresses import links, own_addresses, qr_code
 
     listener = bridge.listeners["foxglove"]
     is_any = options.address in ("0.0.0.0", "::")

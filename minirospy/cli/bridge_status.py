@@ -83,7 +83,7 @@ def _url(scheme: str, door: _Json) -> str:
 
 def _token(given: str) -> _Token:
     from minirospy.base.environment import Environment
-    from minirospy.bridge.tokens import read_tokens
+    from minirospy.web.tokens import read_tokens
 
     if given:
         return _Token(given, is_kept=False)

@@ -13,8 +13,8 @@ from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.tokens import Tokens
-    from minirospy.dashboard.codes import Codes
+    from minirospy.web.dashboard.codes import Codes
+    from minirospy.web.tokens import Tokens
 
 __all__ = ["DASHBOARD", "WINDOWS", "dashboard"]
 
@@ -82,7 +82,7 @@ def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None
 
 
 def _dashboard_parser() -> Parser:
-    from minirospy.dashboard.views import LAYOUTS, VIEWS
+    from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     parser = _parser("minirospy dashboard", "Shows the graph and the board in a browser.")
     layouts = [name for name in LAYOUTS if name not in VIEWS]
@@ -209,7 +209,7 @@ def _dashboard(
     arguments: Sequence[str] = (),
 ) -> int:
     from minirospy.base.suggestions import did_you_mean
-    from minirospy.dashboard.views import LAYOUTS, VIEWS
+    from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     if view and layout:
         raise Misuse(f"'{view}' and --layout {layout} are two views: give one")
@@ -227,13 +227,13 @@ def _dashboard(
 
 
 def _plugin(standalone: str) -> tuple[str, Fields]:
-    from minirospy.dashboard.views import view_of_plugin
+    from minirospy.web.dashboard.views import view_of_plugin
 
     return view_of_plugin(standalone), {}
 
 
 def _plots(topic: Sequence[str], pause: bool) -> tuple[str, Fields]:
-    from minirospy.dashboard.views import plotted_fields
+    from minirospy.web.dashboard.views import plotted_fields
 
     return "plot", {"path": plotted_fields(topic), **({"paused": ["1"]} if pause else {})}
 
@@ -267,7 +267,7 @@ def _rviz(
     arguments: Sequence[str] = (),
     ignored: object = None,
 ) -> int:
-    from minirospy.dashboard.rviz_door import read_file
+    from minirospy.web.dashboard.rviz_door import read_file
 
     file = Path(display_config) if display_config else None
     if file and read_file(file) is None:
@@ -295,7 +295,7 @@ def _serve(
 
     ``node_name``: that of joint_state_publisher_gui, which publishes joints; else the dashboard's own.
     """
-    from minirospy.bridge.serve import require_libraries
+    from minirospy.web.serve import require_libraries
 
     if port is not None and not 0 <= port <= 65535:
         raise Misuse(f"--port {port} is not between 0 and 65535")
@@ -304,12 +304,12 @@ def _serve(
     from minirospy.base.environment import Environment
     from minirospy.base.errors import BridgeError
     from minirospy.base.names import anonymous_name
-    from minirospy.bridge.access import Access, is_loopback
-    from minirospy.bridge.addresses import host_names
-    from minirospy.bridge.bridge import BridgeOptions
-    from minirospy.bridge.serve import run
-    from minirospy.dashboard.bag_folder import BagFolder
-    from minirospy.dashboard.dashboard import PORT, Dashboard
+    from minirospy.web.access import Access, is_loopback
+    from minirospy.web.addresses import host_names
+    from minirospy.web.bridge import BridgeOptions
+    from minirospy.web.dashboard.bag_folder import BagFolder
+    from minirospy.web.dashboard.dashboard import PORT, Dashboard
+    from minirospy.web.serve import run
 
     # Bags of the command line may be anywhere.
     given = fields.get("file", ()) if view == "bag" else ()
@@ -385,8 +385,8 @@ def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
     On loopback, too, the page needs the token to start programs and to open files: other users of the machine reach it.
     """
     from minirospy.base.errors import BridgeError
-    from minirospy.bridge.access import new_token
-    from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.web.access import new_token
+    from minirospy.web.tokens import Tokens, kept_tokens
 
     try:
         return kept_tokens(home)
@@ -408,8 +408,8 @@ def _announce(
     listen: bool,
     read_only: bool,
 ) -> None:
-    from minirospy.bridge.addresses import own_addresses, qr_code
-    from minirospy.dashboard.views import link
+    from minirospy.web.addresses import own_addresses, qr_code
+    from minirospy.web.dashboard.views import link
 
     is_any = address in ("0.0.0.0", "::")
     # Not localhost: a browser may try ::1 first, where another user's program may listen at this port.
@@ -434,8 +434,8 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
     """Open the browser with a code in place of the token; return whether there is one. On the loop."""
     import asyncio
 
-    from minirospy.dashboard.browser import open_link
-    from minirospy.dashboard.codes import LIFETIME
+    from minirospy.web.dashboard.browser import open_link
+    from minirospy.web.dashboard.codes import LIFETIME
 
     code = codes.new(token)
     remove = open_link(link(code=code))

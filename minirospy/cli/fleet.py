@@ -12,8 +12,8 @@ from minirospy.command.verbs import Family, Verb
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.fleet.gateway import Gateway
-    from minirospy.bridge.fleet.network import NetworkOptions
+    from minirospy.fleet.gateway import Gateway
+    from minirospy.fleet.network import NetworkOptions
 
 __all__ = ["FAMILY", "main"]
 
@@ -208,10 +208,10 @@ def _gateway(
     network = _network(connect, listen, config, scout)
 
     from minirospy.base.name_filter import NameFilter
-    from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
-    from minirospy.bridge.fleet.ros1_keys import parse_namespace
-    from minirospy.bridge.fleet.rules import GatewayRules, parse_lanes, parse_rates
-    from minirospy.bridge.serve import run
+    from minirospy.fleet.gateway import Gateway, GatewayOptions
+    from minirospy.fleet.ros1_keys import parse_namespace
+    from minirospy.fleet.rules import GatewayRules, parse_lanes, parse_rates
+    from minirospy.web.serve import run
 
     rules = GatewayRules(
         topics=NameFilter.of(topics),
@@ -228,7 +228,7 @@ def _gateway(
 
     async def start(node: Node) -> Gateway:
         # What the gateway logs goes where the node's lines go.
-        logging.getLogger("minirospy.bridge.fleet").parent = node.log
+        logging.getLogger("minirospy.fleet").parent = node.log
         return Gateway(node, options)
 
     def started(gateway: Gateway) -> None:
@@ -270,8 +270,8 @@ def _control(
 
 
 def _router(connect: Sequence[str], listen: Sequence[str], config: str, scout: bool) -> int:
-    from minirospy.bridge.fleet.network import DEFAULT_ENDPOINT
-    from minirospy.bridge.fleet.router import run_router
+    from minirospy.fleet.network import DEFAULT_ENDPOINT
+    from minirospy.fleet.router import run_router
 
     network = _network(connect, listen or ([] if config else [DEFAULT_ENDPOINT]), config, scout)
     return run_router(network, lambda text: print(text, flush=True))
@@ -282,8 +282,8 @@ def _status(connect: Sequence[str], config: str, scout: bool, json: bool, second
         raise Misuse(f"--seconds {seconds:g} is not between 0.1 and 60")
     network = _network(connect, (), config, scout)
 
-    from minirospy.bridge.fleet.inquiry import fleet_status, inquire
-    from minirospy.bridge.fleet.report import as_json, lines
+    from minirospy.fleet.inquiry import fleet_status, inquire
+    from minirospy.fleet.report import as_json, lines
 
     robots, controls = inquire(network, lambda session: fleet_status(session, seconds))
     if json:
@@ -299,7 +299,7 @@ def _param(robot: str, parameter: str, connect: Sequence[str], config: str, scou
 
     import yaml
 
-    from minirospy.bridge.fleet.inquiry import inquire, robot_parameter
+    from minirospy.fleet.inquiry import inquire, robot_parameter
 
     value = inquire(network, lambda session: robot_parameter(session, robot, parameter, 5.0))
     print(yaml.safe_dump(value, allow_unicode=True).removesuffix("...\n"), end="")
@@ -308,8 +308,8 @@ def _param(robot: str, parameter: str, connect: Sequence[str], config: str, scou
 
 def _takeover(robot: str, machine: str, any: bool) -> int:
     from minirospy.base.errors import NotFoundError
-    from minirospy.bridge.fleet.importer import MACHINES
-    from minirospy.bridge.fleet.keys import is_machine, is_robot_name
+    from minirospy.fleet.importer import MACHINES
+    from minirospy.fleet.keys import is_machine, is_robot_name
     from minirospy.introspect import parameters
     from minirospy.introspect.graph import Graph
 
@@ -337,7 +337,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
     """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
     from minirospy.base.environment import Environment
-    from minirospy.bridge.fleet.network import (
+    from minirospy.fleet.network import (
         EndpointError,
         NetworkOptions,
         is_loopback_endpoint,

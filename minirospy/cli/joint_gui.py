@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _uses_page(words: Sequence[str]) -> bool:
-    from minirospy.dashboard.browser import has_screen
+    from minirospy.web.dashboard.browser import has_screen
 
     is_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     asks_for_page = any(word in ("--page", "-h", "--help") for word in words)
@@ -40,7 +40,7 @@ def _uses_page(words: Sequence[str]) -> bool:
 
 def _has_libraries() -> bool:
     from minirospy.base.errors import BridgeError
-    from minirospy.bridge.serve import require_libraries
+    from minirospy.web.serve import require_libraries
 
     try:
         require_libraries()

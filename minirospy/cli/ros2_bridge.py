@@ -14,11 +14,11 @@ from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.ros2.bridge import Ros2Bridge
-    from minirospy.bridge.ros2.interface import Ros2Side
-    from minirospy.bridge.ros2.link_table import Pair
-    from minirospy.bridge.ros2.rules import Rules
     from minirospy.core.idl.load import Catalogue
+    from minirospy.ros2.bridge import Ros2Bridge
+    from minirospy.ros2.interface import Ros2Side
+    from minirospy.ros2.link_table import Pair
+    from minirospy.ros2.rules import Rules
 
 __all__ = ["COMMAND", "main"]
 
@@ -112,11 +112,11 @@ def _ros2_bridge(
 
     from minirospy.base.errors import BridgeError
     from minirospy.base.name_filter import NameFilter
-    from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
-    from minirospy.bridge.ros2.links import BRIDGE_PREFIX, parse_domain
-    from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
-    from minirospy.bridge.serve import run
     from minirospy.core.idl.load import Catalogue
+    from minirospy.ros2.bridge import Ros2Bridge, Ros2Options
+    from minirospy.ros2.links import BRIDGE_PREFIX, parse_domain
+    from minirospy.ros2.rules import BUILT_IN, parse_rules
+    from minirospy.web.serve import run
     from minirospy.workspace.packages import Packages
 
     if not call_timeout > 0:
@@ -152,7 +152,7 @@ def _ros2_bridge(
 
 
 def _rclpy() -> Callable[[str], Ros2Side]:
-    from minirospy.bridge.ros2.side import RclpySide, require_rclpy
+    from minirospy.ros2.side import RclpySide, require_rclpy
 
     require_rclpy()
     return RclpySide
@@ -162,9 +162,9 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
     import os
 
     from minirospy.base.environment import Environment
-    from minirospy.bridge.ros2.definitions import Definitions
-    from minirospy.bridge.ros2.zenoh_side import ZenohSide
-    from minirospy.bridge.zenoh_library import (
+    from minirospy.ros2.definitions import Definitions
+    from minirospy.ros2.zenoh_side import ZenohSide
+    from minirospy.zenoh.library import (
         EndpointError,
         NetworkOptions,
         is_loopback_endpoint,
@@ -215,8 +215,8 @@ class _Listing:
 
 
 def _table(pairs: Sequence[Pair]) -> list[str]:
-    from minirospy.bridge.ros2.links import Link
-    from minirospy.bridge.ros2.service_links import ServiceLink
+    from minirospy.ros2.links import Link
+    from minirospy.ros2.service_links import ServiceLink
 
     if not pairs:
         return [

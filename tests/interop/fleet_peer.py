@@ -10,8 +10,8 @@ from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import Image
 
 from minirospy import Node
-from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
-from minirospy.bridge.fleet.network import NetworkOptions
+from minirospy.fleet.gateway import Gateway, GatewayOptions
+from minirospy.fleet.network import NetworkOptions
 from minirospy.runtime.master.master import Master
 
 IMAGE = bytes(300_000)

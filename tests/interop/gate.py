@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from minirospy import Node
-from minirospy.bridge.bridge import Bridge, BridgeOptions
+from minirospy.web.bridge import Bridge, BridgeOptions
 
 __all__ = ["Gate", "serving"]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.dashboard.files import FOLDER
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.conftest import PATIENCE
 
 __all__ = ["needs_node", "run_script"]

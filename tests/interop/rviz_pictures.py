@@ -30,12 +30,12 @@ from sensor_msgs.msg import CameraInfo, ChannelFloat32, PointCloud
 from sensor_msgs.msg import Image as ImageMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from minirospy.bridge.access import Access
-from minirospy.bridge.bridge import BridgeOptions
-from tests.dashboard.conftest import TOKEN, Served
+from minirospy.web.access import Access
+from minirospy.web.bridge import BridgeOptions
 from tests.interop import robot_scene
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import running_master
+from tests.web.dashboard.conftest import TOKEN, Served
 
 __all__ = ["HEIGHT", "SCENES", "WIDTH", "Rviz", "has_rviz", "our_picture", "prepare", "publish", "write_file"]
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.bridge.access import Access
-from tests.dashboard.conftest import Served
+from minirospy.web.access import Access
 from tests.interop.browser import Page
 from tests.interop.conftest import REAL_PYTHON, start, stop
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium, serve
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "serve"]
 

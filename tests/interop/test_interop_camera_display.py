@@ -14,12 +14,12 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
-from tests.dashboard.conftest import serve
 from tests.interop import robot_scene
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_dashboard_3d import Serve, publish, status
+from tests.web.dashboard.conftest import serve
 
 __all__ = ["browse", "serve"]
 

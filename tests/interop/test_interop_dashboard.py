@@ -24,12 +24,12 @@ from geometry_msgs.msg import Twist
 from roslib.message import get_message_class
 from std_msgs.msg import String
 
-from minirospy.dashboard.views import VIEWS
-from tests.dashboard.conftest import TOKEN, Served, serve
+from minirospy.web.dashboard.views import VIEWS
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.robots.conftest import start
+from tests.web.dashboard.conftest import TOKEN, Served, serve
 
 __all__ = ["serve", "start"]
 
@@ -221,7 +221,7 @@ def test_topics_show_live_values_and_hostile_text_as_text(
 
 @needs_chromium
 def test_token_is_taken_out_of_the_address(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
-    from minirospy.bridge.access import Access
+    from minirospy.web.access import Access
 
     served = serve(
         access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
@@ -928,7 +928,7 @@ def test_gamepad_drives_while_its_deadman_button_is_held(
 
 @needs_chromium
 def test_teleop_names_what_it_cannot_drive(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
-    from minirospy.bridge.access import Access
+    from minirospy.web.access import Access
 
     served = serve(
         access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)

@@ -15,11 +15,11 @@ from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from minirospy.dashboard.rviz_file import parse_rviz
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.dashboard.rviz_file import parse_rviz
 from tests.interop import robot_scene
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 
@@ -462,7 +462,7 @@ def test_file_of_rviz_is_opened_changed_and_saved(serve: Serve, browse: Browse, 
 
 
 def test_read_only_page_publishes_nothing(serve: Serve, browse: Browse) -> None:
-    from minirospy.bridge.access import Access
+    from minirospy.web.access import Access
 
     access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
     served = serve(access=access)

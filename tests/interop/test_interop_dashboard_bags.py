@@ -11,10 +11,8 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from minirospy.dashboard.files import FOLDER
 from minirospy.recording.sources import Bags
-from tests.dashboard.bags import make_bag
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import (
     address,
@@ -25,6 +23,8 @@ from tests.interop.test_interop_dashboard import (
     repeated,
     start,
 )
+from tests.web.dashboard.bags import make_bag
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve", "start"]
 

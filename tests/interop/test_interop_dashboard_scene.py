@@ -13,7 +13,7 @@ import pytest
 
 from minirospy.base.errors import ConnectivityException, ExtrapolationException, TransformException
 from minirospy.core.tf2.buffer import TransformBuffer
-from minirospy.dashboard.files import FOLDER
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.conftest import PATIENCE
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import needs_node

@@ -19,10 +19,7 @@ from smach_msgs.msg import (
     SmachContainerStructure,
 )
 
-from minirospy.dashboard.files import FOLDER
-from tests.dashboard.conftest import Served, serve
-from tests.dashboard.lamp import make_lamp
-from tests.dashboard.robot import ROBOT
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import (
@@ -33,6 +30,9 @@ from tests.interop.test_interop_dashboard import (
     publisher,
     start,
 )
+from tests.web.dashboard.conftest import Served, serve
+from tests.web.dashboard.lamp import make_lamp
+from tests.web.dashboard.robot import ROBOT
 
 __all__ = ["browse", "serve", "start"]
 

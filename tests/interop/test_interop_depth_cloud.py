@@ -14,13 +14,13 @@ from rospy import Time
 from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
 from tf2_msgs.msg import TFMessage
 
-from tests.dashboard.conftest import serve
 from tests.interop import robot_scene
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.rviz_pictures import depth_camera
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_dashboard_3d import Serve, publish, status
+from tests.web.dashboard.conftest import serve
 
 __all__ = ["browse", "serve"]
 

@@ -14,10 +14,10 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from tests.bridge.conftest import Client, Running, bridge, run_bridge
 from tests.conftest import free_port
 from tests.interop.conftest import PATIENCE
 from tests.interop.test_interop_foreign import FOREIGN, modules
+from tests.web.conftest import Client, Running, bridge, run_bridge
 
 __all__ = ["bridge", "modules", "run_bridge"]
 

@@ -10,7 +10,6 @@ import pytest
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from tests.dashboard.conftest import Served
 from tests.interop.browser import Page
 from tests.interop.test_interop_dashboard import (
     HOSTILE,
@@ -23,6 +22,7 @@ from tests.interop.test_interop_dashboard import (
     serve,
 )
 from tests.interop.test_interop_reconfigure_page import page_functions
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "serve"]
 

@@ -10,7 +10,6 @@ from xmlrpc.client import ServerProxy
 
 from std_msgs.msg import Bool, String
 
-from tests.dashboard.conftest import Served
 from tests.interop.browser import Page
 from tests.interop.test_interop_dashboard import (
     address,
@@ -22,6 +21,7 @@ from tests.interop.test_interop_dashboard import (
     serve,
 )
 from tests.interop.test_interop_reconfigure_page import page_functions
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "serve"]
 

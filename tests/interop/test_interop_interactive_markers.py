@@ -16,14 +16,14 @@ from typing import Any
 
 import pytest
 
-from minirospy.bridge.access import Access
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.access import Access
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import REAL_PYTHON, start, stop
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_dashboard_3d import Serve, drag, drawn, levels, look_down, mouse, status
 from tests.waiting import wait_until
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 

@@ -12,8 +12,7 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3
 
 from minirospy.board.board import Board
-from minirospy.dashboard.views import LAYOUTS, VIEWS
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import (
@@ -27,6 +26,7 @@ from tests.interop.test_interop_dashboard import (
     publisher,
     saved,
 )
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 

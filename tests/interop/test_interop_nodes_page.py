@@ -10,11 +10,11 @@ from xmlrpc.client import ServerProxy
 
 from std_msgs.msg import String
 
-from minirospy.bridge.access import Access
-from tests.dashboard.conftest import Served
+from minirospy.web.access import Access
 from tests.interop.browser import Page
 from tests.interop.conftest import cpp_peer, peer
 from tests.interop.test_interop_dashboard import HOSTILE, address, browse, needs_chromium, serve
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "cpp_peer", "peer", "serve"]
 

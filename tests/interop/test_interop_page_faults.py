@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from minirospy.dashboard.files import FOLDER
 from minirospy.introspect.values import parse_value
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
 from tests.interop.test_interop_reconfigure_page import page_functions
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 

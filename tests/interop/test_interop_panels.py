@@ -11,11 +11,11 @@ import pytest
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, Float64, String
 
-from tests.dashboard.conftest import Served, serve
-from tests.dashboard.test_drive_door import listen
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import HOSTILE, address, browse, needs_chromium, publisher
+from tests.web.dashboard.conftest import Served, serve
+from tests.web.dashboard.test_drive_door import listen
 
 __all__ = ["browse", "serve"]
 
@@ -84,7 +84,7 @@ def test_message_has_one_field_set() -> None:
 
 
 def ros1() -> str:
-    from minirospy.dashboard.files import FOLDER
+    from minirospy.web.dashboard.files import FOLDER
 
     return (FOLDER / "js" / "ros1.js").as_uri()
 
@@ -255,7 +255,7 @@ def test_panels_are_made_by_the_form_and_kept_in_the_link(
 @needs_chromium
 @pytest.mark.parametrize("kind", ["button", "switch"])
 def test_reader_sets_nothing(serve: Callable[..., Served], browse: Callable[..., Page], kind: str) -> None:
-    from minirospy.bridge.access import Access
+    from minirospy.web.access import Access
 
     served = serve(
         access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)

@@ -12,8 +12,7 @@ import pytest
 from geometry_msgs.msg import PointStamped, Vector3
 from rospy import Time
 
-from minirospy.dashboard.files import FOLDER
-from tests.dashboard.conftest import Served
+from minirospy.web.dashboard.files import FOLDER
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_aio import until
@@ -25,6 +24,7 @@ from tests.interop.test_interop_dashboard import (
     publisher,
     serve,
 )
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "serve"]
 

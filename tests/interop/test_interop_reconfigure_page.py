@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.dashboard.conftest import Served
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import start, stop
 from tests.interop.test_interop_dashboard import (
@@ -24,6 +23,7 @@ from tests.interop.test_interop_dashboard import (
 )
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.interop.test_interop_reconfigure import HERE, PYTHONS, dynparam, lines_until, modules
+from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "modules", "serve"]
 
@@ -279,7 +279,7 @@ def load(page: Page, file: Path) -> None:
 def test_reader_sees_values_and_a_server_that_leaves_is_marked(
     lamp: Callable[[str], Any], browse: Callable[..., Page], serve: Callable[..., Served]
 ) -> None:
-    from minirospy.bridge.access import Access
+    from minirospy.web.access import Access
 
     _, _, program = lamp("ours")
     served = serve(

@@ -27,7 +27,7 @@ from tf2_msgs.msg import TFMessage
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.base.errors import ServiceException
-from minirospy.bridge.bridge import Bridge, BridgeOptions
+from minirospy.web.bridge import Bridge, BridgeOptions
 from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import modules

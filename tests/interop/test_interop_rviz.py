@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from PIL import Image, ImageChops
 
-from tests.dashboard.conftest import Served, serve
 from tests.interop import rviz_pictures
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.rviz_pictures import HEIGHT, WIDTH, Rviz
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 

@@ -26,9 +26,9 @@ from visualization_msgs.msg import Marker
 
 from minirospy.aio.topics import Subscription
 from minirospy.core.idl.protocols import Message
-from tests.bridge.conftest import Running, run_bridge
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.test_interop_foreign import FOREIGN, modules
+from tests.web.conftest import Running, run_bridge
 
 __all__ = ["modules", "run_bridge"]
 

@@ -13,13 +13,13 @@ from geometry_msgs.msg import PoseWithCovariance
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool
 
-import minirospy.dashboard
-from minirospy.dashboard.views import VIEWS
-from tests.dashboard.conftest import Served, serve
+import minirospy.web.dashboard
+from minirospy.web.dashboard.views import VIEWS
 from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher
 from tests.interop.test_interop_reconfigure_page import page_functions
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 
@@ -49,7 +49,7 @@ TRANSLATED = (
 )
 """The views whose texts have German ones; add yours."""
 
-PAGE = Path(minirospy.dashboard.__file__).parent / "page"
+PAGE = Path(minirospy.web.dashboard.__file__).parent / "page"
 
 SETTINGS = {
     "plot": "?path=/button_state/data",

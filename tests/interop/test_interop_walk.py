@@ -18,12 +18,12 @@ from std_srvs.srv import SetBool
 from turtlesim.msg import Color, Pose
 
 from minirospy.board.board import Board
-from minirospy.dashboard.views import VIEWS
-from tests.dashboard.bags import make_bag
-from tests.dashboard.conftest import Served, serve
+from minirospy.web.dashboard.views import VIEWS
 from tests.interop import robot_scene
 from tests.interop.browser import Page
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher, statuses
+from tests.web.dashboard.bags import make_bag
+from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.errors import NotFoundError
-from minirospy.dashboard import views
+from minirospy.web.dashboard import views
 from minirospy.workspace import elsewhere
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 from minirospy.workspace.packages import Packages, built_in_roots

@@ -514,14 +514,14 @@ def pins(cursor: Cursor) -> Iterable[str]:
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
     """Return the views of the dashboard, and the layouts whose names are no view's."""
-    from minirospy.dashboard.views import LAYOUTS, VIEWS
+    from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))
 
 
 def dashboard_layouts(_: Cursor) -> Iterable[str]:
     """Return the layouts that come with the dashboard's page."""
-    from minirospy.dashboard.views import LAYOUTS
+    from minirospy.web.dashboard.views import LAYOUTS
 
     return LAYOUTS
 

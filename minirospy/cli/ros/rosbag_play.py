@@ -161,12 +161,12 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
 
     with Bags(paths) as bags, contextlib.ExitStack() as serving:
         if foxglove_port is not None:
-            from minirospy.bridge.serve import require_libraries
+            from minirospy.web.serve import require_libraries
 
             require_libraries()
 
         def serve(first: int, last: int) -> None:
-            from minirospy.bridge.playback import PlayerBridge
+            from minirospy.web.playback import PlayerBridge
 
             assert foxglove_port is not None
             bridge = serving.enter_context(PlayerBridge(player, (first, last), foxglove_port))

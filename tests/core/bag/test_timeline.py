@@ -7,7 +7,7 @@ from pathlib import Path
 
 from minirospy.core.bag.timeline import Timeline
 from minirospy.recording.sources import open_reader
-from tests.dashboard.bags import SECOND, START, make_bag, text_body
+from tests.web.dashboard.bags import SECOND, START, make_bag, text_body
 
 
 def test_messages_are_found_by_time(tmp_path: Path) -> None:

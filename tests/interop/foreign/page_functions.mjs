@@ -13,7 +13,7 @@ for await (const line of createInterface({ input: process.stdin })) {
   const [module, name, given] = JSON.parse(line, (_, value) => (Array.isArray(value?.map) && !Array.isArray(value) ? new Map(value.map) : value));
   let answer;
   try {
-    const functions = await import(`../../../minirospy/dashboard/page/js/${module}.js`);
+    const functions = await import(`../../../minirospy/web/dashboard/page/js/${module}.js`);
     answer = functions[name](...given) ?? null;
   } catch (error) {
     answer = { error: error.message };

@@ -1,6 +1,6 @@
 // Decodes and encodes messages with the dashboard's own code: lines {type, text, hex} in, {hex, json} out.
 import { createInterface } from "node:readline";
-import { decode, encode, parseDefinition } from "../../../minirospy/dashboard/page/js/ros1.js";
+import { decode, encode, parseDefinition } from "../../../minirospy/web/dashboard/page/js/ros1.js";
 
 const plain = (name, value) => {
   if (typeof value === "bigint") return `${value}`;

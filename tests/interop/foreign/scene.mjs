@@ -1,11 +1,11 @@
 // Calls the pure parts of the dashboard's 3D view: lines {call, ...} in, one line out for each.
 import { createInterface } from "node:readline";
-import { colorsOf, pointsOfCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../../../minirospy/dashboard/page/js/scene/points.js";
-import { Config, readView, writeView } from "../../../minirospy/dashboard/page/js/scene/config.js";
-import { palette } from "../../../minirospy/dashboard/page/js/scene/colors.js";
-import { Frames, missingText } from "../../../minirospy/dashboard/page/js/scene/transforms.js";
-import { linkPoses, parseUrdf } from "../../../minirospy/dashboard/page/js/scene/urdf.js";
-import { parseXml } from "../../../minirospy/dashboard/page/js/scene/xml.js";
+import { colorsOf, pointsOfCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../../../minirospy/web/dashboard/page/js/scene/points.js";
+import { Config, readView, writeView } from "../../../minirospy/web/dashboard/page/js/scene/config.js";
+import { palette } from "../../../minirospy/web/dashboard/page/js/scene/colors.js";
+import { Frames, missingText } from "../../../minirospy/web/dashboard/page/js/scene/transforms.js";
+import { linkPoses, parseUrdf } from "../../../minirospy/web/dashboard/page/js/scene/urdf.js";
+import { parseXml } from "../../../minirospy/web/dashboard/page/js/scene/xml.js";
 
 let frames = new Frames();
 const numbers = (bytes) => Uint8Array.from(Buffer.from(bytes, "hex"));

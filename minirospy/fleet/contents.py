@@ -1,0 +1,179 @@
+"""What the fleet has, by the tokens that are there: robots, their gateways, topics and services. Pure.
+
+Tokens come and go one by one and in any order, those of a robot before its claim too. What is too much, or not of the form of
+:mod:`minirospy.fleet.keys`, is left out and counted.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypeVar
+
+from minirospy.fleet.holders import Holders
+from minirospy.fleet.keys import Claim, ServiceToken, TopicToken, parse_claim, parse_service, parse_topic
+
+_Token = TypeVar("_Token", TopicToken, ServiceToken)
+
+__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "MOST_TOKENS", "FleetContents", "Refused", "Robot"]
+
+MOST_GATEWAYS = 5_000
+MOST_NAMES = 2_000
+"""Topics, and as many services, that one gateway may announce."""
+MOST_TOKENS = 200_000
+"""Topics and services of all gateways together: some 100 MiB."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot that others see. ``duplicates``: claims to its name that do not count."""
+
+    claim: Claim
+    topics: dict[str, TopicToken]
+    services: dict[str, ServiceToken]
+    duplicates: tuple[Claim, ...] = ()
+
+
+class Refused(NamedTuple):
+    """A gateway that is not shown: ``holder`` has the name, or had it until a moment ago."""
+
+    claim: Claim
+    holder: Claim | None
+
+
+@dataclass(eq=False)
+class _Gateway:
+    claim: Claim | None = None
+    order: int = 0
+    """When the claim was seen: later claims have larger numbers."""
+    topics: dict[str, TopicToken] = field(default_factory=dict)
+    services: dict[str, ServiceToken] = field(default_factory=dict)
+
+    @property
+    def is_empty(self) -> bool:
+        return not (self.claim or self.topics or self.services)
+
+
+class FleetContents:
+    """The tokens that are there."""
+
+    def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
+        """``allows(robot)``: which robots are of interest. ``clock`` returns seconds that never go back."""
+        self.holders = Holders(clock)
+        self.waiting: tuple[Refused, ...] = ()
+        """The gateways that :meth:`robots` has left out, because another one has their name."""
+        self.refused = 0
+        """How many tokens were left out."""
+        self.refusal = ""
+        """Why the last of these was."""
+        self._count = 0
+        self._allows = allows
+        self._orders = itertools.count()
+        self._gateways: dict[tuple[str, str], _Gateway] = {}
+
+    def add(self, key: str) -> bool:
+        """Add a token; return whether it changes anything."""
+        token = parse_claim(key) or parse_topic(key) or parse_service(key)
+        if token is None:
+            return self._refuse("a key is not that of a robot, a topic or a service")
+        name = token.name if isinstance(token, Claim) else token.robot
+        if not self._allows(name):
+            return False
+        at = (name, token.gateway)
+        if at not in self._gateways and len(self._gateways) >= MOST_GATEWAYS:
+            return self._refuse(f"the fleet has more than {MOST_GATEWAYS} gateways")
+
+        gateway = self._gateways.get(at) or _Gateway()
+        if isinstance(token, Claim):
+            if gateway.claim not in (None, token):
+                # A gateway declares one claim as long as it runs: the second one is another peer's.
+                return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
+            changed = gateway.claim is None
+            if changed:
+                gateway.claim, gateway.order = token, next(self._orders)
+        elif isinstance(token, TopicToken):
+            changed = self._put(gateway.topics, token.topic, token)
+        else:
+            changed = self._put(gateway.services, token.service, token)
+        # Not one whose only name was left out: nothing would remove it.
+        if not gateway.is_empty:
+            self._gateways[at] = gateway
+        return changed
+
+    def remove(self, key: str) -> bool:
+        """Remove a token; return whether it changes anything."""
+        token = parse_claim(key) or parse_topic(key) or parse_service(key)
+        if token is None:
+            return False
+        at = (token.name if isinstance(token, Claim) else token.robot, token.gateway)
+        gateway = self._gateways.get(at)
+        if gateway is None:
+            return False
+
+        # A topic whose flags have changed has a new token already when the old one goes.
+        if isinstance(token, Claim):
+            if gateway.claim != token:
+                return False
+            gateway.claim = None
+        elif isinstance(token, TopicToken):
+            if gateway.topics.get(token.topic) != token:
+                return False
+            del gateway.topics[token.topic]
+            self._count -= 1
+        else:
+            if gateway.services.get(token.service) != token:
+                return False
+            del gateway.services[token.service]
+            self._count -= 1
+        if gateway.is_empty:
+            del self._gateways[at]
+        return True
+
+    @property
+    def gateways(self) -> set[str]:
+        """The gateways that have tokens."""
+        return {gateway for _, gateway in self._gateways}
+
+    def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
+        """Return the robots by name, each as the gateway that holds its name announces it; ``lost`` ones do not count."""
+        there = [
+            (gateway.order, gateway.claim)
+            for gateway in self._gateways.values()
+            if gateway.claim and gateway.claim.gateway not in lost
+        ]
+        claims: dict[str, list[Claim]] = {}
+        for _, claim in sorted(there):
+            claims.setdefault(claim.name, []).append(claim)
+
+        found: dict[str, Robot] = {}
+        waiting = []
+        for name, named in sorted(claims.items()):
+            best = self.holders.choose(name, named)
+            others = tuple(claim for claim in named if claim != best)
+            waiting += [Refused(claim, self.holders.holder(name)) for claim in others]
+            if best:
+                gateway = self._gateways[name, best.gateway]
+                found[name] = Robot(best, dict(gateway.topics), dict(gateway.services), others)
+        self.holders.forget(claims)
+        self.waiting = tuple(waiting)
+        return found
+
+    def _put(self, table: dict[str, _Token], name: str, token: _Token) -> bool:
+        if name not in table:
+            if len(table) >= MOST_NAMES:
+                return self._refuse(
+                    f"robot [{token.robot}] announces more than {MOST_NAMES} topics or services"
+                )
+            if self._count >= MOST_TOKENS:
+                return self._refuse(f"the fleet announces more than {MOST_TOKENS} topics and services")
+            self._count += 1
+        changed = table.get(name) != token
+        table[name] = token
+        return changed
+
+    def _refuse(self, reason: str) -> bool:
+        self.refused += 1
+        self.refusal = reason
+        return False

@@ -1,0 +1,127 @@
+"""The full texts of message types, from packages, publishers and peers; a peer's is checked against its md5sum."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+from weakref import WeakValueDictionary
+
+from minirospy.base.errors import DefinitionError, MinirospyError
+from minirospy.core.idl.load import checked_text
+from minirospy.core.idl.spec import MessageSpec
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.fleet.frames import FrameRewriter
+from minirospy.fleet.keys import definition_key
+from minirospy.fleet.network import FleetNetwork, QueryFailed
+from minirospy.introspect.type_texts import TypeTexts
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["Definitions", "checked_specs"]
+
+_MOST = 5_000
+_SECONDS = 10.0
+MAX_CHARACTERS = 64 << 20  # of all texts that are kept; those of ROS's own packages have 3 million together
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # at a time; one that is not answered takes _SECONDS
+_NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
+
+
+def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
+    """Return the specs in a full text. Raise DefinitionError where it is not that of the md5sum, or not one at all."""
+    specs, found = checked_text(name, text)
+    if found != md5sum:
+        raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
+    return specs
+
+
+class Definitions:
+    """The types that this gateway knows. Makes no class of them: messages stay bytes."""
+
+    def __init__(self, node: Node, network: FleetNetwork) -> None:
+        self.texts = TypeTexts(node)
+        self._network = network
+        self._known: dict[tuple[str, str], str] = {}
+        self._known_characters = 0
+        self._finding: dict[tuple[str, str, str], asyncio.Task[str]] = {}
+        """The queries that are under way, by type, md5sum and gateway."""
+        self._shares: WeakValueDictionary[str, asyncio.Semaphore] = WeakValueDictionary()
+        self._querying = asyncio.Semaphore(MAX_QUERIES)
+        self._rewriters: dict[tuple[str, str], FrameRewriter | None] = {}
+
+    async def close(self) -> None:
+        """End what is under way."""
+        tasks = list(self._finding.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self.texts.close()
+
+    def learn(self, name: str, md5sum: str, text: str) -> None:
+        """Keep the text that a publisher's connection header has."""
+        if not text or (name, md5sum) in self._known or len(self._known) >= _MOST:
+            return
+        if self._known_characters + len(text) <= MAX_CHARACTERS:
+            self._known[name, md5sum] = text
+            self._known_characters += len(text)
+
+    async def md5sum(self, name: str) -> str:
+        """Return the md5sum of an installed type, "" where it is not installed."""
+        found = await self.texts.installed(name)
+        return found.md5sum if found else ""
+
+    async def text(self, name: str, md5sum: str) -> str:
+        """Return the text that this gateway has of a type, "" without one."""
+        if (name, md5sum) not in self._known:
+            installed = await self.texts.installed(name)
+            if installed is None or installed.md5sum != md5sum:
+                return ""
+            self.learn(name, md5sum, installed.definition)
+        return self._known.get((name, md5sum), "")
+
+    async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
+        """Return a type, with its text where it is known here or to a gateway ("": none); without it messages pass, too."""
+        text = await self.text(name, md5sum)
+        if not text and gateway and md5sum != _NO_FIELDS:
+            # Each gateway is queried for itself: one that answers nothing delays no other one's topics.
+            key = name, md5sum, gateway
+            task = self._finding.get(key)
+            if task is None:
+                task = self._finding[key] = asyncio.ensure_future(self._from_peer(name, md5sum, gateway))
+                task.add_done_callback(lambda _: self._finding.pop(key, None))
+            text = await asyncio.shield(task)
+        return InterfaceType(name, md5sum, text)
+
+    async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
+        """Return what rewrites the frame ids of a type; None where it has none, or its text is not known."""
+        key = name, md5sum
+        if key not in self._rewriters:
+            text = await self.text(name, md5sum)
+            if not text:
+                return None
+            try:
+                specs = checked_specs(name, text, md5sum)
+                made = FrameRewriter(specs[name], specs.__getitem__)
+            except MinirospyError:
+                self._rewriters[key] = None
+            else:
+                self._rewriters[key] = made if made.has_frames else None
+        return self._rewriters[key]
+
+    async def _from_peer(self, name: str, md5sum: str, gateway: str) -> str:
+        share = self._shares.get(gateway)
+        if share is None:
+            share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
+        try:
+            # Its own share first: a gateway that answers nothing leaves the places of the others free.
+            async with share, self._querying:
+                if (name, md5sum) in self._known:
+                    return self._known[name, md5sum]
+                answer = await self._network.query(definition_key(gateway, name, md5sum), seconds=_SECONDS)
+                text = answer.decode()
+                loop = asyncio.get_running_loop()
+                await loop.run_in_executor(None, checked_specs, name, text, md5sum)
+        except (QueryFailed, DefinitionError, UnicodeDecodeError):
+            return ""
+        self.learn(name, md5sum, text)
+        return text

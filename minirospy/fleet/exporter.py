@@ -1,0 +1,286 @@
+"""A robot's side: its graph is announced, topics that somebody wants are sent, messages and calls for it are passed on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable, Collection, Coroutine, Mapping
+from typing import TYPE_CHECKING
+
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.fleet.definitions import Definitions
+from minirospy.fleet.inbound import InboundTopic, call_service, run_on_loop
+from minirospy.fleet.keys import (
+    ROOT,
+    Claim,
+    claim_key,
+    parse_call,
+    parse_claim,
+    parse_in,
+    parse_offer,
+    parse_want,
+    replay_key,
+    service_key,
+    topic_key,
+)
+from minirospy.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.fleet.outbound import OutboundTopic
+from minirospy.fleet.robot_graph import RobotGraph
+from minirospy.fleet.rules import GatewayRules
+from minirospy.fleet.sender import Intake, Sender
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["Exporter"]
+
+_log = logging.getLogger(__name__)
+_MOST_IN_FLOWS = 1_000
+_MOST_WANTED, _MOST_READERS = 10_000, 1_000
+"""Topics that readers may want, and readers of each, which peers choose."""
+
+
+class Exporter:
+    """Shows one robot's graph to the fleet. All on the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        network: FleetNetwork,
+        definitions: Definitions,
+        sender: Sender,
+        intake: Intake,
+        claim: Claim,
+        rules: GatewayRules,
+        hidden: Callable[[], Collection[str]],
+        spawn: Callable[[Coroutine[object, object, None]], object],
+    ) -> None:
+        """``hidden``: names of robots whose topics are here as their copies."""
+        self.claim = claim
+        self.duplicates: tuple[Claim, ...] = ()
+        self.graph = RobotGraph(node, definitions, claim, rules, hidden)
+        self.outbound: dict[str, OutboundTopic] = {}
+        self.inbound: dict[str, InboundTopic] = {}
+        self._node = node
+        self._network = network
+        self._definitions = definitions
+        self._sender = sender
+        self._intake = intake
+        self._rules = rules
+        self._spawn = spawn
+        self._tokens: dict[str, Later] = {}
+        self._readers: dict[str, set[str]] = {}
+        self._claims = {claim}
+        self._rivals = RateLimitedLogger(_log)
+        self._flows = Intake.flows(_MOST_IN_FLOWS)
+        self._faults = Faults(_log, "the watch of the robot's graph")
+        self._watching: asyncio.Task[None] | None = None
+        self._declared: list[Later] = []
+
+    async def start(self) -> None:
+        """Announce the robot until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        await self.look()
+        network, ends = self._network, f"{self.claim.name}/{self.claim.gateway}"
+        self._declared = [
+            network.subscribe(f"{ROOT}/in/{ends}/**", self._arrived),
+            network.answer(f"{ROOT}/call/{ends}/**", self._call),
+            network.answer(f"{ROOT}/param/{ends}", self._parameter),
+            network.watch_tokens(f"{ROOT}/want/{ends}/**", self._want_changed),
+            network.watch_tokens(f"{ROOT}/offer/{ends}/**", self._offer_changed),
+            network.watch_tokens(f"{ROOT}/robot/{self.claim.name}/**", self._claim_changed),
+            network.declare_token(claim_key(self.claim)),
+        ]
+        self._watching = asyncio.ensure_future(
+            keep_running(lambda: self.graph.watch(self.look), self._faults)
+        )
+
+    async def close(self) -> None:
+        """Withdraw all. Idempotent."""
+        watching, self._watching = self._watching, None
+        if watching:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+        await self.graph.close()
+        for declared in [*self._declared, *self._tokens.values()]:
+            declared.undeclare()
+        self._declared, self._tokens = [], {}
+        await asyncio.gather(
+            *(topic.close() for topic in self.outbound.values()),
+            *(topic.close() for topic in self.inbound.values()),
+        )
+        self.outbound, self.inbound = {}, {}
+
+    async def look(self) -> bool:
+        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
+        changed = await self.graph.look()
+        self._announce()
+        await self._adjust()
+        return changed
+
+    # --- what is announced
+
+    def _announce(self) -> None:
+        keys = {topic_key(each) for each in self.graph.topics.values()}
+        keys |= {service_key(each) for each in self.graph.services.values()}
+        # New ones first: a topic whose flags have changed is never without a token.
+        for key in keys - self._tokens.keys():
+            self._tokens[key] = self._network.declare_token(key)
+        for key in self._tokens.keys() - keys:
+            self._tokens.pop(key).undeclare()
+
+    # --- what others want, and offer
+
+    def _want_changed(self, key: str, is_there: bool) -> None:
+        want = parse_want(key)
+        if want is None:
+            return
+        if is_there and want.topic not in self._readers and len(self._readers) >= _MOST_WANTED:
+            return
+        readers = self._readers.setdefault(want.topic, set())
+        if is_there and len(readers) < _MOST_READERS:
+            readers.add(want.reader)
+            outbound = self.outbound.get(want.topic)
+            if outbound:
+                ends = outbound.token.robot, outbound.token.gateway, outbound.token.md5sum
+                outbound.replay(replay_key(*ends, want.topic, want.reader))
+        else:
+            readers.discard(want.reader)
+        if not readers:
+            del self._readers[want.topic]
+        self._spawn(self._adjust())
+
+    def _offer_changed(self, key: str, is_there: bool) -> None:
+        offer = parse_offer(key)
+        if offer is None:
+            return
+        inbound = self._inbound_of(offer.topic) if is_there else self.inbound.get(offer.topic)
+        if inbound:
+            inbound.offer_changed(offer, is_there)
+
+    def _claim_changed(self, key: str, is_there: bool) -> None:
+        claim = parse_claim(key)
+        if claim is None or claim == self.claim:
+            return
+        if is_there and len(self._claims) < 100:
+            self._claims.add(claim)
+        else:
+            self._claims.discard(claim)
+        before, self.duplicates = self.duplicates, tuple(sorted(self._claims - {self.claim}))
+        others = [each for each in self.duplicates if each.host != self.claim.host]
+        if others and not any(each.host != self.claim.host for each in before):
+            self._rivals.error(
+                "another machine, %s (gateway %s), calls itself [%s], too: a control room shows the one that it saw first, and "
+                "refuses the other. Give one of them another name (--name). This machine is %s (gateway %s)",
+                others[0].host,
+                others[0].gateway,
+                self.claim.name,
+                self.claim.host,
+                self.claim.gateway,
+            )
+
+    async def _adjust(self) -> None:
+        """Open and close what is sent, and what is published here, as the graph and the wants are."""
+        # Closing waits for the master: other calls of this method run meanwhile, and change both tables.
+        for topic, outbound in list(self.outbound.items()):
+            token = self.graph.topics.get(topic)
+            if self.outbound.get(topic) is outbound and (
+                token is None or not token.has_same_messages(outbound.token) or topic not in self._readers
+            ):
+                del self.outbound[topic]
+                await outbound.close()
+
+        for topic in list(self._readers):
+            token = self.graph.topics.get(topic)
+            if token and token.is_published and topic not in self.outbound:
+                lane = self._rules.lane(topic, token.type)
+                outbound = OutboundTopic(
+                    self._node,
+                    token,
+                    self._sender.flow(lane, self._rules.rate(topic)),
+                    await self._definitions.rewriter(token.type, token.md5sum) if token.has_frames else None,
+                )
+                if topic in self._readers and topic not in self.outbound:
+                    self.outbound[topic] = outbound
+                    outbound.open()
+        for topic, inbound in list(self.inbound.items()):
+            token = self.graph.topics.get(topic)
+            if self.inbound.get(topic) is inbound and (
+                token is None or not token.is_subscribed or inbound.is_idle
+            ):
+                del self.inbound[topic]
+                await inbound.close()
+
+    # --- messages, calls and questions of others
+
+    def _inbound_of(self, topic: str) -> InboundTopic | None:
+        """Return the publisher for what comes to a topic, which must be subscribed here."""
+        inbound = self.inbound.get(topic)
+        token = self.graph.topics.get(topic)
+        if inbound is None and token is not None and token.is_subscribed:
+            inbound = self.inbound[topic] = InboundTopic(
+                self._node,
+                self._definitions,
+                token,
+                self._spawn,
+                self._rules.has_frames,
+                stop_seconds=self._rules.stop_seconds,
+            )
+        return inbound
+
+    def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
+        """Take a message for this robot. In a thread of Zenoh's."""
+        parsed = parse_in(key)
+        token = self.graph.topics.get(parsed[0]) if parsed else None
+        if parsed is None or token is None or not token.is_subscribed:
+            return
+        topic, md5sum, writer = parsed
+        flow = self._flows.of((topic, writer))
+        if flow is not None:
+            self._intake.add(
+                flow, lambda body, _: self._deliver(topic, md5sum, writer, body), message, attachment
+            )
+
+    def _deliver(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
+        """Publish a message. In the intake's thread."""
+        inbound = self.inbound.get(topic)
+        if inbound is None or not inbound.publish(md5sum, body):
+            run_on_loop(self._node, self._hold(topic, md5sum, writer, body))
+
+    async def _hold(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
+        inbound = self._inbound_of(topic)
+        if inbound:
+            inbound.keep(md5sum, writer, body)
+
+    async def _call(self, key: str, request: bytes) -> bytes:
+        parsed = parse_call(key)
+        token = self.graph.services.get(parsed[0]) if parsed else None
+        if parsed is None or token is None:
+            raise QueryFailed("the robot has no such service")
+        if token.md5sum != parsed[1]:
+            raise QueryFailed(f"the service has the md5sum {token.md5sum}, not {parsed[1]}")
+        return await call_service(self._node, token, request)
+
+    async def _parameter(self, _: str, request: bytes) -> bytes:
+        name = request.decode(errors="replace") or "/"
+        if not self._rules.parameters(name):
+            raise QueryFailed(f"the parameter [{name}] may not be read")
+        try:
+            value = await self._node.get_param(name)
+        except KeyError:
+            raise QueryFailed(f"Parameter [{name}] is not set") from None
+        if isinstance(value, dict):
+            value = self._allowed(name, value)
+        return json.dumps(value, default=str).encode()
+
+    def _allowed(self, name: str, tree: Mapping[str, object]) -> dict[str, object]:
+        """Return the part of a namespace that may be read."""
+        found: dict[str, object] = {}
+        for key, value in tree.items():
+            full = f"{name.rstrip('/')}/{key}"
+            if isinstance(value, dict):
+                found[key] = self._allowed(full, value)
+            elif self._rules.parameters(full):
+                found[key] = value
+        return found

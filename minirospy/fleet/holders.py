@@ -1,0 +1,105 @@
+"""Which gateway speaks for a robot if several claim its name: the one that was seen here first, or the operator's choice. Pure.
+
+No clock of a peer decides. A machine that holds a name keeps it until it has been gone for :data:`HOLD_SECONDS`, so that
+another machine cannot take the name while a link is down for a moment. A gateway of the same machine, such as one that was
+started again, follows immediately.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from minirospy.fleet.keys import Claim, is_machine
+
+__all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
+
+HOLD_SECONDS = 10.0  # Zenoh's default lease: a link that is silent for longer is lost
+MAX_HOLDS = 5_000  # names of robots that are gone, kept for HOLD_SECONDS; peers choose names
+
+
+@dataclass
+class _Hold:
+    claim: Claim
+    left: float | None = None
+    """When the gateway left, in seconds of the clock; None while it is there."""
+
+
+class Holders:
+    """Chooses among the claims to each name, and remembers which one was chosen."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """``clock`` returns seconds that never go back."""
+        self.machines: Mapping[str, str] = {}
+        """The machine that the operator has chosen for a robot, by the robot's name."""
+        self._clock = clock
+        self._holds: dict[str, _Hold] = {}
+        self._given_up: set[Claim] = set()
+
+    def give_up(self, claim: Claim) -> None:
+        """Let another gateway of the same machine follow: this one does not answer, though its token is still there."""
+        self._given_up.add(claim)
+
+    def holder(self, name: str) -> Claim | None:
+        """Return the claim that holds a name, including one that has just left."""
+        hold = self._holds.get(name)
+        return hold.claim if hold else None
+
+    def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
+        """Return the claim that counts, of those that are there in the order in which they were seen; None if none may."""
+        present = [claim for claim in claims if claim not in self._given_up] or list(claims)
+        machine = self.machines.get(name)
+        if machine:
+            present = [claim for claim in present if claim.host == machine]
+        hold = self._holds.get(name)
+        if hold is None or (machine and hold.claim.host != machine):
+            return self._hold(name, present)
+        if hold.claim in present:
+            hold.left = None
+            return hold.claim
+
+        successors = [claim for claim in present if claim.host == hold.claim.host]
+        if successors:
+            return self._hold(name, successors)
+        if hold.left is None:
+            hold.left = self._clock()
+        if self._clock() - hold.left < HOLD_SECONDS:
+            return None
+        del self._holds[name]
+        return self._hold(name, present)
+
+    def forget(self, present: Collection[str]) -> None:
+        """Forget the names whose holders have left for good; ``present``: the names that gateways still claim."""
+        now = self._clock()
+        for name in self._holds.keys() - present:
+            hold = self._holds[name]
+            if hold.left is None:
+                hold.left = now
+            elif now - hold.left >= HOLD_SECONDS:
+                del self._holds[name]
+        for name in list(self._holds.keys() - present)[: max(0, len(self._holds) - MAX_HOLDS)]:
+            del self._holds[name]
+        if self._given_up:
+            self._given_up = {claim for claim in self._given_up if claim.name in present}
+
+    def pause(self, names: Collection[str]) -> float | None:
+        """Return in how many seconds the first of these names is free; None if none of them is held by one that has left."""
+        ends = [
+            hold.left + HOLD_SECONDS
+            for name in names
+            if (hold := self._holds.get(name)) is not None and hold.left is not None
+        ]
+        return max(0.0, min(ends) - self._clock()) if ends else None
+
+    def _hold(self, name: str, claims: Sequence[Claim]) -> Claim | None:
+        if not claims:
+            return None
+        self._holds[name] = _Hold(claims[0])
+        return claims[0]
+
+
+def parse_machines(value: object) -> dict[str, str]:
+    """Return the operator's choices in a parameter's value, machines by names of robots; leave out what is none."""
+    if not isinstance(value, dict):
+        return {}
+    return {str(name): machine for name, machine in value.items() if is_machine(machine)}

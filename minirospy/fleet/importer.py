@@ -1,0 +1,488 @@
+"""A control room's side: the robots of the fleet in the local graph, each under its name."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING
+
+from minirospy.aio.raw import RawService
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.errors import MasterUnreachableError, RpcError, ServiceException
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.fleet.clocks import ClockOffset, Ping, offset_of
+from minirospy.fleet.contents import FleetContents, Refused, Robot
+from minirospy.fleet.definitions import Definitions
+from minirospy.fleet.holders import HOLD_SECONDS, parse_machines
+from minirospy.fleet.imported_topic import ImportedTopic, Shared
+from minirospy.fleet.keys import ROOT, Claim, ServiceToken, call_key, parse_claim
+from minirospy.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.fleet.presence import Presence
+from minirospy.fleet.rules import GatewayRules
+from minirospy.fleet.sender import Intake, Sender
+from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.master.heap import return_free_memory
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["MACHINES", "ImportedRobot", "Importer"]
+
+MACHINES = "/fleet/machines"
+"""The parameter of the machines that the operator has chosen, by names of robots; `minirospy fleet takeover` sets it."""
+
+_log = logging.getLogger(__name__)
+_SETTLE_SECONDS = 0.1
+_LOOK_SECONDS = 1.0
+_AGAIN_SECONDS = 5.0
+"""After this a robot that could not be shown is tried again."""
+_CLOCK_SECONDS = 30.0
+_PINGS = 5
+_PING_SECONDS = 5.0
+_MOST_PING = 64  # bytes of an answer to a ping, which has 8
+_CALL_SECONDS = 3600.0
+_CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
+TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # some 4 MB; links linger until then
+MAX_ROBOT_NAMES = 2_000  # of _MOST_IMPORTED that one robot may take
+NAMES_AT_ONCE = 100  # of a robot that are closed together: each is a task, and a call of the master
+MAX_LISTED = 5  # robots that one log line names
+LINES = 5  # log lines of one kind in ten seconds
+_WARN_OFFSET = 100_000_000
+_AT_ONCE = 20
+"""Robots that are removed at a time."""
+_MOST_IMPORTED = 9_000
+"""Names that the importer registers: a master keeps 10,000 for a node."""
+
+
+class ImportedRobot:
+    """A robot whose topics and services are in the local graph."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.since = time.time()
+        self.topics: dict[str, ImportedTopic] = {}
+        self.services: dict[str, tuple[ServiceToken, RawService]] = {}
+        self.clock: ClockOffset | None = None
+        self.measured = 0.0
+        self.left = asyncio.Event()
+
+
+class Importer:
+    """Shows the fleet's robots in the local graph. All on the node's loop, but for messages."""
+
+    def __init__(
+        self,
+        node: Node,
+        network: FleetNetwork,
+        definitions: Definitions,
+        sender: Sender,
+        intake: Intake,
+        gateway: str,
+        own_name: str,
+        rules: GatewayRules,
+        spawn: Callable[[Coroutine[object, object, None]], object],
+        clock: Callable[[], int],
+    ) -> None:
+        """``gateway``: the id of this gateway. ``own_name``: of the robot that it speaks for itself, "" for none."""
+        self.robots: dict[str, ImportedRobot] = {}
+        self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
+        self._node = node
+        self._network = network
+        self._shared = Shared(
+            node, network, definitions, sender, intake, gateway, rules, spawn, clock, RateLimitedLogger(_log)
+        )
+        self._rules = rules
+        self._spawn = spawn
+        self._clock = clock
+        self._reconciling: asyncio.TimerHandle | None = None
+        self._not_before = 0.0
+        """When the next look may be, in seconds of the loop's clock."""
+        self._is_reconciling = False
+        self._is_full = False
+        self._left_out = RateLimitedLogger(_log)
+        self._clocks = RateLimitedLogger(_log, LINES)
+        self._comings = RateLimitedLogger(_log, LINES)
+        self._rivals = RateLimitedLogger(_log, LINES)
+        self._waiting: tuple[Refused, ...] = ()
+        """The gateways that were refused at the last look, so that each is named once."""
+        self._removed = 0
+        """Names that have been removed since memory was given back last."""
+        self._trimming: asyncio.TimerHandle | None = None
+        self._machines: dict[str, str] = {}
+        """The machine of each robot that was shown last."""
+        self._challenging: set[str] = set()
+        self._is_closed = False
+        self._faults = Faults(_log, "showing the fleet's robots")
+        self._presence = Presence(
+            self._answering, lambda: self.contents.gateways, lambda: self._soon(_SETTLE_SECONDS)
+        )
+        self._watching: list[asyncio.Task[None]] = []
+        self._declared: list[Later] = []
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the robots that are shown."""
+        return list(self.robots)
+
+    async def start(self) -> None:
+        """Show robots until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        self._node.parameters.listeners.append(self._parameter_changed)
+        await self._node.parameters.add(MACHINES)
+        await self._read_machines()
+        self._declared = [
+            self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
+            for kind in ("robot", "topic", "service")
+        ]
+        self._watching = [
+            asyncio.ensure_future(keep_running(watch, self._faults))
+            for watch in (self._watch, self._presence.watch)
+        ]
+
+    async def close(self) -> None:
+        """Remove all robots. Idempotent."""
+        self._is_closed = True
+        if self._parameter_changed in self._node.parameters.listeners:
+            self._node.parameters.listeners.remove(self._parameter_changed)
+        for timer in (self._reconciling, self._trimming):
+            if timer:
+                timer.cancel()
+        watching, self._watching = self._watching, []
+        for task in watching:
+            task.cancel()
+        await asyncio.gather(*watching, return_exceptions=True)
+        for declared in self._declared:
+            declared.undeclare()
+        self._declared = []
+        robots, self.robots = self.robots, {}
+        await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
+
+    def _changed(self, key: str, is_there: bool) -> None:
+        refused = self.contents.refused
+        changed = self.contents.add(key) if is_there else self.contents.remove(key)
+        if self.contents.refused != refused:
+            self._left_out.warning("what a gateway announces is not shown: %s", self.contents.refusal)
+        if changed:
+            self._soon(_SETTLE_SECONDS)
+            if not is_there and parse_claim(key):
+                self._presence.check_soon()
+
+    def _soon(self, seconds: float) -> None:
+        if self._is_closed:
+            return
+        loop = asyncio.get_running_loop()
+        when = max(loop.time() + seconds, self._not_before)
+        pending = self._reconciling
+        if pending is not None:
+            if pending.when() <= when:
+                return
+            pending.cancel()
+        self._reconciling = loop.call_at(when, lambda: self._spawn(self._reconcile()))
+
+    # --- the operator's choices
+
+    def _parameter_changed(self, name: str, _: object) -> None:
+        if f"{name}/".startswith(f"{MACHINES}/") or f"{MACHINES}/".startswith(f"{name}/"):
+            self._spawn(self._follow_machines())
+
+    async def _follow_machines(self) -> None:
+        await self._read_machines()
+        self._soon(0.0)
+
+    async def _read_machines(self) -> None:
+        self.contents.holders.machines = parse_machines(await self._node.get_param(MACHINES, {}))
+
+    # --- what is shown
+
+    async def _reconcile(self) -> None:
+        """Show what the fleet has now."""
+        if self._is_reconciling:
+            self._reconciling = None
+            self._soon(_SETTLE_SECONDS)
+            return
+        self._is_reconciling = True
+        self._reconciling = None
+        started = time.monotonic()
+        try:
+            await self._show(self.contents.robots(self._presence.lost))
+        finally:
+            self._is_reconciling = False
+        seconds = time.monotonic() - started
+        if seconds > _SETTLE_SECONDS:
+            # While a thousand robots come, the loop has other work, too.
+            self._not_before = asyncio.get_running_loop().time() + 2 * seconds
+            if self._reconciling is not None:
+                self._reconciling.cancel()
+                self._reconciling = None
+                self._soon(0.0)
+        pause = self.contents.holders.pause({refused.claim.name for refused in self.contents.waiting})
+        if pause is not None:
+            self._soon(max(pause, _SETTLE_SECONDS))
+
+    async def _show(self, robots: dict[str, Robot]) -> None:
+        gone, left, joined = [], [], []
+        for name, shown in list(self.robots.items()):
+            robot = robots.get(name)
+            if robot is None or robot.claim != shown.robot.claim:
+                gone.append(self.robots.pop(name))
+                left.append(name)
+        self._report_names(left, "left")
+        for first in range(0, len(gone), _AT_ONCE):
+            # One of them that fails does not keep the others.
+            for error in await asyncio.gather(
+                *map(self._remove, gone[first : first + _AT_ONCE]), return_exceptions=True
+            ):
+                if isinstance(error, Exception):
+                    self._faults.report(error)
+        self._trim_soon(sum(len(robot.topics) + len(robot.services) for robot in gone))
+        for name, robot in robots.items():
+            if name not in self.robots:
+                self.robots[name] = ImportedRobot(robot)
+                joined.append(name)
+                self._report_machine(robot.claim)
+        self._report_names(joined, "joined")
+        self._report_refused()
+
+        for name, robot in robots.items():
+            known = self.robots.get(name)
+            if known is None:
+                continue  # closed meanwhile
+            known.robot = robot
+            try:
+                await self._update(known)
+            except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
+                self._faults.report(error)
+                self._soon(_AGAIN_SECONDS)
+
+    def _report_names(self, names: list[str], what: str) -> None:
+        """Log the robots that have joined or left, in one line."""
+        if len(names) == 1:
+            self._comings.info("robot [%s] has %s", names[0], what)
+        elif names:
+            rest = len(names) - MAX_LISTED
+            shown = ", ".join(f"[{name}]" for name in names[:MAX_LISTED])
+            more = f" and {rest} more" if rest > 0 else ""
+            self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
+
+    def _report_machine(self, claim: Claim) -> None:
+        """Log that a robot's name has passed to another machine."""
+        before = self._machines.get(claim.name, claim.host)
+        if before != claim.host:
+            is_chosen = claim.name in self.contents.holders.machines
+            self._rivals.warning(
+                "robot [%s] is another machine now: %s (gateway %s) in place of %s, %s",
+                claim.name,
+                claim.host,
+                claim.gateway,
+                before,
+                "as the operator has chosen" if is_chosen else f"which has been gone for {HOLD_SECONDS:g} s",
+            )
+        if len(self._machines) >= _MOST_IMPORTED:
+            self._machines.clear()
+        self._machines[claim.name] = claim.host
+
+    def _report_refused(self) -> None:
+        """Log each gateway that another one keeps from a name, once; check whether the other one of a machine still answers."""
+        known, self._waiting = set(self._waiting), self.contents.waiting
+        for refused in self._waiting:
+            claim, holder = refused
+            if refused in known or holder is None:
+                continue
+            if claim.host == holder.host:
+                self._challenge(refused)
+            elif claim.name in self.contents.holders.machines:
+                self._rivals.warning(
+                    "robot [%s] is shown only from machine %s, which the operator has chosen: machine %s (gateway %s) "
+                    "is refused",
+                    claim.name,
+                    self.contents.holders.machines[claim.name],
+                    claim.host,
+                    claim.gateway,
+                )
+            else:
+                self._rivals.warning(
+                    "two machines call themselves [%s]: %s (gateway %s) came first and is shown, %s (gateway %s) is refused "
+                    "until the first has been gone for %g s. To change it: minirospy fleet takeover %s %s",
+                    claim.name,
+                    holder.host,
+                    holder.gateway,
+                    claim.host,
+                    claim.gateway,
+                    HOLD_SECONDS,
+                    claim.name,
+                    claim.host,
+                )
+
+    def _challenge(self, refused: Refused) -> None:
+        """Ask the holder of a name whether it is there: its machine may have started its gateway again."""
+        name = refused.claim.name
+        if name not in self._challenging:
+            self._challenging.add(name)
+            self._spawn(self._ask_holder(refused))
+
+    async def _ask_holder(self, refused: Refused) -> None:
+        claim, holder = refused
+        assert holder
+        try:
+            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=_CHALLENGE_SECONDS)
+        except QueryFailed:
+            self.contents.holders.give_up(holder)
+            self._soon(0.0)
+        else:
+            if refused in self.contents.waiting:
+                self._rivals.warning(
+                    "two gateways of machine %s call themselves [%s]: %s came first and is shown, %s is refused. End one of "
+                    "them, or give it another name (--name)",
+                    claim.host,
+                    claim.name,
+                    holder.gateway,
+                    claim.gateway,
+                )
+        finally:
+            self._challenging.discard(claim.name)
+
+    async def _update(self, shown: ImportedRobot) -> None:
+        robot = shown.robot
+        for topic, imported in list(shown.topics.items()):
+            token = robot.topics.get(topic)
+            if token is None or not imported.update(token):
+                await shown.topics.pop(topic).close()
+        for service, (known, offered) in list(shown.services.items()):
+            if robot.services.get(service) != known:
+                del shown.services[service]
+                await offered.close()
+
+        for topic, token in robot.topics.items():
+            if (
+                topic not in shown.topics
+                and self._rules.topics(f"/{token.robot}{topic}")
+                and self._has_room(shown)
+            ):
+                imported = shown.topics[topic] = ImportedTopic(self._shared, token, lambda: shown.clock)
+                imported.start()
+        for service, service_token in robot.services.items():
+            name = f"/{robot.claim.name}{service}"
+            if service not in shown.services and self._rules.services(name) and self._has_room(shown):
+                shown.services[service] = service_token, self._serve(name, service_token, shown.left)
+
+    def _has_room(self, shown: ImportedRobot) -> bool:
+        if len(shown.topics) + len(shown.services) >= MAX_ROBOT_NAMES:
+            self._left_out.warning(
+                "robot [%s] has more than %d topics and services: the others are not shown. Give it --topics or --services",
+                shown.robot.claim.name,
+                MAX_ROBOT_NAMES,
+            )
+            return False
+        count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
+        if count < _MOST_IMPORTED:
+            return True
+        if not self._is_full:
+            self._is_full = True
+            _log.error(
+                "the fleet has more than %d topics and services: the others are not shown. Give --robots or --topics",
+                _MOST_IMPORTED,
+            )
+        return False
+
+    def _trim_soon(self, removed: int) -> None:
+        """Give the memory of names that have been removed back to the system, a while later: links linger until then."""
+        self._removed += removed
+        if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
+            loop = asyncio.get_running_loop()
+            self._trimming = loop.call_later(TRIM_SECONDS, self._trim)
+
+    def _trim(self) -> None:
+        self._removed, self._trimming = 0, None
+        asyncio.get_running_loop().run_in_executor(None, return_free_memory)
+
+    async def _remove(self, shown: ImportedRobot) -> None:
+        shown.left.set()
+        parts: list[ImportedTopic | RawService] = [
+            *shown.topics.values(),
+            *(offered for _, offered in shown.services.values()),
+        ]
+        for first in range(0, len(parts), NAMES_AT_ONCE):
+            await asyncio.gather(*(part.close() for part in parts[first : first + NAMES_AT_ONCE]))
+
+    def _serve(self, name: str, token: ServiceToken, left: asyncio.Event) -> RawService:
+        key = call_key(token.robot, token.gateway, token.service, token.md5sum)
+
+        async def call(request: bytes, _: Header) -> bytes:
+            answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
+            leaving = asyncio.ensure_future(left.wait())
+            try:
+                # Zenoh ends a query with the token of the robot, which may stay for minutes.
+                await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
+                if not answering.done():
+                    raise ServiceException(f"robot [{token.robot}] has left during the call")
+                return answering.result()
+            except QueryFailed as error:
+                raise ServiceException(f"robot [{token.robot}]: {error}") from error
+            finally:
+                answering.cancel()
+                leaving.cancel()
+
+        return RawService(self._node, name, InterfaceType(token.type, token.md5sum), call)
+
+    async def _watch(self) -> None:
+        pause = _LOOK_SECONDS
+        while True:
+            await asyncio.sleep(pause)
+            started = time.monotonic()
+            try:
+                self._look(await self._snapshot())
+            except (MasterUnreachableError, RpcError) as error:
+                _log.debug("the graph cannot be read: %s", error)
+            pause = max(_LOOK_SECONDS, 20 * (time.monotonic() - started))
+            for shown in list(self.robots.values()):
+                is_used = any(topic.is_open for topic in shown.topics.values())
+                if not shown.measured or (is_used and started - shown.measured > _CLOCK_SECONDS):
+                    shown.measured = started
+                    self._spawn(self._measure(shown))
+
+    async def _snapshot(self) -> Snapshot | None:
+        """Return the local graph, where it matters: for topics that a robot both publishes and subscribes to."""
+        if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
+            return await fetch(self._node._node.master)
+        return None
+
+    def _look(self, snapshot: Snapshot | None) -> None:
+        for shown in list(self.robots.values()):
+            for topic in list(shown.topics.values()):
+                topic.look(snapshot)
+
+    async def _answering(self) -> list[str] | None:
+        """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
+        start = f"{ROOT}/ping/"
+        try:
+            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MOST_PING)
+        except QueryFailed as error:
+            _log.debug("the fleet cannot be queried: %s", error)
+            return None
+        return [key.removeprefix(start) for key in answers]
+
+    async def _measure(self, shown: ImportedRobot) -> None:
+        key = f"{ROOT}/ping/{shown.robot.claim.gateway}"
+        pings = []
+        try:
+            for _ in range(_PINGS):
+                sent = self._clock()
+                answer = await self._network.query(key, seconds=_PING_SECONDS)
+                if len(answer) == 8:
+                    pings.append(Ping(sent, int.from_bytes(answer, "little", signed=True), self._clock()))
+        except QueryFailed as error:
+            _log.debug("%s does not answer: %s", shown.robot.claim.name, error)
+        if pings:
+            self._presence.answered(shown.robot.claim.gateway)
+        before, found = shown.clock, offset_of(pings)
+        shown.clock = found or before
+        if found and abs(found.offset) > _WARN_OFFSET + found.round_trip and before is None:
+            self._clocks.warning(
+                "the clock of robot [%s] is %.3f s %s this one: times in its messages are its own",
+                shown.robot.claim.name,
+                abs(found.offset) / 1e9,
+                "ahead of" if found.offset > 0 else "behind",
+            )

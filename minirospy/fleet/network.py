@@ -1,0 +1,527 @@
+"""Zenoh, behind one file: the session of a gateway, its tokens, messages and queries.
+
+Zenoh calls back in its own threads; what this file calls back with comes on the event loop, but for messages, which go
+to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a lane's (:mod:`sender`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import functools
+import importlib
+import json
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.errors import BridgeError, MinirospyError
+from minirospy.base.escape import escaped
+from minirospy.fleet.rules import Lane
+from minirospy.zenoh.library import (
+    DEFAULT_ENDPOINT,
+    DEFAULT_PORT,
+    Declared,
+    EndpointError,
+    NetworkOptions,
+    Outlet,
+    Query,
+    Reply,
+    Sample,
+    Session,
+    configured,
+    is_loopback_endpoint,
+    one_line,
+    require_zenoh,
+    to_endpoint,
+    unresolved,
+)
+from minirospy.zenoh.linger import LingerRemover
+
+__all__ = [
+    "DEFAULT_ENDPOINT",
+    "DEFAULT_PORT",
+    "Beacon",
+    "Declared",
+    "EndpointError",
+    "FleetNetwork",
+    "NetworkOptions",
+    "Outlet",
+    "QueryFailed",
+    "is_loopback_endpoint",
+    "require_zenoh",
+    "to_endpoint",
+]
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+
+MOST_TEXT = 16 << 20
+"""Bytes of a query or a reply that is read at most: a response of a service, a definition."""
+MAX_REPLIES = 10_000  # to one query: peers choose how many; a fleet has at most 5,000 gateways
+EARLY_SHARE = 0.9  # of its seconds: a query that ends before has not waited in vain, its link broke
+_RETRY_SECONDS = 1.0
+_LINGER_SECONDS = 2.0
+_QUERIES = 200
+"""Calls of services and parameters that are answered at the same time; more are refused."""
+_CONTROL_QUERIES = 50
+"""The same of pings, reports and definitions, which calls that wait must not hold up."""
+
+
+# --- the network
+
+
+async def _remove_linger() -> None:
+    """Remove SO_LINGER from each link of Zenoh, long before its lease of 10 s ends."""
+    remover = LingerRemover()
+    while True:
+        remover.look()
+        await asyncio.sleep(_LINGER_SECONDS)
+
+
+class QueryFailed(MinirospyError):
+    """A query got no answer, or one that says why it failed."""
+
+
+class FleetNetwork:
+    """A session of Zenoh; made by :meth:`open`. Handlers are called on the loop that opened it."""
+
+    def __init__(
+        self, session: Session, loop: asyncio.AbstractEventLoop, *, has_many_links: bool = False
+    ) -> None:
+        self._session = session
+        self._loop = loop
+        self._zenoh = importlib.import_module("zenoh")
+        # One thread: what is declared first is known first on the other side.
+        self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
+        self._answering: set[asyncio.Task[None]] = set()
+        self._calls = _Share(_QUERIES)
+        self._control = _Share(_CONTROL_QUERIES)
+        self._is_closed = False
+        self._faults = Faults(_log, "taking a message or query of the fleet")
+        faults = Faults(_log, "the search for links of Zenoh")
+        self._lingering = (
+            asyncio.ensure_future(keep_running(_remove_linger, faults)) if has_many_links else None
+        )
+
+    @classmethod
+    async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
+        """Open a session; ``waits``: until the other end is there. Raise BridgeError where the configuration is not right."""
+        has_many_links = bool(options.listen or options.config)
+        require_zenoh(has_many_links=has_many_links)
+        zenoh = importlib.import_module("zenoh")
+        loop = asyncio.get_running_loop()
+        config = configured(options)
+        endpoints = ", ".join(json.loads(config.get_json("connect/endpoints") or "[]"))
+        is_reported = False
+
+        while True:
+            try:
+                session = await loop.run_in_executor(None, functools.partial(zenoh.open, config))
+                return cls(session, loop, has_many_links=has_many_links)
+            except zenoh.ZError as error:
+                text = one_line(error)
+                if "Unable to connect" not in text:
+                    raise BridgeError(f"the fleet's network cannot be opened: {text}") from error
+                unknown = await loop.run_in_executor(
+                    None, unresolved, json.loads(config.get_json("connect/endpoints") or "[]")
+                )
+                why = f" ({', '.join(map(escaped, unknown))} does not resolve)" if unknown else ""
+                if not waits:
+                    raise BridgeError(
+                        f"nothing of the fleet answers at {endpoints}{why}: give --connect, or start `minirospy fleet router`"
+                    ) from error
+            if not is_reported:
+                _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
+                is_reported = True
+            await asyncio.sleep(_RETRY_SECONDS)
+
+    @property
+    def peers(self) -> int:
+        """The number of routers and gateways that this one is connected to."""
+        if self._is_closed:
+            return 0
+        return len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
+
+    async def close(self) -> None:
+        """End the session, and all that it has declared. Idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        tasks = [*self._answering, *([self._lingering] if self._lingering else [])]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        # Of a link that is cut: the other end notices by itself.
+        with contextlib.suppress(self._zenoh.ZError):
+            await self._loop.run_in_executor(self._caller, self._session.close)
+        self._caller.shutdown(wait=False)
+
+    # --- tokens
+
+    def declare_token(self, key: str) -> Later:
+        """Declare that something is there."""
+        return self._declare(lambda: self._session.liveliness().declare_token(key))
+
+    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Later:
+        """Call ``changed(key, is_there)`` for each token that is there, and whenever one comes or goes."""
+        put = self._zenoh.SampleKind.PUT
+
+        def arrived(sample: Sample) -> None:
+            self._soon(changed, str(sample.key_expr), sample.kind == put)
+
+        return self._declare(
+            lambda: self._session.liveliness().declare_subscriber(
+                pattern, self._direct(arrived), history=True
+            )
+        )
+
+    async def tokens(self, pattern: str, seconds: float) -> list[str]:
+        """Return the keys of the tokens that are there."""
+        found: list[str] = []
+
+        def arrived(reply: Reply) -> bool:
+            if reply.ok is not None and len(found) < MAX_REPLIES:
+                found.append(str(reply.ok.key_expr))
+            return len(found) >= MAX_REPLIES
+
+        await self._collected(
+            lambda handler: self._session.liveliness().get(pattern, handler, timeout=seconds), arrived
+        )
+        return list(found)
+
+    # --- messages
+
+    def subscribe(
+        self, key: str, deliver: Callable[[str, bytes, bytes], object], *, from_others: bool = False
+    ) -> Later:
+        """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block.
+
+        ``from_others``: not with those of this session.
+        """
+        options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
+
+        def arrived(sample: Sample) -> None:
+            attachment = sample.attachment
+            try:
+                deliver(
+                    str(sample.key_expr),
+                    sample.payload.to_bytes(),
+                    attachment.to_bytes() if attachment else b"",
+                )
+            except Exception as error:  # noqa: BLE001 - Zenoh would print it, or end its thread
+                self._faults.report(error)
+
+        return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
+
+    def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Later:
+        """Call ``changed(is_there)`` when another session subscribes to a key, and when none does any more."""
+
+        def declare() -> Declared:
+            publisher = self._session.declare_publisher(key, **self._to_others)
+            listener = publisher.declare_matching_listener(
+                self._direct(lambda status: self._soon(changed, status.matching))
+            )
+            if publisher.matching_status.matching:
+                self._soon(changed, True)
+            return _Together(listener, publisher)
+
+        return self._declare(declare)
+
+    def beacon(self, key: str) -> Beacon:
+        """Return what puts an empty message under a key to other sessions, that gives way to everything else."""
+        zenoh = self._zenoh
+        return Beacon(
+            self._caller,
+            lambda: self._session.declare_publisher(
+                key,
+                priority=zenoh.Priority.BACKGROUND,
+                congestion_control=zenoh.CongestionControl.DROP,
+                reliability=zenoh.Reliability.BEST_EFFORT,
+                **self._to_others,
+            ),
+            zenoh.ZError,
+        )
+
+    @property
+    def _to_others(self) -> dict[str, object]:
+        return {"allowed_destination": self._zenoh.Locality.REMOTE}
+
+    def outlet_to_others(self, key: str, lane: Lane) -> Outlet:
+        """Return the same that does not send to this session itself."""
+        return self.outlet(key, lane, **self._to_others)
+
+    def outlet(self, key: str, lane: Lane, **options: object) -> Outlet:
+        """Return a publisher, with more ``options`` of Zenoh's; may block, as its ``put``: for a lane's thread."""
+        zenoh = self._zenoh
+        priorities = {
+            Lane.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
+            Lane.DATA: zenoh.Priority.DATA,
+            Lane.BULK: zenoh.Priority.BACKGROUND,
+        }
+        return self._session.declare_publisher(
+            key,
+            priority=priorities[lane],
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            express=lane is Lane.TELEOP,
+            **options,
+        )
+
+    # --- queries
+
+    def answer(
+        self,
+        pattern: str,
+        handler: Callable[[str, bytes], Awaitable[bytes]],
+        *,
+        is_control: bool = False,
+        from_others: bool = False,
+    ) -> Later:
+        """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
+
+        ``is_control``: of the fleet itself: its handler waits for no node of a user. ``from_others``: not those of this session.
+        """
+        options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
+        share = self._control if is_control else self._calls
+        # A query of many keys gets the answers of each under its own.
+        key = "" if "*" in pattern else pattern
+
+        def arrived(query: Query) -> None:
+            self._soon(self._start_answer, query, handler, share, key)
+
+        return self._declare(
+            lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True, **options)
+        )
+
+    async def query(
+        self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
+    ) -> bytes:
+        """Return the first answer. Raise QueryFailed without any, or where it says why there is none.
+
+        ``of_others``: of one that another session has, where several could answer.
+        """
+        options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
+        started = self._loop.time()
+        found = await self.queries(key, request, seconds=seconds, most=1, **options)
+        if not found:
+            waited = self._loop.time() - started
+            if waited < EARLY_SHARE * seconds:
+                raise QueryFailed(f"no answer: nobody answers there, or the link broke after {waited:.1f} s")
+            raise QueryFailed(f"no answer within {seconds:g} s")
+        answer = next(iter(found.values()))
+        if isinstance(answer, QueryFailed):
+            raise answer
+        return answer
+
+    async def queries(
+        self,
+        pattern: str,
+        request: bytes = b"",
+        *,
+        seconds: float,
+        most: int = MAX_REPLIES,
+        size: int = MOST_TEXT,
+        **options: object,
+    ) -> Mapping[str, bytes | QueryFailed]:
+        """Return the answers by their keys, ``most`` of at most ``size`` bytes; ``options`` of Zenoh's go before ours.
+
+        Returns with the last one: what else answers the query, or never does, is not waited for.
+        """
+        found: dict[str, bytes | QueryFailed] = {}
+
+        def arrived(reply: Reply) -> bool:
+            if len(found) >= most:
+                return True
+            if reply.ok is not None:
+                is_short = len(reply.ok.payload) <= size
+                answer = (
+                    reply.ok.payload.to_bytes()
+                    if is_short
+                    else QueryFailed(f"the answer has more than {size} bytes")
+                )
+                found.setdefault(str(reply.ok.key_expr), answer)
+            elif reply.err is not None:
+                text = reply.err.payload.to_bytes()[:2000].decode(errors="replace")
+                found.setdefault("", QueryFailed(escaped(text)))
+            return len(found) >= most
+
+        zenoh = self._zenoh
+        await self._collected(
+            lambda handler: self._session.get(
+                pattern,
+                handler,
+                payload=request,
+                timeout=seconds,
+                **{
+                    "target": zenoh.QueryTarget.ALL,
+                    # By default Zenoh keeps the answers back until the last one is there, or never comes.
+                    "consolidation": zenoh.ConsolidationMode.NONE,
+                    "priority": zenoh.Priority.DATA_HIGH,
+                    "congestion_control": zenoh.CongestionControl.BLOCK,
+                    **options,
+                },
+            ),
+            arrived,
+        )
+        return dict(found)
+
+    # --- within
+
+    async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
+        """Start a query, and return when its last reply has arrived, or ``arrived`` returns that none is needed any more."""
+        if self._is_closed:
+            raise QueryFailed("the gateway is closed")
+        ended = asyncio.Event()
+
+        def replied(reply: Reply) -> None:
+            if arrived(reply):
+                self._soon(ended.set)
+
+        handler = self._zenoh.handlers.Callback(replied, lambda: self._soon(ended.set), indirect=False)
+        try:
+            await self._loop.run_in_executor(self._caller, start, handler)
+        except self._zenoh.ZError as error:
+            raise QueryFailed(one_line(error)) from error
+        await ended.wait()
+
+    def _declare(self, declare: Callable[[], Declared]) -> Later:
+        return Later(self._caller, declare, self._zenoh.ZError)
+
+    def _direct(self, function: Callable[..., object]) -> object:
+        """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
+        return self._zenoh.handlers.Callback(function, indirect=False)
+
+    def _start_answer(
+        self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
+    ) -> None:
+        # Decided here: in a burst all tasks are created before the first of them runs.
+        is_full = len(share.tasks) >= share.limit
+        refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
+        task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
+        for tasks in [self._answering] if is_full else [self._answering, share.tasks]:
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
+
+    async def _answer(
+        self,
+        query: Query,
+        handler: Callable[[str, bytes], Awaitable[bytes]],
+        own_key: str = "",
+        refusal: str = "",
+    ) -> None:
+        key, payload = str(query.key_expr), query.payload
+        reply: Callable[[], object] | None = None
+        try:
+            if refusal:
+                raise QueryFailed(refusal)
+            if payload is not None and len(payload) > MOST_TEXT:
+                raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
+            body = await handler(key, payload.to_bytes() if payload is not None else b"")
+            reply = functools.partial(query.reply, own_key or query.key_expr, body)
+        except MinirospyError as error:
+            reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
+        except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here
+            self._faults.report(error)
+            reply = functools.partial(query.reply_err, f"the gateway failed: {type(error).__name__}".encode())
+        finally:
+            if reply is None:
+                query.drop()
+
+        try:
+            with contextlib.suppress(RuntimeError, self._zenoh.ZError):
+                await self._loop.run_in_executor(self._caller, reply)
+        finally:
+            query.drop()
+
+    def _soon(self, function: Callable[..., object], *arguments: object) -> None:
+        """Call a function on the loop, from any thread."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+
+@dataclass(eq=False)
+class _Share:
+    """Queries of one kind that are being answered."""
+
+    limit: int
+    tasks: set[asyncio.Task[None]] = field(default_factory=set)
+
+
+class Later:
+    """Something that is declared in the background, and undeclared after that."""
+
+    def __init__(
+        self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]
+    ) -> None:
+        self._caller = caller
+        self._fault = fault
+        self._declared: Declared | None = None
+        with contextlib.suppress(RuntimeError):
+            caller.submit(self._declare, declare)
+
+    def undeclare(self) -> None:
+        """Undeclare it, in the background. Idempotent."""
+        with contextlib.suppress(RuntimeError):
+            self._caller.submit(self._undeclare)
+
+    def _declare(self, declare: Callable[[], Declared]) -> None:
+        try:
+            self._declared = declare()
+        except self._fault as error:
+            _log.debug("not declared: %s", error)
+
+    def _undeclare(self) -> None:
+        declared, self._declared = self._declared, None
+        if declared is not None:
+            with contextlib.suppress(self._fault):
+                declared.undeclare()
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Two things that are undeclared together."""
+
+    first: Declared
+    second: Declared
+
+    def undeclare(self) -> None:
+        self.first.undeclare()
+        self.second.undeclare()
+
+
+class Beacon:
+    """A publisher of empty messages; made by :meth:`FleetNetwork.beacon`."""
+
+    def __init__(
+        self, caller: concurrent.futures.Executor, declare: Callable[[], Outlet], fault: type[Exception]
+    ) -> None:
+        self._outlet: Outlet | None = None
+        self._caller = caller
+        self._fault = fault
+        self._is_waiting = False
+
+        def opened() -> Declared:
+            self._outlet = declare()
+            return self._outlet
+
+        self._declared = Later(caller, opened, fault)
+
+    def put(self) -> None:
+        """Put one, in the background; none while the one before waits."""
+        if not self._is_waiting:
+            self._is_waiting = True
+            with contextlib.suppress(RuntimeError):
+                self._caller.submit(self._put)
+
+    def undeclare(self) -> None:
+        """Undeclare it, in the background. Idempotent."""
+        self._declared.undeclare()
+
+    def _put(self) -> None:
+        self._is_waiting = False
+        if self._outlet:
+            with contextlib.suppress(self._fault):
+                self._outlet.put(b"")

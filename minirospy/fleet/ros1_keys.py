@@ -1,0 +1,231 @@
+"""The keys of zenoh-bridge-ros1, and its beacons. Pure.
+
+Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ros1, May 2025)::
+
+    HEX/MD5/NAMESPACE/NAME                               messages of a topic; queries of a service
+    ros1_discovery_info/*/KIND/HEX/MD5/NAMESPACE/NAME    a beacon: some bridge has such a resource
+
+HEX is the name of the type, two hexadecimal digits a byte; NAME has no slash in front; NAMESPACE is ``*``, which meets every
+other, unless bridges are kept apart. KIND is pub, sub or srv; cl is for clients of services, which no bridge announces. A beacon
+is empty, and is put every second. While a bridge receives its own key from another, it may stop its own beacons: they say that
+somebody has the resource, not who, nor how many.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from minirospy.base.errors import BridgeError
+from minirospy.fleet.keys import UNKNOWN_MD5, TopicToken, is_global_name, is_md5
+
+__all__ = [
+    "EVERY_NAMESPACE",
+    "LOST_SECONDS",
+    "MOST_RESOURCES",
+    "PERIOD",
+    "Beacons",
+    "Resource",
+    "SharedTopic",
+    "Sightings",
+    "beacon_key",
+    "beacon_pattern",
+    "data_key",
+    "parse_beacon",
+    "parse_namespace",
+    "shared_topics",
+]
+
+EVERY_NAMESPACE = "*"
+PERIOD = 1.0
+"""Seconds from one beacon of a resource to the next."""
+LOST_SECONDS = 5.0
+"""Without a beacon for so long a resource is lost: when a bridge ends, another that was silent needs up to three periods. The
+bridge itself needs 3 to 6 s."""
+MOST_RESOURCES = 9_000
+"""Resources of others that are known: a master keeps 10,000 names of a node."""
+
+_ROOT = "ros1_discovery_info"
+_KINDS = ("pub", "sub", "srv", "cl")
+_ANY = b"*".hex()
+_MOST_KEY = 1_000
+_HEX = re.compile(r"(?:[0-9a-f]{2})+")
+_TYPE = re.compile(r"[A-Za-z]\w{0,127}/[A-Za-z]\w{0,127}", re.ASCII)
+_NAMESPACE = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+
+
+class Resource(NamedTuple):
+    """A topic that others publish ("pub") or subscribe to ("sub"), a service that they offer ("srv")."""
+
+    kind: str
+    name: str
+    type: str
+    md5sum: str
+
+
+class SharedTopic(NamedTuple):
+    """A topic of one type. ``token``: its ends here. ``is_offered``: others publish it; ``is_wanted``: they subscribe."""
+
+    token: TopicToken
+    is_offered: bool = False
+    is_wanted: bool = False
+
+    def has_type_of(self, other: TopicToken) -> bool:
+        """Return whether another token is of the same type."""
+        return (self.token.type, self.token.md5sum) == (other.type, other.md5sum)
+
+
+def shared_topics(
+    local: Mapping[str, TopicToken], remote: Iterable[Resource]
+) -> tuple[dict[str, SharedTopic], dict[str, str]]:
+    """Return the topics of here and elsewhere by name; and by name, why others' are left out: they have another type.
+
+    The type of here counts; of several that exist only elsewhere, the one that was first.
+    """
+    found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
+    conflicts = {}
+    for kind, name, type_, md5sum in remote:
+        if kind == "srv":
+            continue
+        token = local.get(name, TopicToken("-", "-", name, type_, UNKNOWN_MD5, False, False))
+        topic = found.get(name) or SharedTopic(token._replace(md5sum=md5sum))
+        if (topic.token.type, topic.token.md5sum) != (type_, md5sum):
+            conflicts[name] = f"{type_} [{md5sum}], not {topic.token.type} [{topic.token.md5sum}]"
+        elif kind == "pub":
+            found[name] = topic._replace(is_offered=True)
+        else:
+            found[name] = topic._replace(is_wanted=True)
+    return found, conflicts
+
+
+def parse_namespace(text: str) -> str:
+    """Return a namespace of keys. Raise BridgeError where it is not one chunk of a key."""
+    if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
+        raise BridgeError(
+            f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
+        )
+    return text
+
+
+def data_key(type_: str, md5sum: str, name: str, namespace: str) -> str:
+    """Return the key of a topic's messages or a service's queries."""
+    return f"{type_.encode().hex()}/{md5sum}/{namespace}/{name.strip('/')}"
+
+
+def beacon_key(resource: Resource, namespace: str) -> str:
+    """Return the key of a resource's beacons."""
+    kind, name, type_, md5sum = resource
+    return f"{_ROOT}/*/{kind}/{data_key(type_, md5sum, name, namespace)}"
+
+
+def beacon_pattern(namespace: str) -> str:
+    """Return what matches the beacons that bridges of a namespace receive."""
+    return f"{_ROOT}/*/*/*/*/{namespace}/*/**"
+
+
+def parse_beacon(key: str) -> Resource | None:
+    """Return the resource of a beacon; None where it has no type, as a subscriber of any. Raise BridgeError with the reason."""
+    if len(key) > _MOST_KEY:
+        raise BridgeError(f"its key has {len(key)} characters")
+    chunks = key.split("/", 6)
+    if len(chunks) < 7 or chunks[0] != _ROOT:
+        raise BridgeError("its key has not seven parts")
+    _, _, kind, hexadecimal, md5sum, _, name = chunks
+    if kind not in _KINDS:
+        raise BridgeError(f"[{kind}] is not one of {', '.join(_KINDS)}")
+    if hexadecimal == _ANY or kind == "cl":
+        return None
+    if not _HEX.fullmatch(hexadecimal):
+        raise BridgeError(f"[{hexadecimal}] is not a type's name in hexadecimal digits")
+    type_ = bytes.fromhex(hexadecimal).decode(errors="replace")
+    if not _TYPE.fullmatch(type_):
+        raise BridgeError(f"[{type_}] is not the name of a type")
+    if not is_md5(md5sum):
+        raise BridgeError(f"[{md5sum}] is not an md5sum")
+    if not is_global_name(f"/{name}"):
+        raise BridgeError(f"[/{name}] is not the name of a topic or service")
+    return Resource(kind, f"/{name}", type_, md5sum)
+
+
+@dataclass
+class _Beacon:
+    due: float
+    is_received: bool = False
+    is_silent: bool = False
+    is_resuming: bool = False
+
+
+class Beacons:
+    """When to put the beacons of what is here: each period, but not while others put the same."""
+
+    def __init__(self, random: Callable[[], float]) -> None:
+        """``random()`` returns a number from 0 to below 1."""
+        self._random = random
+        self._beacons: dict[str, _Beacon] = {}
+
+    def __len__(self) -> int:
+        return len(self._beacons)
+
+    def update(self, keys: Iterable[str], now: float) -> None:
+        """Take over the keys of what is here now; the new ones are due."""
+        before = self._beacons
+        self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
+
+    def received(self, key: str) -> None:
+        """Record a beacon of another."""
+        beacon = self._beacons.get(key)
+        if beacon:
+            beacon.is_received = True
+
+    def due(self, now: float) -> list[str]:
+        """Return the keys to put at a time in seconds."""
+        found = []
+        for key, beacon in self._beacons.items():
+            if beacon.due > now:
+                continue
+            is_received, beacon.is_received = beacon.is_received, False
+            beacon.due = now + PERIOD
+            if is_received:
+                # One of those that put it goes on: which one is left to chance.
+                beacon.is_silent = beacon.is_silent or self._random() < 0.5
+                beacon.is_resuming = False
+            elif beacon.is_silent and not beacon.is_resuming:
+                # So that not all that were silent start together.
+                beacon.is_resuming = True
+                beacon.due = now + self._random() * PERIOD
+            else:
+                beacon.is_silent = beacon.is_resuming = False
+            if not beacon.is_silent:
+                found.append(key)
+        return found
+
+
+class Sightings:
+    """The resources of others whose beacons have come recently."""
+
+    def __init__(self) -> None:
+        self._seen: dict[Resource, float] = {}
+
+    def __iter__(self) -> Iterator[Resource]:
+        return iter(self._seen)
+
+    def received(self, resource: Resource, now: float) -> bool:
+        """Record a beacon; return whether the resource is new. Raise BridgeError where there are too many."""
+        is_new = resource not in self._seen
+        if is_new and len(self._seen) >= MOST_RESOURCES:
+            raise BridgeError(f"there are more than {MOST_RESOURCES} topics and services")
+        self._seen[resource] = now
+        return is_new
+
+    def extend(self, seconds: float, now: float) -> None:
+        """Keep all for ``seconds`` longer, counted from ``now`` at most."""
+        self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
+
+    def forget_lost(self, now: float) -> bool:
+        """Forget what has had no beacon for too long; return whether there was any."""
+        lost = [resource for resource, at in self._seen.items() if now - at > LOST_SECONDS]
+        for resource in lost:
+            del self._seen[resource]
+        return bool(lost)

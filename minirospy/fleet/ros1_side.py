@@ -1,0 +1,338 @@
+"""The side of zenoh-bridge-ros1: robots that run it see this master's topics and services, and this master theirs.
+
+Names are not changed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import logging
+import random
+import threading
+import time
+from collections.abc import Callable, Collection, Coroutine
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from minirospy.aio.raw import RawService, RawSubscription
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError, ServiceException
+from minirospy.base.name_filter import NameFilter
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.fleet.definitions import Definitions
+from minirospy.fleet.inbound import call_service
+from minirospy.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken
+from minirospy.fleet.network import Beacon, FleetNetwork, Later, QueryFailed
+from minirospy.fleet.robot_graph import RobotGraph
+from minirospy.fleet.ros1_keys import (
+    PERIOD,
+    Beacons,
+    Resource,
+    Sightings,
+    beacon_key,
+    beacon_pattern,
+    data_key,
+    parse_beacon,
+    shared_topics,
+)
+from minirospy.fleet.ros1_topic import Ros1Topic, Shared
+from minirospy.fleet.rules import GatewayRules, is_logger_service
+from minirospy.fleet.sender import Intake, Sender
+from minirospy.introspect.snapshot import Snapshot
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["Ros1Side"]
+
+_log = logging.getLogger(__name__)
+_MARKER = "/minirospy/ros1_keys"
+"""Each gateway of these keys subscribes to this topic, before all others: so those of one master know each other."""
+_MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
+_BRIDGE = "/ros1_to_zenoh_bridge"
+"""How the nodes of zenoh-bridge-ros1 itself are called by default."""
+_AGGREGATE = "/rosout_agg"
+_BEAT_SECONDS = 0.2
+_CALL_SECONDS = 3600.0
+_MOST_REASON = 200
+_MOST_ERROR = 2_000
+
+
+class Ros1Side:
+    """Passes topics and services between a master and these keys. All on the node's loop, but for messages and beacons."""
+
+    def __init__(
+        self,
+        node: Node,
+        network: FleetNetwork,
+        definitions: Definitions,
+        sender: Sender,
+        intake: Intake,
+        claim: Claim,
+        rules: GatewayRules,
+        namespace: str,
+        hidden: Callable[[], Collection[str]],
+        spawn: Callable[[Coroutine[object, object, None]], object],
+    ) -> None:
+        """``hidden``: names of robots whose topics are here as their copies. ``namespace``: that of the keys."""
+        # /rosout_agg has what /rosout has: passed as well, each line would come back to where it was logged.
+        if rules.topics == NameFilter():
+            rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
+        self.namespace = namespace
+        self.refused = 0
+        """How many beacons were left out."""
+        self.topics: dict[str, Ros1Topic] = {}
+        self.services: dict[str, tuple[Resource, RawService]] = {}
+        self.graph = RobotGraph(
+            node, definitions, claim, replace(rules, has_frames=False), hidden, self._gateways
+        )
+        self._node = node
+        self._network = network
+        self._rules = rules
+        self._shared = Shared(node, network, definitions, sender, intake, rules, namespace, spawn)
+        self._answered: dict[ServiceToken, Later] = {}
+        self._outlets: dict[str, Beacon] = {}
+        # Beacons come in Zenoh's threads.
+        self._lock = threading.Lock()
+        self._beacons = Beacons(random.random)
+        self._sightings = Sightings()
+        self._has_news = False
+        self._conflicts: dict[str, str] = {}
+        self._others: set[str] = set()
+        self._adjusting = asyncio.Lock()
+        self._left_out = RateLimitedLogger(_log)
+        self._misfits = RateLimitedLogger(_log, 5)
+        self._faults = Faults(_log, "passing the keys of zenoh-bridge-ros1")
+        self._marker: RawSubscription | None = None
+        self._beacons_received: Later | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def start(self) -> None:
+        """Pass until :meth:`close`. Raises BridgeError, MasterUnreachableError, RpcError."""
+        self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
+        await self.graph.look()
+        if self._others:
+            raise BridgeError(
+                f"{min(self._others)} passes the keys of zenoh-bridge-ros1 on this master already: end it, or, where it has "
+                "crashed, run `rosnode cleanup`"
+            )
+        await self.look()
+        self._beacons_received = self._network.subscribe(
+            beacon_pattern(self.namespace), self._beacon_arrived, from_others=True
+        )
+        self._tasks = [
+            asyncio.ensure_future(keep_running(lambda: self.graph.watch(self.look), self._faults)),
+            asyncio.ensure_future(keep_running(self._beat, self._faults)),
+        ]
+
+    async def close(self) -> None:
+        """Withdraw all. Idempotent."""
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self.graph.close()
+        for declared in (self._beacons_received, *self._outlets.values(), *self._answered.values()):
+            if declared:
+                declared.undeclare()
+        self._beacons_received, self._outlets, self._answered = None, {}, {}
+        topics, services, marker = self.topics, self.services, self._marker
+        self.topics, self.services, self._marker = {}, {}, None
+        await asyncio.gather(
+            *(topic.close() for topic in topics.values()),
+            *(offered.close() for _, offered in services.values()),
+        )
+        if marker:
+            await marker.close()
+
+    async def look(self) -> bool:
+        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
+        changed = await self.graph.look()
+        # What is announced can be used already: a bridge calls and sends as soon as it receives a beacon.
+        await self._adjust()
+        self._announce()
+        return changed
+
+    def status(self) -> dict[str, object]:
+        """Return what is passed, for JSON."""
+        with self._lock:
+            seen, announced = len(list(self._sightings)), len(self._beacons)
+        return {
+            "namespace": self.namespace,
+            "announced": announced,
+            "seen": seen,
+            "refused": self.refused,
+            "sent": [
+                {
+                    "topic": name,
+                    "messages": each.outbound.outflow.sent,
+                    "dropped": each.outbound.outflow.dropped,
+                }
+                for name, each in self.topics.items()
+                if each.outbound
+            ],
+            "passed_in": [
+                {"topic": name, "messages": each.inbound.passed}
+                for name, each in self.topics.items()
+                if each.inbound
+            ],
+            "services": list(self.services),
+        }
+
+    # --- what is here
+
+    def _gateways(self, snapshot: Snapshot) -> set[str]:
+        """Return the nodes on this master that pass these keys: what they publish and subscribe to is not announced again."""
+        ends = (snapshot.publishers, snapshot.subscribers, snapshot.services)
+        bridges = {
+            node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
+        }
+        found = bridges | set(snapshot.subscribers.get(_MARKER, ())) - {self._node.name}
+        for node in sorted(found - self._others) if self._beacons_received else ():
+            _log.warning(
+                "%s passes the keys of zenoh-bridge-ros1 on this master, too: messages come twice. End one of the two",
+                node,
+            )
+        self._others = found
+        return found
+
+    def _announce(self) -> None:
+        resources = []
+        for topic in self.graph.topics.values():
+            if topic.md5sum != UNKNOWN_MD5:
+                ends = (("pub", topic.is_published), ("sub", topic.is_subscribed))
+                resources += [
+                    Resource(kind, topic.topic, topic.type, topic.md5sum)
+                    for kind, is_there in ends
+                    if is_there
+                ]
+        resources += [Resource("srv", *token[2:]) for token in self.graph.services.values()]
+        keys = [beacon_key(each, self.namespace) for each in resources]
+        for key in self._outlets.keys() - set(keys):
+            self._outlets.pop(key).undeclare()
+        for key in keys:
+            if key not in self._outlets:
+                self._outlets[key] = self._network.beacon(key)
+        with self._lock:
+            self._beacons.update(keys, time.monotonic())
+
+    async def _beat(self) -> None:
+        """Put the beacons that are due, and follow those of others."""
+        expected = time.monotonic()
+        while True:
+            now = time.monotonic()
+            late, expected = now - expected, now + _BEAT_SECONDS
+            with self._lock:
+                due = self._beacons.due(now)
+                if late > PERIOD:
+                    # The process did not run: the beacons of that time have not been delivered yet.
+                    self._sightings.extend(late, now)
+                has_news = self._sightings.forget_lost(now) or self._has_news
+            for key in due:
+                self._outlets[key].put()
+            if has_news:
+                await self._adjust()
+            await asyncio.sleep(_BEAT_SECONDS)
+
+    # --- what others have
+
+    def _beacon_arrived(self, key: str, _: bytes, __: bytes) -> None:
+        """Take a beacon. In a thread of Zenoh's."""
+        try:
+            resource = parse_beacon(key)
+            with self._lock:
+                self._beacons.received(key)
+                if resource and self._allows(resource):
+                    self._has_news |= self._sightings.received(resource, time.monotonic())
+        except BridgeError as error:
+            self.refused += 1
+            self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MOST_REASON])
+
+    def _allows(self, resource: Resource) -> bool:
+        if resource.kind != "srv":
+            return self._rules.topics(resource.name)
+        is_shown = self._rules.services != NameFilter() or not is_logger_service(resource.name)
+        return is_shown and self._rules.services(resource.name)
+
+    async def _adjust(self) -> None:
+        """Pass what is here and there, as the graph and the beacons are."""
+        async with self._adjusting:
+            with self._lock:
+                remote, self._has_news = list(self._sightings), False
+            found, conflicts = shared_topics(self.graph.topics, remote)
+            for name in conflicts.keys() - self._conflicts.keys():
+                self._misfits.warning("%s of others is not passed: it is of type %s", name, conflicts[name])
+            self._conflicts = conflicts
+
+            for name, topic in list(self.topics.items()):
+                if name not in found or not found[name].has_type_of(topic.token):
+                    await self.topics.pop(name).close()
+            for name, shared in found.items():
+                if name not in self.topics:
+                    self.topics[name] = Ros1Topic(self._shared, shared)
+                await self.topics[name].update(shared)
+            await self._adjust_services(remote)
+
+    async def _adjust_services(self, remote: list[Resource]) -> None:
+        here = set(self.graph.services.values())
+        for token in self._answered.keys() - here:
+            self._answered.pop(token).undeclare()
+        for token in here - self._answered.keys():
+            key = data_key(token.type, token.md5sum, token.service, self.namespace)
+            self._answered[token] = self._network.answer(key, self._answerer(token), from_others=True)
+
+        # A master has one service of a name: that of this robot's own nodes.
+        there = {each.name: each for each in reversed(remote) if each.kind == "srv"}
+        for name, (resource, offered) in list(self.services.items()):
+            if there.get(name) != resource or name in self.graph.service_names:
+                del self.services[name]
+                await offered.close()
+        for name, resource in there.items():
+            if name not in self.services and name not in self.graph.service_names:
+                self.services[name] = resource, self._serve(resource)
+
+    def _answerer(self, token: ServiceToken) -> Callable[[str, bytes], Coroutine[object, object, bytes]]:
+        return lambda _, request: call_service(self._node, token, request)
+
+    def _serve(self, resource: Resource) -> RawService:
+        key = data_key(resource.type, resource.md5sum, resource.name, self.namespace)
+
+        async def call(request: bytes, _: Header) -> bytes:
+            try:
+                answer = await self._network.query(key, request, seconds=_CALL_SECONDS, of_others=True)
+            except QueryFailed as error:
+                raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {error}") from error
+            loop = asyncio.get_running_loop()
+            fault = await loop.run_in_executor(None, _error_in, resource, answer)
+            if fault:
+                raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {fault}")
+            return answer
+
+        return RawService(self._node, resource.name, InterfaceType(resource.type, resource.md5sum), call)
+
+
+def _error_in(resource: Resource, answer: bytes) -> str:
+    """Return the text of a call's error, "" for a response: the bridge answers with either, and nothing tells them apart.
+
+    Where the type is installed here: what is not a response of it, to the last byte, and is text.
+    """
+    from minirospy.core.idl.load import get_service_class
+
+    text = answer[:_MOST_ERROR].decode(errors="replace")
+    if not answer or len(answer) > _MOST_ERROR or not "".join(text.split()).isprintable():
+        return ""
+    try:
+        found = get_service_class(resource.type)
+        if found is None or found._md5sum != resource.md5sum:
+            return ""
+        response = found._response_class()
+        written = io.BytesIO()
+        response.deserialize(answer).serialize(written)
+    except DeserializationError:
+        return text
+    except (MinirospyError, ImportError, SyntaxError):
+        return ""
+    return "" if written.getvalue() == answer else text

@@ -1,0 +1,205 @@
+"""Which topics and services a gateway passes on, how often, and in which lane. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from fnmatch import fnmatchcase
+
+from minirospy.base.errors import BridgeError
+from minirospy.base.name_filter import NameFilter
+from minirospy.fleet.keys import is_global_name
+from minirospy.introspect.snapshot import Snapshot
+
+__all__ = [
+    "Export",
+    "GatewayRules",
+    "Lane",
+    "Throttle",
+    "exported_services",
+    "exported_topics",
+    "is_logger_service",
+    "lane_of_type",
+    "parse_lanes",
+    "parse_rates",
+]
+
+_MOST_HERTZ = 10_000.0
+_LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
+
+
+class Lane(IntEnum):
+    """A priority, each with a separate queue and thread: what is slow to send does not hold up a lane before it."""
+
+    TELEOP = 0
+    DATA = 1
+    BULK = 2
+
+
+_TELEOP_TYPES = {
+    "ackermann_msgs/AckermannDrive",
+    "ackermann_msgs/AckermannDriveStamped",
+    "actionlib_msgs/GoalID",
+    "geometry_msgs/Twist",
+    "geometry_msgs/TwistStamped",
+    "sensor_msgs/Joy",
+}
+_BULK_TYPES = {
+    "nav_msgs/OccupancyGrid",
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/Image",
+    "sensor_msgs/PointCloud",
+    "sensor_msgs/PointCloud2",
+    "stereo_msgs/DisparityImage",
+    "theora_image_transport/Packet",
+    "visualization_msgs/MarkerArray",
+}
+
+
+STOP_SECONDS = 0.5  # without a command before a zero is published; two commands closer than this are a stream
+
+
+@dataclass(frozen=True)
+class GatewayRules:
+    """What a gateway may pass on, and how. ``rates`` (Hz) and ``lanes`` by patterns of names: the first that matches counts."""
+
+    topics: NameFilter = field(default_factory=NameFilter)
+    services: NameFilter = field(default_factory=NameFilter)
+    parameters: NameFilter = field(default_factory=NameFilter)
+    robots: NameFilter = field(default_factory=NameFilter)
+    rates: Sequence[tuple[str, float]] = ()
+    lanes: Sequence[tuple[str, Lane]] = ()
+    has_frames: bool = False
+    stop_seconds: float = STOP_SECONDS
+    """A stream of velocities that comes here and ends is followed by a zero after this; 0: it is not."""
+
+    def rate(self, topic: str) -> float:
+        """Return the most messages a second of a topic; 0 where it is not limited."""
+        return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
+
+    def lane(self, topic: str, type_: str) -> Lane:
+        """Return the lane of a topic."""
+        named = (lane for pattern, lane in self.lanes if fnmatchcase(topic, pattern))
+        return next(named, lane_of_type(type_))
+
+
+@dataclass(frozen=True)
+class Export:
+    """A topic with ends that are not gateways."""
+
+    topic: str
+    type: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+
+
+class Throttle:
+    """Lets at most so many messages a second pass, evenly spaced; 0: all."""
+
+    def __init__(self, hertz: float) -> None:
+        self._period = 1.0 / hertz if hertz else 0.0
+        self._next = 0.0
+
+    def allows(self, now: float) -> bool:
+        """Return whether a message may pass at a time in seconds, which does not go back."""
+        if now < self._next:
+            return False
+        # From the time that was due, so that 30 Hz become 10 Hz and not 7.5; not from far back after a pause.
+        self._next = max(self._next + self._period, now)
+        if self._next <= now:
+            self._next = now + self._period
+        return True
+
+
+def lane_of_type(type_: str) -> Lane:
+    """Return the lane of a type where no rule names the topic."""
+    if type_ in _TELEOP_TYPES:
+        return Lane.TELEOP
+    return Lane.BULK if type_ in _BULK_TYPES else Lane.DATA
+
+
+def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
+    """Return patterns and rates of words such as ``/camera/*=5``. Raise BridgeError."""
+    found = []
+    for word in words:
+        pattern, text = _halves(word, "--rate", "/camera/*=5")
+        try:
+            hertz = float(text)
+        except ValueError:
+            hertz = -1.0
+        if not 0 < hertz <= _MOST_HERTZ:
+            raise BridgeError(f"--rate {word}: [{text}] is not a rate in Hz, as 5 or 0.2")
+        found.append((pattern, hertz))
+    return found
+
+
+def parse_lanes(words: Iterable[str]) -> list[tuple[str, Lane]]:
+    """Return patterns and lanes of words such as ``/arm/*=teleop``. Raise BridgeError."""
+    names = {lane.name.lower(): lane for lane in Lane}
+    found = []
+    for word in words:
+        pattern, text = _halves(word, "--priority", "/arm/*=teleop")
+        if text not in names:
+            raise BridgeError(f"--priority {word}: [{text}] is not one of {', '.join(names)}")
+        found.append((pattern, names[text]))
+    return found
+
+
+def exported_topics(
+    snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
+) -> dict[str, Export]:
+    """Return the topics that a robot shows to others: those with an end that is not a gateway's, of a known type.
+
+    ``own``: the nodes of gateways. ``hidden``: namespaces of what came from other robots, which is not shown again.
+    """
+    starts = tuple(f"/{name}/" for name in hidden)
+    found = {}
+    for topic in sorted(snapshot.topics):
+        type_ = snapshot.types.get(topic)
+        if type_ is None or not _is_shown(topic, starts) or not allows(topic):
+            continue
+        publishers = _others(snapshot.publishers.get(topic, ()), own)
+        subscribers = _others(snapshot.subscribers.get(topic, ()), own)
+        if publishers or subscribers:
+            found[topic] = Export(topic, type_, publishers, subscribers)
+    return found
+
+
+def exported_services(
+    snapshot: Snapshot, own: Collection[str], allows: NameFilter, hidden: Iterable[str] = ()
+) -> dict[str, tuple[str, ...]]:
+    """Return the services that a robot shows to others, with their nodes.
+
+    The two services of each node's loggers are left out, unless a pattern was given.
+    """
+    starts = tuple(f"/{name}/" for name in hidden)
+    every = allows == NameFilter()
+    found = {}
+    for service, nodes in sorted(snapshot.services.items()):
+        others = _others(nodes, own)
+        if not others or not _is_shown(service, starts) or not allows(service):
+            continue
+        if not (every and is_logger_service(service)):
+            found[service] = others
+    return found
+
+
+def is_logger_service(service: str) -> bool:
+    """Return whether a service is one of the two that each node has for its loggers."""
+    return service.endswith(_LOGGER_SERVICES)
+
+
+def _halves(word: str, option: str, example: str) -> tuple[str, str]:
+    pattern, equals, text = word.rpartition("=")
+    if not equals or not pattern.startswith(("/", "*")):
+        raise BridgeError(f"{option} {word}: is not of the form GLOB=VALUE, as {example}")
+    return pattern, text
+
+
+def _is_shown(name: str, hidden: tuple[str, ...]) -> bool:
+    return is_global_name(name) and not name.startswith(hidden)
+
+
+def _others(nodes: Sequence[str], own: Collection[str]) -> tuple[str, ...]:
+    return tuple(node for node in nodes if node not in own)

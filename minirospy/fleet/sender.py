@@ -1,0 +1,247 @@
+"""Messages on their way into Zenoh, and out of it: threads with queues, so that neither side ever waits on the loop."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeAlias
+
+from minirospy.aio.tasks import Faults
+from minirospy.fleet.keys import Stamp, serialize_stamp
+from minirospy.fleet.lanes import Flow, FlowQueue
+from minirospy.fleet.network import FleetNetwork, Outlet
+from minirospy.fleet.rules import Lane, Throttle
+
+__all__ = ["Intake", "Outflow", "Sender"]
+
+_log = logging.getLogger(__name__)
+_CLOSE_SECONDS = 2.0
+_MOST_WAITING = {Lane.TELEOP: 10, Lane.DATA: 100, Lane.BULK: 2}
+_MOST_BYTES = {Lane.TELEOP: 1 << 20, Lane.DATA: 8 << 20, Lane.BULK: 32 << 20}
+_INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
+_MOST_OUTLETS = 64
+"""Publishers of Zenoh that a flow keeps: its own, and those of readers that got latched messages, least recent first to go."""
+
+
+class _Worker:
+    """A thread that takes from a queue; made when there is something to do."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._condition = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._is_closed = False
+
+    def close(self) -> None:
+        """End the thread; one that Zenoh keeps waiting is left to end by itself. Idempotent."""
+        with self._condition:
+            self._is_closed = True
+            self._condition.notify_all()
+        if self._thread:
+            self._thread.join(_CLOSE_SECONDS)
+
+    def _wake(self) -> None:
+        """Have the thread look at the queue. With the lock held."""
+        if self._thread is None and not self._is_closed:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
+        self._condition.notify()
+
+    def _run(self) -> None:
+        raise NotImplementedError
+
+
+class Outflow:
+    """A topic's messages to the fleet; made by :meth:`Sender.flow`. ``send`` may be called from any thread."""
+
+    def __init__(self, worker: _LaneWorker, lane: Lane, hertz: float, is_bare: bool) -> None:
+        self.lane = lane
+        self.is_bare = is_bare
+        self.throttled = 0
+        self._worker = worker
+        self._throttle = Throttle(hertz)
+        self._flow: Flow[tuple[str, bytes]] = Flow(_MOST_WAITING[lane], _MOST_BYTES[lane])
+        self._outlets: dict[str, Outlet] = {}
+        self._numbers: dict[str, int] = {}
+
+    @property
+    def sent(self) -> int:
+        """How many messages Zenoh has taken."""
+        return self._flow.passed
+
+    @property
+    def sent_bytes(self) -> int:
+        """The size of these messages."""
+        return self._flow.passed_bytes
+
+    @property
+    def dropped(self) -> int:
+        """How many gave way to newer ones, because the network was slower."""
+        return self._flow.dropped
+
+    def send(self, key: str, message: bytes, *, always: bool = False) -> None:
+        """Queue a message; ``always``: whatever the rate."""
+        if not always and not self._throttle.allows(time.monotonic()):
+            self.throttled += 1
+            return
+        self._worker.add(self, key, message)
+
+    def close(self) -> None:
+        """Drop what waits, and undeclare the publishers."""
+        self._worker.end(self)
+
+
+class _LaneWorker(_Worker):
+    def __init__(self, lane: Lane, network: FleetNetwork, clock: Callable[[], int]) -> None:
+        super().__init__(f"fleet-{lane.name.lower()}")
+        self._lane = lane
+        self._network = network
+        self._clock = clock
+        self._queue: FlowQueue[tuple[str, bytes]] = FlowQueue()
+        self._owners: dict[Flow[tuple[str, bytes]], Outflow] = {}
+        self._ended: list[Outflow] = []
+
+    def add(self, outflow: Outflow, key: str, message: bytes) -> None:
+        with self._condition:
+            if not self._is_closed:
+                self._owners[outflow._flow] = outflow
+                self._queue.add(outflow._flow, (key, message), len(message))
+                self._wake()
+
+    def end(self, outflow: Outflow) -> None:
+        with self._condition:
+            self._queue.forget(outflow._flow)
+            if self._owners.pop(outflow._flow, None):
+                self._ended.append(outflow)
+                self._wake()
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                while not (self._is_closed or self._queue or self._ended):
+                    self._condition.wait()
+                if self._is_closed:
+                    return
+                ended, self._ended = self._ended, []
+                taken = self._queue.pop()
+                outflow = self._owners.get(taken[0]) if taken else None
+            try:
+                for each in ended:
+                    for outlet in each._outlets.values():
+                        outlet.undeclare()
+                if taken and outflow:
+                    self._put(outflow, *taken[1])
+            except Exception as error:  # noqa: BLE001 - Zenoh's own, of a session that is closed or a link that broke
+                _log.debug("a message was not sent: %s", error)
+
+    def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
+        outlet = outflow._outlets.pop(key, None)
+        if outlet is None:
+            while len(outflow._outlets) >= _MOST_OUTLETS:
+                oldest = next(iter(outflow._outlets))
+                outflow._numbers.pop(oldest, None)
+                outflow._outlets.pop(oldest).undeclare()
+            make = self._network.outlet_to_others if outflow.is_bare else self._network.outlet
+            outlet = make(key, self._lane)
+        outflow._outlets[key] = outlet
+        if outflow.is_bare:
+            outlet.put(message)
+            return
+        number = outflow._numbers[key] = outflow._numbers.get(key, 0) + 1
+        outlet.put(message, attachment=serialize_stamp(Stamp(number, self._clock())))
+
+
+class Sender:
+    """Sends messages, each lane in its own thread: a large one that takes a second does not hold up a command."""
+
+    def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
+        """``clock``: returns the time in ns that goes with each message."""
+        self._lanes = {lane: _LaneWorker(lane, network, clock) for lane in Lane}
+
+    def flow(self, lane: Lane, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
+        """Return a topic's flow, of at most so many messages a second (0: all). ``is_bare``: for others, without stamps."""
+        return Outflow(self._lanes[lane], lane, hertz, is_bare)
+
+    def close(self) -> None:
+        """End the threads. Idempotent."""
+        for lane in self._lanes.values():
+            lane.close()
+
+
+_Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
+"""What delivers a message and its attachment, and these two."""
+
+
+class Flows:
+    """The flows of an intake by key, at most so many: the least recently used one makes room. Safe for threads."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = threading.Lock()
+        self._flows: dict[object, Flow[_Arrival]] = {}
+
+    def of(self, key: object) -> Flow[_Arrival] | None:
+        """Return a key's flow; None where there are too many, and messages wait in each."""
+        with self._lock:
+            flow = self._flows.pop(key, None)
+            if flow is None:
+                if len(self._flows) >= self._most:
+                    idle = next((known for known, each in self._flows.items() if not each.waiting), None)
+                    if idle is None:
+                        return None
+                    del self._flows[idle]
+                flow = Intake.flow()
+            self._flows[key] = flow
+            return flow
+
+
+class Intake(_Worker):
+    """Messages that have arrived, until they are published: fair between robots' topics.
+
+    Publishing may wait for a subscriber, some milliseconds; Zenoh's own thread would hold up all robots meanwhile.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("fleet-intake")
+        self._faults = Faults(_log, "publishing a message of the fleet")
+        self._queue: FlowQueue[_Arrival] = FlowQueue()
+
+    @staticmethod
+    def flow() -> Flow[_Arrival]:
+        """Return the flow of a robot's topic."""
+        return Flow(_INTAKE_MESSAGES, _INTAKE_BYTES)
+
+    @staticmethod
+    def flows(most: int) -> Flows:
+        """Return a table of flows."""
+        return Flows(most)
+
+    def add(
+        self,
+        flow: Flow[_Arrival],
+        deliver: Callable[[bytes, bytes], object],
+        message: bytes,
+        attachment: bytes,
+    ) -> None:
+        """Have ``deliver(message, attachment)`` called in the thread of the intake."""
+        with self._condition:
+            if not self._is_closed:
+                self._queue.add(flow, (deliver, message, attachment), len(message))
+                self._wake()
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                while not (self._is_closed or self._queue):
+                    self._condition.wait()
+                if self._is_closed:
+                    return
+                taken = self._queue.pop()
+            if taken:
+                deliver, message, attachment = taken[1]
+                try:
+                    deliver(message, attachment)
+                except Exception as error:  # noqa: BLE001 - of one message: the others go on
+                    self._faults.report(error)

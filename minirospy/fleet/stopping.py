@@ -1,0 +1,153 @@
+"""Velocities that come over the fleet, and stop coming: the robot's gateway publishes a zero after them, as the dashboard does.
+
+Only what is sent again and again is guarded: a single velocity stays, as in one graph. Nothing here needs the event loop; the
+zero is published by the guard's thread.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import struct
+import threading
+import time
+from collections.abc import Callable
+
+from minirospy.base.errors import ROSException
+from minirospy.fleet.rules import STOP_SECONDS
+from minirospy.runtime.stop_guard import StopGuard
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+__all__ = ["CommandStream", "at_rest"]
+
+_log = logging.getLogger(__name__)
+_TWIST = struct.Struct("<6d")
+_HEADER = 16
+"""Bytes of a header without its frame id: seq, stamp, the length of the frame id."""
+
+
+def at_rest(type_: str, body: bytes) -> bytes | None:
+    """Return the message that stops what a message drives; None if it drives nothing, or is broken."""
+    find = _FIELDS.get(type_)
+    if find is None:
+        return None
+    try:
+        parts = find(body)
+    except struct.error:
+        return None
+    rest = bytearray(body)
+    moves = False
+    for start, end, format_ in parts:
+        if end > len(body):
+            return None
+        moves = moves or any(
+            struct.unpack(f"<{(end - start) // struct.calcsize(format_)}{format_}", body[start:end])
+        )
+        rest[start:end] = bytes(end - start)
+    return bytes(rest) if moves else None
+
+
+_Part = tuple[int, int, str]
+"""Where numbers start and end in a message, and their format."""
+
+
+def _twist(_: bytes) -> list[_Part]:
+    return [(0, _TWIST.size, "d")]
+
+
+def _twist_stamped(body: bytes) -> list[_Part]:
+    start = _after_header(body)
+    return [(start, start + _TWIST.size, "d")]
+
+
+def _joy(body: bytes) -> list[_Part]:
+    parts: list[_Part] = []
+    end = _after_header(body)
+    for format_ in "fi":
+        (count,) = struct.unpack_from("<I", body, end)
+        start = end + 4
+        end = start + 4 * count
+        parts.append((start, end, format_))
+    return parts
+
+
+def _after_header(body: bytes) -> int:
+    (length,) = struct.unpack_from("<I", body, _HEADER - 4)
+    return _HEADER + int(length)
+
+
+_FIELDS: dict[str, Callable[[bytes], list[_Part]]] = {
+    "geometry_msgs/Twist": _twist,
+    "geometry_msgs/TwistStamped": _twist_stamped,
+    "sensor_msgs/Joy": _joy,
+}
+
+
+class CommandStream:
+    """The commands of one topic, published in order with the zero that follows a stream of them. For any thread."""
+
+    def __init__(
+        self,
+        topic: str,
+        type_: str,
+        publish: Callable[[bytes], None],
+        seconds: float = STOP_SECONDS,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._topic = topic
+        self._type = type_
+        self._publish = publish
+        self._seconds = seconds
+        self._clock = clock
+        self._guard = StopGuard(clock)
+        self._logger = RateLimitedLogger(_log)
+        self._lock = threading.Lock()
+        self._rest: bytes | None = None
+        # What stops the last command; None if that was none.
+        self._last = -math.inf
+        self._deadline = math.inf
+
+    @staticmethod
+    def guards(type_: str) -> bool:
+        """Return whether messages of a type drive something."""
+        return type_ in _FIELDS
+
+    def publish(self, body: bytes) -> None:
+        """Publish a command."""
+        now = self._clock()
+        rest = at_rest(self._type, body)
+        with self._lock:
+            is_stream = now - self._last < self._seconds
+            self._last, self._rest = now, rest
+            self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
+            if self._deadline < math.inf:
+                # Before it moves: what cannot be stopped is not driven.
+                self._guard.arm(self._silent, self._deadline)
+            else:
+                self._guard.disarm(self._silent)
+            self._publish(body)
+
+    def close(self) -> None:
+        """Stop what a stream drives. Idempotent."""
+        self._guard.disarm(self._silent)
+        with self._lock:
+            self._stop()
+
+    def _silent(self) -> None:
+        """Stop what is silent, in the guard's thread."""
+        with self._lock:
+            if self._clock() < self._deadline:
+                return  # a command has come at this moment
+            with contextlib.suppress(ROSException):  # the node has ended
+                self._stop()
+        self._logger.warning(
+            "%s is stopped: no command came for %g s (fleet gateway --stop-after)", self._topic, self._seconds
+        )
+
+    def _stop(self) -> None:
+        """Publish a zero if a stream has ended with another command. With the lock."""
+        rest, is_stream = self._rest, self._deadline < math.inf
+        self._rest, self._deadline = None, math.inf
+        if rest is not None and is_stream:
+            self._publish(rest)

@@ -1,0 +1,118 @@
+"""What nodes alone know, such as the types of their services: the master does not, so each node is queried."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Collection
+from functools import partial
+from typing import Generic, TypeVar
+
+from minirospy.aio.tasks import Faults
+from minirospy.base.errors import MinirospyError, ServiceException
+
+__all__ = ["AT_ONCE", "NodeQueries"]
+
+AT_ONCE = 64
+"""Queries that run at a time: a node that hangs costs nothing but a connection."""
+
+_AGAIN_AT_ONCE = 32
+"""Queries to what did not answer before that run at a time: next to the others, so that nothing new waits for them."""
+_QUERY_SECONDS = 5.0
+_AGAIN_SECONDS = 10.0
+"""After this what did not answer is queried again."""
+_REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
+"""What refused at once is queried again sooner, since that costs little: a server that was killed may be started again. The pause
+grows with the number of those that failed: 500 dead nodes are queried every 10 s."""
+
+_Key = TypeVar("_Key")
+_Found = TypeVar("_Found")
+
+
+class NodeQueries(Generic[_Key, _Found]):
+    """Queries nodes once for each key, such as the name of a service with its nodes. On the loop.
+
+    What does not answer is queried again later, and keeps nothing else waiting.
+    """
+
+    def __init__(
+        self,
+        query: Callable[[_Key], Awaitable[_Found]],
+        faults: Faults,
+        *,
+        arrived_late: Callable[[], object] = lambda: None,
+    ) -> None:
+        """``arrived_late`` is called when an answer has come that :meth:`look` did not wait for."""
+        self.found: dict[_Key, _Found] = {}
+        self._query = query
+        self._faults = faults
+        self._arrived_late = arrived_late
+        self._present: set[_Key] = set()
+        self._tasks: dict[_Key, asyncio.Task[None]] = {}
+        self._not_before: dict[_Key, float] = {}
+        self._first = asyncio.Semaphore(AT_ONCE)
+        self._again = asyncio.Semaphore(_AGAIN_AT_ONCE)
+
+    async def look(self, present: Collection[_Key], seconds: float) -> None:
+        """Query for what is new and forget what is absent; return when the new is found, or after ``seconds``."""
+        kept = self._present = set(present)
+        self.found = {key: found for key, found in self.found.items() if key in kept}
+        self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
+        is_late = False
+
+        async def query(key: _Key, turns: asyncio.Semaphore) -> None:
+            async with turns:
+                if key in self._present and await self._query_once(key) and is_late:
+                    self._arrived_late()
+
+        new = []
+        now = asyncio.get_running_loop().time()
+        for key in present:
+            if key in self.found or key in self._tasks or now < self._not_before.get(key, 0.0):
+                continue
+            has_failed = key in self._not_before
+            task = asyncio.ensure_future(query(key, self._again if has_failed else self._first))
+            self._tasks[key] = task
+            task.add_done_callback(partial(self._ended, key))
+            if not has_failed:
+                new.append(task)
+        try:
+            if new:
+                await asyncio.wait(new, timeout=seconds)
+        finally:
+            is_late = True
+
+    async def close(self) -> None:
+        """End the queries. Idempotent."""
+        tasks = list(self._tasks.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        # Those that had just ended report it only afterwards.
+        self._tasks.clear()
+
+    async def _query_once(self, key: _Key) -> bool:
+        """Query once; return whether there is an answer to what is still present."""
+        started = asyncio.get_running_loop().time()
+        try:
+            found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
+        except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
+            is_quick = asyncio.get_running_loop().time() - started < _REFUSED_SECONDS
+            self._failed(key, is_quick=is_quick)
+        except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
+            self._faults.report(error)
+            self._failed(key)
+        else:
+            # What is absent by now is new when it is back.
+            if key in self._present:
+                self.found[key] = found
+                return True
+        return False
+
+    def _ended(self, key: _Key, _: object) -> None:
+        self._tasks.pop(key, None)
+
+    def _failed(self, key: _Key, *, is_quick: bool = False) -> None:
+        if key in self._present:
+            refused = max(_REFUSED_SECONDS, _REFUSED_EACH * len(self._not_before))
+            pause = min(refused, _AGAIN_SECONDS) if is_quick else _AGAIN_SECONDS
+            self._not_before[key] = asyncio.get_running_loop().time() + pause

@@ -1,0 +1,71 @@
+"""Which actions are bridged: from what both graphs have at a moment. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from minirospy.introspect.snapshot import Snapshot
+from minirospy.ros2.links import Direction, is_bridge
+
+__all__ = ["ActionLink", "action_links", "send_goal_service"]
+
+_SEND_GOAL = "/_action/send_goal"
+_GOAL_TYPE = "ActionGoal"
+
+
+@dataclass(frozen=True)
+class ActionLink:
+    """An action that is offered on one side and used from the other. ``direction``: where goals go."""
+
+    action: str
+    direction: Direction
+    ros1_type: str
+    ros2_type: str
+
+    @property
+    def title(self) -> str:
+        """How messages to people name the link."""
+        return f"action {self.action}"
+
+
+def send_goal_service(action: str) -> str:
+    """Return the service by which an action of ROS 2 gets its goals."""
+    return action + _SEND_GOAL
+
+
+def action_links(
+    ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
+) -> list[ActionLink]:
+    """Return what is to be bridged: each action that one side alone offers, bridges not counted.
+
+    ``ros2_services``: services and their types. ``partner(type, direction)``: the type of the side that sends goals.
+    """
+    here = dict(_of_ros1(ros1))
+    there = {
+        service.removesuffix(_SEND_GOAL): type_.removesuffix("_SendGoal")
+        for service, type_ in ros2_services.items()
+        if service.endswith(_SEND_GOAL) and type_.endswith("_SendGoal")
+    }
+    found = [
+        ActionLink(name, Direction.TO_ROS1, here[name], partner(here[name], Direction.TO_ROS1))
+        for name in here.keys() - there.keys()
+    ]
+    found += [
+        ActionLink(name, Direction.TO_ROS2, partner(there[name], Direction.TO_ROS2), there[name])
+        for name in there.keys() - here.keys()
+    ]
+    return sorted(found, key=lambda link: link.action)
+
+
+def _of_ros1(ros1: Snapshot) -> list[tuple[str, str]]:
+    found = []
+    for topic, type_ in ros1.types.items():
+        if not topic.endswith("/goal") or not type_.endswith(_GOAL_TYPE):
+            continue
+        name = topic.removesuffix("/goal")
+        # A server is who takes goals and publishes results.
+        servers = set(ros1.subscribers.get(topic, ())) & set(ros1.publishers.get(f"{name}/result", ()))
+        if not all(map(is_bridge, servers)):
+            found.append((name, type_.removesuffix(_GOAL_TYPE)))
+    return found

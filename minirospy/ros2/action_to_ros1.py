@@ -1,0 +1,249 @@
+"""An action of ROS 1 that the bridge offers in ROS 2: goals go to ROS 1, feedback and results come back."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
+from typing import TYPE_CHECKING
+
+from minirospy.aio.tasks import Faults
+from minirospy.base.errors import BridgeError, DeserializationError, ROSException
+from minirospy.core.graph.goals import TERMINAL, GoalState
+from minirospy.core.idl.cdr import CDR_HEADER
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.ros2.action_messages import (
+    GoalId,
+    cancel_message,
+    goal_message,
+    parse_status_and_body,
+    parse_statuses,
+)
+from minirospy.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.aio.topics import Publisher
+    from minirospy.core.idl.protocols import Message
+    from minirospy.ros2.action_links import ActionLink
+    from minirospy.ros2.actions import ActionCodec
+    from minirospy.ros2.interface import Ros2Handle, Ros2Side
+
+__all__ = ["MOST_GOALS", "GoalsToRos1"]
+
+_SERVER_SECONDS = 5.0
+"""How long a server of ROS 1 may take to be connected, and to name a goal in its list of statuses."""
+MOST_GOALS = 1_000
+"""Goals that are passed on at a time: more are refused."""
+_PENDING_SECONDS = 0.5
+"""After this a goal that is still pending counts as accepted: ROS 2 has no such state."""
+_ENDS = {
+    GoalState.SUCCEEDED: SUCCEEDED,
+    GoalState.PREEMPTED: CANCELED,
+    GoalState.RECALLED: CANCELED,
+}
+_REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
+
+
+class _Goal:
+    """A goal of ROS 2 at a server of ROS 1."""
+
+    def __init__(
+        self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]
+    ) -> None:
+        self.id = id
+        self.feedback = feedback
+        self.ended: Future[tuple[int, bytes | None]] = Future()
+        self.accepted: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        self.is_listed = False
+        self._cancel = cancel
+
+    def cancel(self) -> None:
+        """Request the server to cancel the goal. From any thread."""
+        self._cancel(self)
+
+    def accept(self, is_accepted: bool) -> None:
+        if not self.accepted.done():
+            self.accepted.set_result(is_accepted)
+
+    def end(self, status: int, result: bytes | None) -> None:
+        with contextlib.suppress(InvalidStateError):
+            self.ended.set_result((status, result))
+
+
+class GoalsToRos1:
+    """The client in ROS 1. On the node's loop."""
+
+    def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
+        self._node = node
+        self._side = side
+        self._link = link
+        self._codec = codec
+        self._loop = asyncio.get_running_loop()
+        self._misfits = RateLimitedLogger(node.log)
+        self._goals: dict[str, _Goal] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._number = 0
+        self._faults = Faults(node.log, f"action {link.action}")
+        self._heard = asyncio.Event()
+        self._server: Ros2Handle | None = None
+        self._is_closed = False
+
+        def publisher(name: str) -> Publisher[Message]:
+            return node.advertise(f"{link.action}/{name}", codec.classes[name], tcp_nodelay=True)
+
+        self._goal = publisher("goal")
+        self._cancel = publisher("cancel")
+        self._subscriptions = [
+            node.subscribe_raw(f"{link.action}/status", self._guarded(self._take_statuses)),
+            node.subscribe_raw(f"{link.action}/feedback", self._guarded(self._take_feedback)),
+            node.subscribe_raw(f"{link.action}/result", self._guarded(self._take_result)),
+        ]
+
+    async def open(self) -> None:
+        """Connect to the server, then offer the action. Raises TypesDiffer."""
+        for end in (self._goal, self._cancel, *self._subscriptions):
+            await end
+        self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
+
+    async def close(self) -> None:
+        """End it: goals that run are aborted, those whose result has come get it."""
+        # A result that has come is taken in the next round.
+        await asyncio.sleep(0)
+        self._is_closed = True
+        for goal in list(self._goals.values()):
+            self._end(goal, ABORTED, None)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._server:
+            # It waits until what is known is sent.
+            await self._loop.run_in_executor(None, self._server.close)
+        for end in (*self._subscriptions, self._goal, self._cancel):
+            await end.close()
+
+    def _accept(self, data: bytes, feedback: Callable[[bytes], None]) -> Future[GoalOfRos1 | None]:
+        """Start a goal. In the executor's thread."""
+        accepted: Future[GoalOfRos1 | None] = Future()
+        self._loop.call_soon_threadsafe(self._start, data, feedback, accepted)
+        return accepted
+
+    def _start(
+        self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
+    ) -> None:
+        if self._is_closed:
+            accepted.set_exception(BridgeError("it is not bridged any more"))
+            return
+        # Those that are being accepted, and those that run.
+        if len(self._tasks) + len(self._goals) >= MOST_GOALS:
+            accepted.set_exception(BridgeError(f"the bridge passes on {MOST_GOALS} goals already"))
+            return
+        task = asyncio.ensure_future(self._send(data, feedback, accepted))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        # Of a task that is cancelled, also before its first step.
+        task.add_done_callback(lambda _: accepted.cancel())
+
+    async def _send(
+        self, data: bytes, feedback: Callable[[bytes], None], accepted: Future[GoalOfRos1 | None]
+    ) -> None:
+        try:
+            accepted.set_result(await self._sent(data, feedback))
+        except asyncio.TimeoutError:
+            accepted.set_exception(BridgeError(f"its server has not answered within {_SERVER_SECONDS:g} s"))
+        except (DeserializationError, ROSException) as error:
+            accepted.set_exception(BridgeError(str(error)))
+        except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
+            self._faults.report(error)
+            accepted.set_exception(BridgeError(f"the bridge failed: {type(error).__name__}"))
+
+    async def _sent(self, data: bytes, feedback: Callable[[bytes], None]) -> GoalOfRos1 | None:
+        body = self._codec.goal.to_ros1(data)
+        await asyncio.wait_for(self._connected(), _SERVER_SECONDS)
+        now = self._node.now()
+        self._number += 1
+        id = GoalId(f"{self._node.name}-{self._number}-{now.secs}.{now.nsecs}", now.secs, now.nsecs)
+        goal = self._goals[id.id] = _Goal(id, feedback, self._cancel_goal)
+        self._goal.publish_raw(goal_message(id, body))
+        try:
+            is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), _SERVER_SECONDS)
+        except asyncio.TimeoutError:
+            self._goals.pop(id.id, None)
+            self._cancel.publish_raw(cancel_message(id))
+            raise
+        return goal if is_accepted else None
+
+    async def _connected(self) -> None:
+        """Wait until the server takes goals and its answers arrive: a goal that is sent before is lost."""
+        await self._heard.wait()
+        for publisher in (self._goal, self._cancel):
+            await publisher.wait_for_subscribers()
+        while not all(subscription.headers for subscription in self._subscriptions):
+            await asyncio.sleep(0.01)
+
+    def _cancel_goal(self, goal: _Goal) -> None:
+        def cancel() -> None:
+            with contextlib.suppress(ROSException):
+                self._cancel.publish_raw(cancel_message(GoalId(goal.id.id)))
+
+        self._loop.call_soon_threadsafe(cancel)
+
+    # --- what comes from the server
+
+    def _guarded(self, take: Callable[[Frame], None]) -> Callable[[Frame, Header], None]:
+        def guarded(frame: Frame, _: Header) -> None:
+            try:
+                take(frame)
+            except DeserializationError as error:
+                self._misfits.error("a message of action %s: %s", self._link.action, error)
+
+        return guarded
+
+    def _take_statuses(self, frame: Frame) -> None:
+        self._heard.set()
+        listed = {status.goal.id: status.state for status in parse_statuses(frame)}
+        for goal in list(self._goals.values()):
+            state = listed.get(goal.id.id)
+            if state is None:
+                if goal.is_listed:
+                    # The server was started again: it does not know the goal any more.
+                    self._end(goal, ABORTED, None)
+            elif state == GoalState.PENDING:
+                if not goal.is_listed:
+                    self._loop.call_later(_PENDING_SECONDS, goal.accept, True)
+                goal.is_listed = True
+            elif state not in _REFUSED:
+                goal.is_listed = state not in TERMINAL
+                goal.accept(True)
+
+    def _take_feedback(self, frame: Frame) -> None:
+        status, body = parse_status_and_body(frame)
+        goal = self._goals.get(status.goal.id)
+        if goal:
+            goal.accept(True)
+            goal.feedback(self._codec.feedback.to_cdr(body, CDR_HEADER))
+
+    def _take_result(self, frame: Frame) -> None:
+        status, body = parse_status_and_body(frame)
+        goal = self._goals.get(status.goal.id)
+        if not goal:
+            return
+        # Feedback has a separate connection: what has arrived by now is read first.
+        self._loop.call_soon(self._take_end, goal, status.state, body)
+
+    def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:
+        goal.accept(state not in _REFUSED)
+        end = _ENDS.get(GoalState(state), ABORTED) if state in TERMINAL else ABORTED
+        try:
+            self._end(goal, end, self._codec.result.to_cdr(body, CDR_HEADER))
+        except DeserializationError as error:
+            self._misfits.error("a result of action %s: %s", self._link.action, error)
+            self._end(goal, ABORTED, None)
+
+    def _end(self, goal: _Goal, status: int, result: bytes | None) -> None:
+        self._goals.pop(goal.id.id, None)
+        goal.accept(False)
+        goal.end(status, result)

@@ -1,0 +1,146 @@
+"""What the bridge needs of ROS 2: by rclpy in ``side.py``, by Zenoh in ``zenoh_side.py``; a test may put another side there.
+
+ROS 2 calls back in threads of its own. Types are ``pkg/Name``; messages are CDR.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Protocol
+
+from minirospy.ros2.links import Ros2Topic
+from minirospy.ros2.parameter_values import Value
+from minirospy.ros2.reach import Reachable
+
+if TYPE_CHECKING:
+    from minirospy.ros2.rclpy_actions import Accept, Ros2Goal
+    from minirospy.ros2.rclpy_parameters import ParameterStore
+
+__all__ = [
+    "Ros2ActionClient",
+    "Ros2Client",
+    "Ros2Handle",
+    "Ros2Parameters",
+    "Ros2Probe",
+    "Ros2Publisher",
+    "Ros2Side",
+]
+
+
+class Ros2Publisher(Protocol):
+    """A publisher of serialized messages."""
+
+    @property
+    def subscribers(self) -> int:
+        """The number of subscribers that are connected."""
+
+    def publish(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Ros2Handle(Protocol):
+    """A subscription or a service, which calls back until it is closed."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Probe(Protocol):
+    """Requests without effect to a client's servers; its methods may be called from any thread."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the servers are connected."""
+
+    def reach(self) -> Future[None]:
+        """Send one; return the future of its response: from then on no response to the client is lost."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Client(Reachable, Protocol):
+    """A client of a service; its methods may be called from any thread."""
+
+    def call(self, request: bytes) -> Future[bytes]:
+        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
+
+    def close(self) -> None: ...
+
+
+class Ros2ActionClient(Reachable, Protocol):
+    """A client of an action; its methods may be called from any thread."""
+
+    def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
+        """Send a goal; return the future accepted goal, None where it is refused. It fails with BridgeError."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Parameters(Protocol):
+    """Parameters of other nodes of ROS 2. Its methods wait: call them in a worker thread. All raise BridgeError."""
+
+    def names(self, node: str) -> list[str]: ...
+
+    def get(self, node: str, name: str) -> Value:
+        """Return a parameter; of type 0 where it is not set."""
+
+    def set(self, node: str, name: str, value: Value) -> None: ...
+
+
+class Ros2Side(Protocol):
+    """A node of ROS 2."""
+
+    @property
+    def domain(self) -> str: ...
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """Return all topics and their types."""
+
+    def ends(self, topic: str) -> Ros2Topic: ...
+
+    def fields(self, type_: str) -> dict[str, str]:
+        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
+
+    def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
+
+    def subscribe(
+        self,
+        topic: str,
+        type_: str,
+        deliver: Callable[[bytes], None],
+        *,
+        depth: int,
+        is_reliable: bool,
+        is_latched: bool,
+    ) -> Ros2Handle: ...
+
+    def nodes(self) -> list[tuple[str, str]]:
+        """Return the names and namespaces of all nodes but those of bridges."""
+
+    def services(self) -> Mapping[str, str]:
+        """Return the services that others than this bridge offer, and their types."""
+
+    def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
+
+    def client(self, service: str, type_: str) -> Ros2Client: ...
+
+    def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
+        """Offer a service: ``answer`` gets the CDR of a request, in a thread; MinirospyError is why a call fails."""
+
+    def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer where it is not installed."""
+
+    def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
+
+    def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
+        """Offer an action: ``accept`` gets a goal, and where its feedback goes, in a thread."""
+
+    def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
+        """Offer the parameters of ROS 1 as those of this node."""
+
+    def node_parameters(self) -> Ros2Parameters: ...
+
+    def close(self) -> None: ...

@@ -1,0 +1,112 @@
+"""The links of one kind, of topics, services or actions: opened where both sides want them, closed where they do not any more."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from minirospy.aio.tasks import Faults
+from minirospy.base.errors import MinirospyError, ROSException
+from minirospy.base.escape import escaped
+from minirospy.ros2.action_links import ActionLink
+from minirospy.ros2.layouts import TypesDiffer
+from minirospy.ros2.links import Link
+from minirospy.ros2.service_links import ServiceLink
+
+__all__ = ["LinkTable", "OpenLink", "Pair", "pairs"]
+
+_L = TypeVar("_L", Link, ServiceLink, ActionLink)
+_O = TypeVar("_O", bound="OpenLink")
+
+
+class OpenLink(Protocol):
+    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`, which is called in any case."""
+
+    async def open(self) -> None: ...
+
+    async def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A link, and why it is not open: nothing where it is."""
+
+    link: Link | ServiceLink | ActionLink
+    reason: str = ""
+
+
+def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
+    """Return what would be bridged, and why something is not; ``check(link)`` raises TypesDiffer with the reason."""
+    found = []
+    for link in wanted:
+        try:
+            check(link)
+        except TypesDiffer as error:
+            found.append(Pair(link, str(error)))
+        else:
+            found.append(Pair(link))
+    return found
+
+
+class LinkTable(Generic[_L, _O]):
+    """The open links, and those that cannot be opened with the reason. ``make(link)`` raises TypesDiffer. On the node's loop."""
+
+    def __init__(self, log: logging.Logger, make: Callable[[_L], _O]) -> None:
+        self.links: dict[_L, _O] = {}
+        self.refused: dict[_L, str] = {}
+        self._log = log
+        self._faults = Faults(log, "closing a link")
+        self._make: Callable[[_L], _O] = make
+
+    async def update(self, wanted: Collection[_L]) -> bool:
+        """Close what is not wanted any more and open what is new; return whether there was any."""
+        gone = [link for link in self.links if link not in wanted]
+        for link in gone:
+            await self._close(link)
+
+        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
+        new = [link for link in wanted if link not in self.links and link not in self.refused]
+        for link in new:
+            try:
+                await self._open(link)
+            except (TypesDiffer, ROSException, ValueError) as error:
+                self._refuse(link, str(error))
+            except MinirospyError:
+                raise  # of the master: it is tried again
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
+                self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
+        return bool(gone or new)
+
+    async def close(self) -> None:
+        """Close all. Idempotent."""
+        for link in list(self.links):
+            await self._close(link)
+
+    async def _open(self, link: _L) -> None:
+        opened = self._make(link)
+        try:
+            await opened.open()
+        except BaseException:
+            await opened.close()
+            raise
+        self.links[link] = opened
+        self._log.info(
+            "bridging %s (%s): [%s] and [%s]",
+            link.title,
+            link.direction.value,
+            link.ros1_type,
+            link.ros2_type,
+        )
+
+    def _refuse(self, link: _L, reason: str) -> None:
+        self.refused[link] = reason
+        self._log.warning("%s is not bridged (%s): %s", link.title, link.direction.value, escaped(reason))
+
+    async def _close(self, link: _L) -> None:
+        try:
+            await self.links.pop(link).close()
+        except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are closed
+            self._faults.report(error)
+        self._log.info("no longer bridging %s (%s)", link.title, link.direction.value)

@@ -1,0 +1,419 @@
+"""Clients and servers of actions in ROS 2, by rclpy's own: goals, results and feedback as CDR.
+
+All of this runs in the executor's thread, but for the methods that say otherwise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import threading
+import uuid
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, InvalidStateError
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
+
+from minirospy.base.errors import BridgeError, MinirospyError
+from minirospy.ros2.action_links import send_goal_service
+from minirospy.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
+
+__all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos1", "GoalOfRos2", "Ros2Goal"]
+
+if TYPE_CHECKING:
+    from minirospy.ros2.interface import Ros2Probe
+
+_T = TypeVar("_T")
+
+CANCELED = 5
+"""The statuses of a goal that has ended: action_msgs/GoalStatus."""
+SUCCEEDED = 4
+ABORTED = 6
+
+_FEEDBACK_DEPTH = 100
+_CLOSE_SECONDS = 1.0
+_HEADER = 4
+_ID = 16
+
+
+# --- what is used of rclpy
+
+
+class _Impl(Protocol):
+    FeedbackMessage: MessageClass
+
+
+class ActionClass(Protocol):
+    """The class of an action."""
+
+    Impl: _Impl
+
+    Goal: MessageClass
+    Result: MessageClass
+    Feedback: MessageClass
+
+
+class _ClientHandle(Protocol):
+    accepted: bool
+
+    def cancel_goal_async(self) -> RclpyFuture: ...
+
+    def get_result_async(self) -> RclpyFuture: ...
+
+
+class _ServerHandle(Protocol):
+    request: Message
+    is_cancel_requested: bool
+
+    def publish_feedback(self, feedback: Message) -> None: ...
+
+    def succeed(self) -> None: ...
+
+    def abort(self) -> None: ...
+
+    def canceled(self) -> None: ...
+
+
+class _RclpyActionClient(Protocol):
+    def send_goal_async(self, goal: Message, *, goal_uuid: object) -> RclpyFuture: ...
+
+    def server_is_ready(self) -> bool: ...
+
+    def destroy(self) -> None: ...
+
+
+class Ros2Goal(Protocol):
+    """A goal that a server of ROS 2 has accepted; its methods may be called from any thread."""
+
+    def cancel(self) -> None: ...
+
+    def result(self) -> Future[tuple[int, bytes]]:
+        """Return the future status, of action_msgs/GoalStatus, and result."""
+
+
+class _Closable(Protocol):
+    def destroy(self) -> None: ...
+
+
+# --- goals of ROS 1 in ROS 2
+
+
+class GoalOfRos2:
+    """A goal that a server of ROS 2 has accepted. Its methods may be called from any thread."""
+
+    def __init__(self, calls: Calls, handle: _ClientHandle, on_end: Callable[[], None]) -> None:
+        self._calls = calls
+        self._handle = handle
+        self._on_end = on_end
+
+    def cancel(self) -> None:
+        """Request the server to cancel the goal."""
+        self._calls.executor.create_task(self._handle.cancel_goal_async)
+
+    def result(self) -> Future[tuple[int, bytes]]:
+        """Return the future status and result."""
+        ended: Future[tuple[int, bytes]] = Future()
+
+        def arrived(done: RclpyFuture) -> None:
+            try:
+                response = done.result()
+                self._on_end()
+                result = self._calls.serialize(getattr(response, "result"))  # noqa: B009 - not known here
+                found = (int(getattr(response, "status")), result)  # noqa: B009
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+                _fail(ended, error)
+                return
+            with contextlib.suppress(InvalidStateError):
+                ended.set_result(found)
+
+        def send() -> None:
+            self._handle.get_result_async().add_done_callback(arrived)
+
+        self._calls.executor.create_task(send)
+        return ended
+
+
+class ActionClient:
+    """A client of an action.
+
+    It subscribes to feedback itself: rclpy's client drops what has not been read when the result comes.
+    """
+
+    def __init__(self, calls: Calls, name: str, class_: ActionClass) -> None:
+        self._calls = calls
+        self._name = name
+        self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
+        self._class = class_
+        self._feedback_class = class_.Impl.FeedbackMessage
+        # Before the client: a server that has found the client's last end has found this one, too.
+        self._feedback = calls.node.create_subscription(
+            self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
+        )
+        self._client: _RclpyActionClient = _client_class()(
+            calls.node,
+            class_,
+            name,
+            callback_group=calls.options["callback_group"],
+            goal_service_qos_profile=calls.options["qos_profile"],
+            result_service_qos_profile=calls.options["qos_profile"],
+            cancel_service_qos_profile=calls.options["qos_profile"],
+        )
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is connected. From any thread."""
+        return bool(self._client.server_is_ready())
+
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """The ids of the servers. From any thread."""
+        return self._calls.servers(send_goal_service(self._name))
+
+    def probe(self) -> Ros2Probe:
+        """Return what cancels a goal that nobody has: cancels are the last of the client's ends that is made."""
+        return _CancelProbe(self)
+
+    def reach(self) -> Future[None]:
+        """Cancel a goal that nobody has; return the future of the response. From any thread."""
+        reached: Future[None] = Future()
+
+        def answered(_: object) -> None:
+            with contextlib.suppress(InvalidStateError):
+                reached.set_result(None)
+
+        def send() -> None:
+            try:
+                handle = importlib.import_module("rclpy.action.client").ClientGoalHandle(
+                    self._client, _uuid_message(uuid.uuid4().bytes), None
+                )
+                handle.cancel_goal_async().add_done_callback(answered)
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+                _fail(reached, error)
+
+        self._calls.executor.create_task(send)
+        return reached
+
+    def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
+        """Send a goal; return the accepted goal, None where it is refused. From any thread."""
+        accepted: Future[Ros2Goal | None] = Future()
+        self._calls.executor.create_task(self._send, goal, feedback, accepted)
+        return accepted
+
+    def close(self) -> None:
+        """End the client."""
+        self._calls.end(lambda: self._calls.node.destroy_subscription(self._feedback))
+        self._calls.end(self._client.destroy)
+
+    def _send(
+        self, goal: bytes, feedback: Callable[[bytes], None], accepted: Future[Ros2Goal | None]
+    ) -> None:
+        id = uuid.uuid4().bytes
+        self._callbacks[id] = feedback
+
+        def ended() -> None:
+            self._read_feedback()
+            self._callbacks.pop(id, None)
+
+        def answered(done: RclpyFuture) -> None:
+            handle = cast("_ClientHandle", done.result())
+            if not handle.accepted:
+                self._callbacks.pop(id, None)
+            try:
+                accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
+            except InvalidStateError:
+                # Nobody waits any more, and in ROS 1 the goal counts as refused: it must not run.
+                self._callbacks.pop(id, None)
+                if handle.accepted:
+                    handle.cancel_goal_async()
+
+        try:
+            message = self._calls.deserialize(goal, self._class.Goal)
+            self._client.send_goal_async(message, goal_uuid=_uuid_message(id)).add_done_callback(answered)
+        except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            self._callbacks.pop(id, None)
+            _fail(accepted, error)
+
+    def _read_feedback(self) -> None:
+        """Pass on the feedback that waits: it was sent before the result that has come."""
+        handle = self._feedback.handle
+        with handle:
+            while taken := handle.take_message(self._feedback_class, True):
+                self._take_feedback(taken[0])
+
+    def _take_feedback(self, data: bytes) -> None:
+        # The id of the goal takes 16 bytes, so that the rest is aligned as it was.
+        callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
+        if callback:
+            callback(data[:_HEADER] + data[_HEADER + _ID :])
+
+
+class _CancelProbe:
+    """Reaches the servers of an action by its client, which stays open."""
+
+    def __init__(self, client: ActionClient) -> None:
+        self._client = client
+
+    @property
+    def is_ready(self) -> bool:
+        return self._client.is_ready
+
+    def reach(self) -> Future[None]:
+        return self._client.reach()
+
+    def close(self) -> None:
+        pass
+
+
+def _uuid_message(id: bytes) -> object:
+    return importlib.import_module("unique_identifier_msgs.msg").UUID(uuid=list(id))
+
+
+def _client_class() -> Callable[..., _RclpyActionClient]:
+    """Return rclpy's client of actions, with a lock from the start.
+
+    Its constructor shows it to the executor before it makes its lock: the executor's thread would fail on that.
+    """
+    return type(
+        "ActionClient", (importlib.import_module("rclpy.action").ActionClient,), {"_lock": threading.Lock()}
+    )
+
+
+# --- goals of ROS 2 in ROS 1
+
+
+class GoalOfRos1(Protocol):
+    """A goal that a server of ROS 1 has accepted."""
+
+    @property
+    def ended(self) -> Future[tuple[int, bytes | None]]:
+        """The future status, one of those above, and result, None for an empty one."""
+
+    def cancel(self) -> None:
+        """Request the server to cancel the goal. From any thread."""
+
+
+class Feedback:
+    """The feedback of a goal: kept until its handle is there, then published. From any thread."""
+
+    def __init__(self, calls: Calls, class_: MessageClass) -> None:
+        self._calls = calls
+        self._class = class_
+        self._handle: _ServerHandle | None = None
+        self._kept: list[bytes] = []
+
+    def __call__(self, data: bytes) -> None:
+        self._calls.executor.create_task(self._publish, data)
+
+    def start(self, handle: _ServerHandle) -> None:
+        """Publish what has come."""
+        self._handle = handle
+        kept, self._kept = self._kept, []
+        for data in kept:
+            self._publish(data)
+
+    def _publish(self, data: bytes) -> None:
+        if self._handle is None:
+            self._kept.append(data)
+        else:
+            self._handle.publish_feedback(self._calls.deserialize(data, self._class))
+
+
+Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
+"""A goal and where its feedback goes -> the accepted goal, None where it is refused."""
+
+
+class ActionServer:
+    """An action that is offered in ROS 2."""
+
+    def __init__(self, calls: Calls, name: str, class_: ActionClass, accept: Accept) -> None:
+        self._calls = calls
+        self._name = name
+        self._class = class_
+        self._accept = accept
+        self._goals: dict[int, tuple[Message, GoalOfRos1, Feedback]] = {}
+        self._requests = 0
+        self._is_closed = False
+        self._module = importlib.import_module("rclpy.action")
+        # Its constructor shows it to the executor, which may have a goal for it, before it has a logger.
+        named = {"_logger": calls.node.get_logger()}
+        self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
+            calls.node,
+            class_,
+            name,
+            self._execute,
+            goal_callback=self._requested,
+            cancel_callback=self._cancelled,
+            goal_service_qos_profile=calls.options["qos_profile"],
+            result_service_qos_profile=calls.options["qos_profile"],
+            cancel_service_qos_profile=calls.options["qos_profile"],
+            feedback_pub_qos_profile=importlib.import_module("rclpy.qos").QoSProfile(depth=_FEEDBACK_DEPTH),
+            callback_group=calls.options["callback_group"],
+        )
+
+    def close(self) -> None:
+        """Offer it no more; results that are known, and refusals, are sent first. From any other thread than the executor's."""
+        sent = threading.Event()
+        self._calls.end(functools.partial(self._wait_until_sent, sent))
+        sent.wait(_CLOSE_SECONDS)
+        self._is_closed = True
+        self._calls.end(self._server.destroy)
+
+    def _wait_until_sent(self, sent: threading.Event) -> None:
+        """Set the event in the first of the executor's rounds in which no goal waits to be answered."""
+        if self._is_closed:
+            return
+        if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
+            self._calls.end(functools.partial(self._wait_until_sent, sent))
+        else:
+            # What rclpy does after our part of the answer may be a task of its own.
+            self._calls.end(sent.set)
+
+    async def _requested(self, goal: Message) -> object:
+        self._requests += 1
+        try:
+            return await self._answered(goal)
+        finally:
+            self._requests -= 1
+
+    async def _answered(self, goal: Message) -> object:
+        feedback = Feedback(self._calls, self._class.Feedback)
+        try:
+            accepted = await self._calls.result(self._accept(self._calls.serialize(goal), feedback))
+        except (MinirospyError, CancelledError, RuntimeError) as error:
+            self._calls.node.get_logger().error(f"action [{self._name}] of ROS 1: {error}")
+            accepted = None
+        if accepted is None:
+            return self._module.GoalResponse.REJECT
+        # The goal's handle will have this very object.
+        self._goals[id(goal)] = (goal, accepted, feedback)
+        return self._module.GoalResponse.ACCEPT
+
+    def _cancelled(self, handle: _ServerHandle) -> object:
+        known = self._goals.get(id(handle.request))
+        if known is None:
+            return self._module.CancelResponse.REJECT
+        known[1].cancel()
+        return self._module.CancelResponse.ACCEPT
+
+    async def _execute(self, handle: _ServerHandle) -> Message:
+        _, goal, feedback = self._goals[id(handle.request)]
+        feedback.start(handle)
+        try:
+            status, data = await self._calls.result(goal.ended, after_tasks=True)
+        except CancelledError:
+            status, data = ABORTED, None
+        finally:
+            del self._goals[id(handle.request)]
+        if status == SUCCEEDED:
+            handle.succeed()
+        elif status == CANCELED and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            # A goal that ROS 1 preempted for another one: ROS 2 has no such end.
+            handle.abort()
+        return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
+
+
+def _fail(future: Future[_T], error: Exception) -> None:
+    with contextlib.suppress(InvalidStateError):
+        future.set_exception(BridgeError(" ".join(str(error).split())))

@@ -1,0 +1,177 @@
+"""What rmw_zenoh writes into keys and attachments of Zenoh: topics, services, nodes and their ends. Pure.
+
+Source: https://github.com/ros2/rmw_zenoh/blob/rolling/docs/design.md, and liveliness_utils.cpp of the same repository.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from minirospy.ros2.xxh3 import xxh3_128
+
+__all__ = [
+    "Entity",
+    "Kind",
+    "Qos",
+    "attachment",
+    "data_key",
+    "dds_name",
+    "format_token",
+    "gid_of",
+    "parse_token",
+    "reply_attachment",
+    "tokens_pattern",
+]
+
+_SPACE = "@ros2_lv"
+_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_DDS_NAME = re.compile(r"([A-Za-z]\w*)::(msg|srv|action)::dds_::([A-Za-z]\w*)_", re.ASCII)
+_HASH = re.compile(r"RIHS01_[0-9a-f]{64}|TypeHashNotSupported")
+_LONGEST = 2000
+_DEFAULT_DEPTH = 42
+
+
+class Kind(Enum):
+    """What a token declares."""
+
+    NODE = "NN"
+    PUBLISHER = "MP"
+    SUBSCRIPTION = "MS"
+    SERVICE = "SS"
+    CLIENT = "SC"
+
+
+@dataclass(frozen=True)
+class Qos:
+    """The quality of service of an end, so far as the bridge knows it."""
+
+    is_reliable: bool = True
+    is_transient_local: bool = False
+    depth: int = 10
+
+    def __str__(self) -> str:
+        """Return the text of a token: what differs from rmw_zenoh's own default."""
+        depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
+        return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
+
+
+class Entity(NamedTuple):
+    """A node, or an end of a topic or service. ``type``: ``pkg/Name``, or ``pkg/srv/Name`` and the like.
+
+    ``session``: the id of its session of Zenoh.
+    """
+
+    domain: str
+    session: str
+    id: int
+    kind: Kind
+    node: str
+    namespace: str = "/"
+    name: str = ""
+    type: str = ""
+    hash: str = ""
+    qos: Qos = Qos()
+
+    @property
+    def short_type(self) -> str:
+        """The type as ``pkg/Name``."""
+        package, _, rest = self.type.partition("/")
+        return f"{package}/{rest.rpartition('/')[2]}"
+
+    @property
+    def key(self) -> str:
+        """The key of its messages or requests."""
+        return data_key(self.domain, self.name, self.type, self.hash)
+
+
+def tokens_pattern(domain: str) -> str:
+    """Return the pattern of all tokens of a domain."""
+    return f"{_SPACE}/{domain}/**"
+
+
+def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
+    """Return the key of a topic's messages, or a service's requests."""
+    return f"{domain}/{name.strip('/')}/{dds_name(type_)}/{hash_}"
+
+
+def dds_name(type_: str) -> str:
+    """Return ``pkg::msg::dds_::Name_`` of ``pkg/Name``, and the like of ``pkg/srv/Name``."""
+    package, _, rest = type_.partition("/")
+    kind, _, name = rest.rpartition("/")
+    return f"{package}::{kind or 'msg'}::dds_::{name}_"
+
+
+def format_token(entity: Entity) -> str:
+    """Return the key of the token that declares it."""
+    node_id = entity.id if entity.kind is Kind.NODE else 0
+    parts = [_SPACE, entity.domain, entity.session, str(node_id), str(entity.id), entity.kind.value, "%"]
+    parts += [_mangled(entity.namespace), entity.node]
+    if entity.kind is not Kind.NODE:
+        parts += [_mangled(entity.name), dds_name(entity.type), entity.hash, str(entity.qos)]
+    return "/".join(parts)
+
+
+def parse_token(key: str) -> Entity | None:
+    """Return what a token declares, None where it is not one that the bridge understands."""
+    parts = key.split("/")
+    if len(key) > _LONGEST or len(parts) < 9 or parts[0] != _SPACE:
+        return None
+    _, domain, session, _, id, kind, _, namespace, node, *rest = parts
+    if kind not in {each.value for each in Kind} or not (id.isascii() and id.isdigit()) or len(id) > 18:
+        return None
+    head = (domain, session, int(id), Kind(kind), node, namespace.replace("%", "/"))
+    if kind == Kind.NODE.value:
+        return Entity(*head)
+    # Newer versions may append more.
+    if len(rest) < 4:
+        return None
+    name, found, qos = rest[0].replace("%", "/"), _DDS_NAME.fullmatch(rest[1]), _parse_qos(rest[3])
+    if not _NAME.fullmatch(name) or not found or not _HASH.fullmatch(rest[2]) or qos is None:
+        return None
+    package, part, type_ = found.groups()
+    whole = f"{package}/{type_}" if part == "msg" else f"{package}/{part}/{type_}"
+    return Entity(*head, name, whole, rest[2], qos)
+
+
+def _parse_qos(text: str) -> Qos | None:
+    parts = text.split(":")
+    if len(parts) < 6:
+        return None
+    _, _, depth = parts[2].partition(",")
+    return Qos(
+        parts[0] in ("", "1"),
+        parts[1] == "1",
+        int(depth) if depth.isascii() and depth.isdigit() and len(depth) < 10 else _DEFAULT_DEPTH,
+    )
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%")
+
+
+def gid_of(token: str) -> bytes:
+    """Return the id of what a token declares."""
+    return xxh3_128(token.encode())
+
+
+# --- attachments
+
+_ATTACHMENT = struct.Struct("<qqB16s")
+_TIME = slice(8, 16)
+
+
+def attachment(sequence: int, time: int, gid: bytes) -> bytes:
+    """Return what goes with a message or request; ``time`` in nanoseconds since 1970."""
+    return _ATTACHMENT.pack(sequence, time, len(gid), gid)
+
+
+def reply_attachment(data: bytes, time: int) -> bytes:
+    """Return what goes with the response to a request, with this attachment. Raise ValueError where it is not one."""
+    # The id without its length, as other versions of rmw_zenoh may have it, goes back likewise.
+    if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
+        raise ValueError("this is not an attachment of rmw_zenoh")
+    return data[: _TIME.start] + struct.pack("<q", time) + data[_TIME.stop :]

@@ -1,0 +1,166 @@
+"""The bridge's node of ROS 2 on a session of Zenoh: its tokens, its ends, and the graph that the tokens of others make."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable
+
+from minirospy.base.errors import BridgeError
+from minirospy.ros2.links import parse_domain
+from minirospy.ros2.zenoh_keys import (
+    Entity,
+    Kind,
+    Qos,
+    attachment,
+    format_token,
+    gid_of,
+    parse_token,
+    tokens_pattern,
+)
+from minirospy.zenoh.library import (
+    DEFAULT_ENDPOINT,
+    Declared,
+    NetworkOptions,
+    Sample,
+    Session,
+    configured,
+    one_line,
+    require_zenoh,
+)
+
+__all__ = ["Graph", "Handle", "ZenohNode"]
+
+_MOST_ENTITIES = 50_000
+
+
+class Graph:
+    """All tokens that are there, but those of one's own session. From any thread."""
+
+    def __init__(self, own_session: str = "") -> None:
+        self._own = own_session
+        self._nodes: dict[str, Entity] = {}
+        self._by_name: dict[str, dict[str, Entity]] = {}
+        self._count = 0
+        self._lock = threading.Lock()
+
+    def set(self, key: str, is_there: bool) -> None:
+        """Add or remove a token; one that is not understood has no effect."""
+        entity = parse_token(key)
+        if entity is None or entity.session == self._own:
+            return
+        with self._lock:
+            kept = self._nodes if entity.kind is Kind.NODE else self._by_name.setdefault(entity.name, {})
+            if is_there and key not in kept and self._count < _MOST_ENTITIES:
+                kept[key] = entity
+                self._count += 1
+            elif not is_there and key in kept:
+                del kept[key]
+                self._count -= 1
+            if not kept:
+                self._by_name.pop(entity.name, None)
+
+    def nodes(self) -> list[Entity]:
+        """Return the nodes."""
+        with self._lock:
+            return list(self._nodes.values())
+
+    def ends(self, *kinds: Kind) -> list[Entity]:
+        """Return the ends of these kinds of all topics and services."""
+        with self._lock:
+            found = [each for ends in self._by_name.values() for each in ends.values()]
+        return [each for each in found if each.kind in kinds]
+
+    def of_name(self, name: str, *kinds: Kind) -> list[Entity]:
+        """Return the ends of these kinds of a topic or service."""
+        with self._lock:
+            found = list(self._by_name.get(name, {}).values())
+        return [each for each in found if each.kind in kinds]
+
+
+class ZenohNode:
+    """A session with one node. ``graph``: the nodes and ends of other sessions."""
+
+    def __init__(self, name: str, options: NetworkOptions) -> None:
+        """Open the session; waits for the router. Raises BridgeError."""
+        require_zenoh("ros2-bridge --zenoh")
+        self.zenoh = importlib.import_module("zenoh")
+        self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
+        self.session = self._opened(options)
+        self._zid = str(self.session.info.zid())
+        self._name = name
+        self._ids = itertools.count()
+        self.graph = Graph(self._zid)
+        self._is_closed = False
+        liveliness = self.session.liveliness()
+        # Until the session closes.
+        self._declared = [
+            liveliness.declare_token(format_token(self.entity(Kind.NODE))),
+            liveliness.declare_subscriber(
+                tokens_pattern(self.domain), self.handler(self._changed), history=True
+            ),
+        ]
+
+    def entity(
+        self, kind: Kind, name: str = "", type_: str = "", hash_: str = "", qos: Qos | None = None
+    ) -> Entity:
+        """Return a new end of this node, whose token :class:`Handle` declares; the first one is the node itself."""
+        id = next(self._ids)
+        return Entity(self.domain, self._zid, id, kind, self._name, "/", name, type_, hash_, qos or Qos())
+
+    def close(self) -> None:
+        """End the session, and all that it has declared. Idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        # Of a link that is cut: the other end notices by itself.
+        with contextlib.suppress(self.zenoh.ZError):
+            self.session.close()
+
+    def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
+        """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
+        return self.zenoh.handlers.Callback(function, ended, indirect=False)
+
+    def _opened(self, options: NetworkOptions) -> Session:
+        config = configured(options)
+        # What is kept for those who come later has times.
+        config.insert_json5("timestamping/enabled", "true")
+        try:
+            session: Session = self.zenoh.open(config)
+        except self.zenoh.ZError as error:
+            where = ", ".join(options.connect) or options.config or DEFAULT_ENDPOINT
+            raise BridgeError(
+                f"no router of Zenoh answers at {where} ({one_line(error)}): start `ros2 run rmw_zenoh_cpp rmw_zenohd`, "
+                "`zenohd` or `minirospy fleet router` there, or give --connect"
+            ) from error
+        return session
+
+    def _changed(self, sample: Sample) -> None:
+        self.graph.set(str(sample.key_expr), sample.kind == self.zenoh.SampleKind.PUT)
+
+
+class Handle:
+    """An end of a node with its token, and what belongs to it, until it is closed."""
+
+    def __init__(self, node: ZenohNode, end: Entity, *declared: Declared) -> None:
+        key = format_token(end)
+        self._fault = node.zenoh.ZError
+        self._declared = (node.session.liveliness().declare_token(key), *declared)
+        self._gid = gid_of(key)
+        self._sequence = itertools.count(1)
+
+    def attachment(self) -> bytes:
+        """Return what goes with the next message or request."""
+        return attachment(next(self._sequence), time.time_ns(), self._gid)
+
+    def close(self) -> None:
+        """Undeclare it. Idempotent."""
+        declared, self._declared = self._declared, ()
+        for each in declared:
+            # It is undeclared with its session.
+            with contextlib.suppress(self._fault):
+                each.undeclare()

@@ -1,0 +1,98 @@
+"""Publishers and subscriptions of ROS 2 by Zenoh, also those of actions. Zenoh calls back in its own threads."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from minirospy.ros2.zenoh_keys import Entity, Kind
+from minirospy.ros2.zenoh_node import Handle, ZenohNode
+from minirospy.zenoh.library import Outlet
+
+if TYPE_CHECKING:
+    from minirospy.zenoh.library import Declared, Sample
+
+__all__ = ["ZenohPublisher", "subscribe"]
+
+_log = logging.getLogger(__name__)
+
+
+class ZenohPublisher(Handle):
+    """A publisher; what it is like is the quality of service of its end."""
+
+    def __init__(self, node: ZenohNode, end: Entity) -> None:
+        outlet = _outlet(node, end)
+        super().__init__(node, end, outlet)
+        self._graph = node.graph
+        self._end = end
+        self._outlet = outlet
+
+    @property
+    def subscribers(self) -> int:
+        """Return the number of subscribers; 0 while those of other sessions are not reached yet."""
+        found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
+        count = len([each for each in found if each.key == self._end.key])
+        # One that keeps its messages loses none.
+        is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
+        return count if is_ready else 0
+
+    def publish(self, data: bytes) -> None:
+        """Send a message; a network that is too slow drops it."""
+        # A session that is closed.
+        with contextlib.suppress(self._fault):
+            self._outlet.put(data, attachment=self.attachment())
+
+
+def _outlet(node: ZenohNode, end: Entity) -> Outlet:
+    drop = node.zenoh.CongestionControl.DROP
+    # The bridge's own subscription to the topic, which takes nothing of this session, does not count as a match.
+    remote = node.zenoh.Locality.REMOTE
+    if not end.qos.is_transient_local:
+        return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
+    extension = importlib.import_module("zenoh.ext")
+    outlet: Outlet = extension.declare_advanced_publisher(
+        node.session,
+        end.key,
+        congestion_control=drop,
+        allowed_destination=remote,
+        cache=extension.CacheConfig(max_samples=end.qos.depth),
+        sample_miss_detection=extension.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=1.0),
+        publisher_detection=True,
+    )
+    return outlet
+
+
+def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) -> Handle:
+    """Call ``deliver`` with each serialized message, in a thread of Zenoh's, until the handle is closed."""
+
+    def arrived(sample: Sample) -> None:
+        if sample.kind != node.zenoh.SampleKind.PUT:
+            return
+        try:
+            deliver(sample.payload.to_bytes())
+        except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
+            _log.exception("a message of ROS 2 could not be passed on")
+
+    handler = node.handler(arrived)
+    # What this bridge sends does not come back.
+    remote = node.zenoh.Locality.REMOTE
+    if not end.qos.is_transient_local:
+        declared = node.session.declare_subscriber(end.key, handler, allowed_origin=remote)
+        return Handle(node, end, declared)
+    extension = importlib.import_module("zenoh.ext")
+    recovery = (
+        extension.RecoveryConfig(periodic_queries=None, heartbeat=True) if end.qos.is_reliable else None
+    )
+    kept: Declared = extension.declare_advanced_subscriber(
+        node.session,
+        end.key,
+        handler,
+        allowed_origin=remote,
+        history=extension.HistoryConfig(detect_late_publishers=True, max_samples=end.qos.depth),
+        recovery=recovery,
+        subscriber_detection=True,
+    )
+    return Handle(node, end, kept)

@@ -1,0 +1,294 @@
+"""The bridge as a whole: the shared graph, its doors and their listeners, their state and their diagnostics."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+from minirospy.aio.node import Node
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.closing import close_all
+from minirospy.base.environment import DISTRO
+from minirospy.base.errors import BridgeError
+from minirospy.introspect.snapshot import fetch
+from minirospy.web.access import Access
+from minirospy.web.foxglove.assets import ALLOWED, Assets
+from minirospy.web.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
+from minirospy.web.graph import Filters, SharedGraph
+from minirospy.web.rosbridge.client_topics import ClientTopics
+from minirospy.web.rosbridge.door import RosbridgeDoor, RosbridgeOptions
+from minirospy.web.server.account import Account
+from minirospy.web.server.connection import Door, Exchange, HttpHandler, Limits
+from minirospy.web.server.listener import Listener
+from minirospy.web.server.pipe import tls_context
+from minirospy.web.video.pages import VideoPages
+from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    import ssl
+
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    from minirospy.aio.topics import Publisher
+    from minirospy.web.rosapi.services import Rosapi
+    from minirospy.web.tf_republisher.republisher import Republisher
+
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Addition", "Bridge", "BridgeOptions"]
+
+FOXGLOVE_PORT = 8765
+ROSBRIDGE_PORT = 9090
+VIDEO_PORT = 8080
+_DIAGNOSTICS_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class BridgeOptions:
+    """``address`` is where the listeners are, at a port for each protocol, None: not served.
+
+    ``certificate`` and ``key`` are PEM files. In seconds: ``slowest_look``; ``retry_delay`` after which a port that is in use
+    is tried again, None: never.
+    """
+
+    address: str = "127.0.0.1"
+    foxglove_port: int | None = FOXGLOVE_PORT
+    rosbridge_port: int | None = None
+    video_port: int | None = None
+    access: Access = field(default_factory=Access)
+    limits: Limits = field(default_factory=Limits)
+    filters: Filters = field(default_factory=Filters)
+    capabilities: Sequence[str] = CAPABILITIES
+    assets: Sequence[str] = (ALLOWED,)
+    certificate: str = ""
+    key: str = ""
+    slowest_look: float = 1.0
+    diagnostics: bool = True
+    rosbridge: RosbridgeOptions = field(default_factory=RosbridgeOptions)
+    retry_delay: float | None = None
+    rosapi: bool = False
+    transforms: bool = False
+    """What clients of rosbridge want beside it: the services of rosapi, tf2_web_republisher."""
+    name: str = "minirospy bridge"
+    """The name of the Foxglove server."""
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What the listener of the Foxglove protocol serves in addition; ``pages`` are public: they need no token."""
+
+    doors: Sequence[Door] = ()
+    pages: Mapping[str, HttpHandler] = field(default_factory=dict)
+
+
+class Bridge:
+    """Opens the graph of a node to browsers. On the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        options: BridgeOptions | None = None,
+        playback: Playback | None = None,
+        addition: Addition | None = None,
+    ) -> None:
+        self.options = options or BridgeOptions()
+        self.node = node
+        self.graph = SharedGraph(
+            node,
+            self.options.filters,
+            slowest_look=self.options.slowest_look,
+            clock=playback.now if playback else None,
+        )
+        self.foxglove = FoxgloveDoor(
+            self.graph,
+            Assets(Packages(), self.options.assets),
+            FoxgloveOptions(
+                name=self.options.name,
+                capabilities=self.options.capabilities,
+                session_id=str(time.time_ns() // 1_000_000),
+                metadata={"ROS_DISTRO": DISTRO.strip(), "node": node.name},
+            ),
+            playback,
+        )
+        client_topics = ClientTopics(node)
+        self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge, client_topics.changed)
+        self._video = VideoPages(self.graph)
+        self._beside: list[ClientTopics | Rosapi | Republisher] = []
+        if self.options.rosbridge_port is not None:
+            self._beside.append(client_topics)
+        self._addition = addition or Addition()
+        self._account = Account(self.options.limits.memory)
+        self.listeners: dict[str, Listener] = {}
+        self._started = time.monotonic()
+        self._reporting: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Listen. Raises BridgeError."""
+        tls = self._tls()
+        served: list[tuple[str, list[Door], int | None]] = [
+            ("foxglove", [self.foxglove, *self._addition.doors], self.options.foxglove_port),
+            ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
+            ("video", [], self.options.video_port),
+        ]
+        for name, doors, port in served:
+            if port is not None:
+                public = self._addition.pages if name == "foxglove" else {}
+                self.listeners[name] = await self._listen(doors, port, tls, public)
+        await self._start_beside()
+        if self.options.diagnostics:
+            self._reporting = asyncio.ensure_future(self._report())
+
+    async def _listen(
+        self, doors: list[Door], port: int, tls: ssl.SSLContext | None, public: Mapping[str, HttpHandler]
+    ) -> Listener:
+        """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
+        listener = Listener(
+            doors,
+            self.options.access,
+            limits=self.options.limits,
+            pages={**self._video.handlers, "/status": self._status_page},
+            public_pages=public,
+            tls=tls,
+            account=self._account,
+        )
+        while True:
+            try:
+                await listener.open(self.options.address, port)
+            except BridgeError as error:
+                if self.options.retry_delay is None:
+                    raise
+                delay = self.options.retry_delay
+                self.node.log.warning("Unable to start server: %s. Retrying in %gs.", error, delay)
+                await asyncio.sleep(delay)
+            else:
+                return listener
+
+    async def _start_beside(self) -> None:
+        """Offer what clients of rosbridge want beside it, unless another node does."""
+        graph = await fetch(self.node._node.master)
+        if self.options.rosapi and "/rosapi/topics" not in graph.services:
+            from minirospy.web.rosapi.services import Rosapi
+
+            self._beside.append(Rosapi(self.node, self.options.filters))
+        if self.options.transforms and "/republish_tfs" not in graph.services:
+            from minirospy.web.tf_republisher.republisher import Republisher
+
+            self._beside.append(Republisher(self.node))
+        for part in self._beside:
+            await part.start()
+
+    async def close(self) -> None:
+        """Disconnect all clients. Idempotent."""
+        if self._reporting:
+            self._reporting.cancel()
+            await asyncio.gather(self._reporting, return_exceptions=True)
+        parts = [*self.listeners.values(), self.rosbridge, *self._beside, self.graph]
+        await close_all([part.close for part in parts])
+
+    def status(self) -> dict[str, object]:
+        """Return what the bridge serves and to whom, as JSON has it."""
+        clients = []
+        for door, listener in self.listeners.items():
+            for connection in listener.connections:
+                if connection.client:
+                    queue = connection.queue
+                    clients.append(
+                        {
+                            "door": door,
+                            "address": connection.peer,
+                            "protocol": connection.client.subprotocol or "",
+                            "rights": connection.client.grant.value,
+                            "seconds": round(time.monotonic() - connection.traffic.since, 1),
+                            "sent": queue.sent,
+                            "sent_bytes": queue.sent_bytes,
+                            "waiting": len(queue),
+                            "waiting_bytes": queue.size + queue.answers,
+                            "dropped": queue.dropped,
+                            "received": connection.traffic.received,
+                            "received_bytes": connection.traffic.received_bytes,
+                            "held_back": connection.traffic.held_back,
+                        }
+                    )
+
+        return {
+            "node": self.node.name,
+            "seconds": round(time.monotonic() - self._started, 1),
+            "doors": {
+                door: {
+                    "address": listener.host,
+                    "port": listener.port,
+                    "encrypted": listener.is_encrypted,
+                    "connections": len(listener.connections),
+                    "refused": listener.refused,
+                }
+                for door, listener in self.listeners.items()
+            },
+            "topics": {
+                topic: {"received": shared.received, "received_bytes": shared.received_bytes}
+                for topic, shared in self.graph.topics.items()
+            },
+            "clients": clients,
+        }
+
+    def _tls(self) -> ssl.SSLContext | None:
+        if not self.options.certificate:
+            if self.options.key:
+                raise BridgeError("a key is given without its certificate: give both PEM files")
+            return None
+        try:
+            return tls_context(self.options.certificate, self.options.key)
+        except OSError as error:  # ssl.SSLError is one
+            name = error.filename or f"{self.options.certificate} {self.options.key}".strip()
+            raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
+
+    def _status_page(self, exchange: Exchange) -> None:
+        exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
+
+    async def _report(self) -> None:
+        """Publish the state of the clients as diagnostics, every second while there are any."""
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)
+        faults = Faults(self.node.log, "publishing the state of the clients")
+        await keep_running(partial(self._publish_states, publisher), faults)
+
+    async def _publish_states(self, publisher: Publisher[DiagnosticArray]) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+        before: Mapping[str, int] = {}
+        while True:
+            await asyncio.sleep(_DIAGNOSTICS_SECONDS)
+            dropped: dict[str, int] = {}
+            array = DiagnosticArray()
+            array.header.stamp = self.node.now()
+            for door, listener in self.listeners.items():
+                for connection in listener.connections:
+                    if not connection.client:
+                        continue
+                    queue, name = connection.queue, f"{connection.peer} {id(connection):x}"
+                    dropped[name] = queue.dropped
+                    lost = queue.dropped - before.get(name, 0)
+                    values = {
+                        "sent": queue.sent,
+                        "sent bytes": queue.sent_bytes,
+                        "waiting bytes": queue.size,
+                        "dropped": queue.dropped,
+                        "received": connection.traffic.received,
+                    }
+                    array.status.append(
+                        DiagnosticStatus(
+                            level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
+                            name=f"{self.node.name.lstrip('/')}: {door} client {connection.peer}",
+                            message=f"{lost} messages dropped in a second" if lost else "all messages sent",
+                            hardware_id=connection.peer,
+                            values=[KeyValue(key, str(value)) for key, value in values.items()],
+                        )
+                    )
+            before = dropped
+            if array.status:
+                with contextlib.suppress(Exception):
+                    await publisher.publish(array)

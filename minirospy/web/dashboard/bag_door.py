@@ -1,0 +1,348 @@
+"""Bags for the page: recording topics, and looking into a bag and playing it, by JSON over WebSocket.
+
+A client sends ``{"op": NAME, ...}``: list; record {topics, name, suffix, compression}, stop; open {name}, close;
+play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {topics}; density {start, end, bins};
+thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
+``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the message of the moment, 2 one for a
+thumbnail), the topic's number (u16), its time (f64), the serialized message.
+Times are seconds since the bag's start. Only a client that has the read-write token may do any of it: files are read and written
+as the user of the dashboard.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from minirospy.base.errors import BagError, MinirospyError, UsageError
+from minirospy.web.dashboard.bag_folder import BagFolder
+from minirospy.web.dashboard.bag_player import GraphStage, OpenBag
+from minirospy.web.dashboard.json_session import (
+    Fields,
+    Handler,
+    JsonDoor,
+    JsonSession,
+    number,
+    text_of,
+    texts_of,
+)
+from minirospy.web.dashboard.recording import Recording
+
+if TYPE_CHECKING:
+    from minirospy.web.graph import SharedGraph
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["SUBPROTOCOL", "BagDoor", "BagSession"]
+
+SUBPROTOCOL = "minirospy.core.bag.v1"
+
+_PLAYING_SECONDS = 0.05
+_RECORDING_SECONDS = 0.25
+_MOST_BINS = 4000
+_MOST_THUMBNAILS = 60
+_LEAST_RATE, _MOST_RATE = 0.1, 10.0
+_HEAD = struct.Struct("<BHd")
+_MOMENT, _THUMBNAIL = 1, 2
+_SECOND = 10**9
+
+
+class BagDoor(JsonDoor["BagSession"]):
+    """Serves the bags of a folder; all clients see the same recording."""
+
+    def __init__(self, folder: BagFolder, master_uri: str, graph: Callable[[], SharedGraph]) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: BagSession(self, client))
+        self.folder = folder
+        self.graph = graph
+        self.recording: Recording | None = None
+        self._master_uri = master_uri
+        self._starting: asyncio.Task[None] | None = None
+
+    async def record(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
+        """Start a recording. Raise MinirospyError."""
+        is_starting = self._starting and not self._starting.done()
+        if is_starting or (self.recording and not self.recording.state().is_ended):
+            raise UsageError("there is a recording already: stop it first")
+        # The page may be closed meanwhile: its child must not be lost.
+        self._starting = self.spawn(self._start(name, suffix, topics, compression))
+        await asyncio.shield(self._starting)
+
+    async def _start(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
+        await self._close_recording()
+        path = self.folder.new_file(name, suffix)
+        start = partial(Recording, path, topics, compression, self._master_uri)
+        self.recording = await asyncio.get_running_loop().run_in_executor(None, start)
+        self.changed()
+
+    async def stop(self) -> None:
+        """Complete the recording, if there is one, or one is being started."""
+        if self._starting:
+            await asyncio.wait([self._starting])
+        if self.recording:
+            await self.recording.stop()
+            self.changed()
+
+    async def close(self) -> None:
+        """End all sessions, whose connections have ended, and complete the recording."""
+        await super().close()
+        await self._close_recording()
+
+    async def _close_recording(self) -> None:
+        recording, self.recording = self.recording, None
+        if recording:
+            await recording.stop()
+
+
+class BagSession(JsonSession):
+    """One client. What reads files blocks, so it runs in the thread of the session."""
+
+    subject: ClassVar[str] = "bags"
+    owners_only: ClassVar[str] = "record or open bags"
+
+    def __init__(self, door: BagDoor, client: WebClient) -> None:
+        self._door = door
+        self._bag: OpenBag | None = None
+        self._shown: dict[str, int] = {}
+        """Topics whose messages are sent, and the time of the last one, -1 before."""
+        self._thumbnails: deque[tuple[str, int]] = deque()
+        self._sent: dict[str, str] = {}
+        handlers: Mapping[str, Handler] = {
+            "list": self._list,
+            "record": self._record,
+            "stop": self._stop,
+            "open": self._open,
+            "close": self._close,
+            "play": self._play,
+            "step": self._step,
+            "back": self._back,
+            "publish": self._publish,
+            "show": self._show,
+            "density": self._density,
+            "thumbnails": self._request_thumbnails,
+        }
+        super().__init__(client, handlers)
+
+    async def follow(self) -> float | None:
+        """Send the recording's state, the player's, the messages of the moment that are shown, a thumbnail that waits."""
+        recording = self._door.recording
+        state = recording.state() if recording else None
+        self._send_changed("recording", state._asdict() if state else None)
+        pause = _RECORDING_SECONDS if state and not state.is_ended else None
+        if self._bag:
+            await self._follow_bag(self._bag)
+        if self._bag:
+            now = self._bag.state
+            pause = pause if now.is_paused or now.is_at_end else _PLAYING_SECONDS
+        return 0.0 if self._thumbnails else pause
+
+    async def left(self) -> None:
+        """End the player, and close the bag."""
+        await self._close_bag()
+
+    # --- recording
+
+    async def _list(self, _: Fields) -> Fields:
+        bags = await self.in_thread(self._door.folder.bags)
+        folder = self._door.folder
+        rows = [[bag.name, bag.size, bag.modified] for bag in bags]
+        return {"files": rows, "folder": str(folder.root), "given": folder.given}
+
+    async def _record(self, fields: Fields) -> None:
+        suffix = text_of(fields, "suffix")
+        if suffix not in (".bag", ".mcap"):
+            raise UsageError(f"recordings are .bag or .mcap, not '{suffix[:20]}'")
+        await self._door.record(
+            text_of(fields, "name"), suffix, texts_of(fields, "topics"), text_of(fields, "compression")
+        )
+
+    async def _stop(self, fields: Fields) -> Fields:
+        await self._door.stop()
+        return await self._list(fields)
+
+    # --- a bag
+
+    def _opened(self) -> OpenBag:
+        if self._bag is None:
+            raise UsageError("no bag is open")
+        return self._bag
+
+    async def _open(self, fields: Fields) -> Fields:
+        await self._close_bag()
+        name = text_of(fields, "name")
+        stage = GraphStage(self._door.graph())
+
+        def opening() -> OpenBag:
+            path = self._door.folder.path_of(name)
+            try:
+                return OpenBag(path, name, stage, self.post_change)
+            except BagError as error:
+                text = str(error)
+                raise BagError(text if text.startswith(name) else f"{name}: {text}") from error
+
+        future = self._thread.submit(opening)
+        try:
+            bag = self._bag = await asyncio.wrap_future(future)
+        except asyncio.CancelledError:
+            # The page was closed meanwhile: what is opened for nobody is closed in that thread.
+            future.add_done_callback(_close_opened)
+            raise
+        start, end = bag.span
+        topics = [
+            [
+                topic.name,
+                topic.connections[0].type,
+                topic.messages,
+                topic.connections[0].definition,
+                topic.is_latched,
+            ]
+            for topic in bag.timeline.topics.values()
+        ]
+        return {"bag": {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}}
+
+    async def _close(self, _: Fields) -> None:
+        await self._close_bag()
+
+    async def _close_bag(self) -> None:
+        bag, self._bag = self._bag, None
+        self._shown.clear()
+        self._thumbnails.clear()
+        self._sent.pop("state", None)
+        if bag:
+            bag.stage.close()
+            # A client that leaves now cancels the waiting, not the closing.
+            await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
+
+    async def _play(self, fields: Fields) -> None:
+        bag = self._opened()
+        rate = fields.get("rate")
+        seek = fields.get("seek")
+        if rate is not None and not _LEAST_RATE <= number(rate) <= _MOST_RATE:
+            raise UsageError(f"the speed is between {_LEAST_RATE:g} and {_MOST_RATE:g}")
+        bag.player.control(
+            is_paused=_flag(fields, "paused"),
+            rate=None if rate is None else number(rate),
+            seek=None if seek is None else self._time(bag, seek),
+            is_looping=_flag(fields, "looping"),
+        )
+
+    async def _step(self, _: Fields) -> None:
+        bag = self._opened()
+        bag.player.control(is_paused=True)
+        now = bag.state.time
+        # All messages of one time are a step; after a seek those of that very moment are shown already, and not published yet.
+        count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
+        after = bag.timeline.time_after(now)
+        if after is not None:
+            bag.player.step(count + bag.timeline.count_at(after))
+
+    async def _back(self, _: Fields) -> None:
+        bag = self._opened()
+        before = bag.timeline.time_before(bag.state.time)
+        if before is not None:
+            bag.player.control(is_paused=True, seek=before)
+
+    async def _publish(self, fields: Fields) -> None:
+        bag = self._opened()
+        topics = [each for each in texts_of(fields, "topics") if each in bag.timeline.topics]
+        new = set(topics) - set(bag.stage.published)
+        for line in bag.stage.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
+            self.send_error(line)
+        bag.player.control(has_clock=bag.stage.has_clock)
+        # What was latched before would never reach those who subscribe now.
+        time = bag.state.time
+        for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
+            bag.stage.send(topic, body)
+
+    # --- what is shown
+
+    async def _show(self, fields: Fields) -> None:
+        bag = self._opened()
+        self._shown = {topic: -1 for topic in texts_of(fields, "topics") if topic in bag.timeline.topics}
+
+    async def _density(self, fields: Fields) -> Fields:
+        bag = self._opened()
+        bins = min(max(int(number(fields["bins"])), 1), _MOST_BINS)
+        start, end = (self._time(bag, fields[name]) for name in ("start", "end"))
+
+        def count() -> dict[str, list[int]]:
+            return {name: bag.timeline.density(name, start, end, bins) for name in bag.timeline.topics}
+
+        rows = await self.in_thread(count)
+        first = bag.span[0]
+        found = {"start": (start - first) / 1e9, "end": (end - first) / 1e9, "rows": rows}
+        return {"density": found}
+
+    async def _request_thumbnails(self, fields: Fields) -> None:
+        bag = self._opened()
+        topic = text_of(fields, "topic")
+        times = fields["times"]
+        if topic not in bag.timeline.topics or not isinstance(times, list):
+            raise UsageError(f"'{topic[:200]}' is not a topic of this bag")
+        self._thumbnails = deque(each for each in self._thumbnails if each[0] != topic)
+        self._thumbnails += [(topic, self._time(bag, each)) for each in times[:_MOST_THUMBNAILS]]
+
+    async def _follow_bag(self, bag: OpenBag) -> None:
+        state = bag.state
+        if bag.failure:
+            self.send_error(bag.failure)
+            bag.failure = ""
+        self._send_changed(
+            "state",
+            {
+                "time": (state.time - bag.span[0]) / 1e9,
+                "rate": state.rate,
+                "paused": state.is_paused,
+                "ended": state.is_at_end,
+                "looping": bag.player.is_looping,
+                "published": bag.stage.published,
+                "clock": bag.stage.has_clock,
+            },
+        )
+
+        for topic, before in list(self._shown.items()):
+            when = bag.timeline.time_at(topic, state.time)
+            if when is not None and when != before:
+                self._shown[topic] = when
+                await self._send_message(bag, _MOMENT, topic, when)
+        if self._thumbnails:
+            await self._send_message(bag, _THUMBNAIL, *self._thumbnails.popleft())
+
+    async def _send_message(self, bag: OpenBag, kind: int, topic: str, time: int) -> None:
+        try:
+            message = await self.in_thread(lambda: bag.timeline.message_at(topic, time))
+        except (MinirospyError, OSError, ValueError) as error:
+            self.send_error(f"{bag.name}: {topic}: {error}")
+            return
+        if message is None:
+            return
+        place = list(bag.timeline.topics).index(topic)
+        head = _HEAD.pack(kind, place, (message.time - bag.span[0]) / 1e9)
+        key = (kind, topic) if kind == _MOMENT else (kind, topic, time)
+        self.client.send_message(key, head, message.body, newest_only=True)
+
+    @staticmethod
+    def _time(bag: OpenBag, seconds: object) -> int:
+        """Return the bag's time of a client's number."""
+        start, end = bag.span
+        return min(max(start + round(number(seconds) * _SECOND), start), end)
+
+    def _send_changed(self, name: str, value: object) -> None:
+        text = json.dumps({name: value})
+        if self._sent.get(name) != text:
+            self._sent[name] = text
+            self.client.send_text_message(name, text.encode(), newest_only=True)
+
+
+def _close_opened(future: Future[OpenBag]) -> None:
+    if not future.cancelled() and not future.exception():
+        future.result().close()
+
+
+def _flag(fields: Fields, name: str) -> bool | None:
+    value = fields.get(name)
+    return None if value is None else bool(value)

@@ -1,0 +1,226 @@
+"""One opened bag: its contents by time, and the player of `rosbag play`, whose stage is the dashboard's graph."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable, Collection, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from minirospy.base.errors import BagError, BagUnindexedError, BridgeError, MinirospyError
+from minirospy.core.bag.base import StoredMessage
+from minirospy.core.bag.records import Connection
+from minirospy.core.bag.timeline import Timeline
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.recording.player import Player, PlayerState
+from minirospy.recording.schedule import PlayOptions
+from minirospy.recording.sources import Bags, open_reader
+from minirospy.recording.stage import CLOCK, Controls
+
+if TYPE_CHECKING:
+    from minirospy.web.graph import Publication, SharedGraph
+
+__all__ = ["GraphStage", "OpenBag"]
+
+_log = logging.getLogger(__name__)
+
+_SECOND = 10**9
+_MOST_WAITING = 200
+"""Messages that wait for the loop; then the player waits, too."""
+
+
+class GraphStage:
+    """Publishes what a player plays into a graph of a loop: the topics that are switched on, and the clock."""
+
+    def __init__(self, graph: SharedGraph) -> None:
+        """On the loop."""
+        self._graph = graph
+        self._loop = asyncio.get_running_loop()
+        self._publications: dict[str, Publication] = {}
+        self._clock: Publication | None = None
+        self._free = threading.BoundedSemaphore(_MOST_WAITING)
+        self._is_closed = threading.Event()
+
+    # --- on the loop
+
+    @property
+    def published(self) -> list[str]:
+        """Return the topics that are switched on."""
+        return sorted(self._publications)
+
+    @property
+    def has_clock(self) -> bool:
+        """Return whether the clock is published."""
+        return self._clock is not None
+
+    def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
+        """Publish these topics from now on, and no others; return one line for each that cannot be published."""
+        refused = []
+        for topic in [each for each in self._publications if each not in topics]:
+            self._publications.pop(topic).close()
+        for topic in topics:
+            if topic in self._publications:
+                continue
+            connection = timeline.topics[topic].connections[0]
+            type_ = InterfaceType(connection.type, connection.md5sum, connection.definition)
+            try:
+                self._publications[topic] = self._graph.advertise(
+                    topic, type_, latch=timeline.topics[topic].is_latched
+                )
+            except BridgeError as error:
+                refused.append(str(error))
+
+        if clock and self._clock is None:
+            from rosgraph_msgs.msg import Clock
+
+            try:
+                self._clock = self._graph.advertise("/clock", InterfaceType.of(Clock))
+            except BridgeError as error:
+                refused.append(str(error))
+        elif not clock and self._clock:
+            self._clock.close()
+            self._clock = None
+        return refused
+
+    def send(self, topic: str, body: bytes) -> None:
+        """Publish a message, if its topic is switched on."""
+        publication = self._publications.get(topic)
+        if publication:
+            publication.publish(body)
+
+    def close(self) -> None:
+        """Publish nothing any more. Idempotent."""
+        self._is_closed.set()
+        for publication in self._publications.values():
+            publication.close()
+        self._publications.clear()
+        if self._clock:
+            self._clock.close()
+            self._clock = None
+
+    # --- in the player's thread
+
+    def open(self, player: Controls) -> None:
+        """See :meth:`Stage.open`: the session ends the player."""
+
+    def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
+        """See :meth:`Stage.advertise`: that is done when a topic is switched on."""
+
+    def offer(self, player: Controls) -> None:
+        """See :meth:`Stage.offer`: the page controls the player."""
+
+    def has_all_subscribers(self) -> bool:
+        """See :meth:`Stage.has_all_subscribers`."""
+        return True
+
+    def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
+        """See :meth:`Stage.running`: there are no keys, and the process has other work."""
+        return nullcontext()
+
+    def publish(self, number: int, message: StoredMessage) -> None:
+        """See :meth:`Stage.publish`."""
+        topic = message.connection.topic
+        if topic in self._publications:
+            self._post(lambda: self.send(topic, message.body))
+
+    def publish_clock(self, time: int) -> None:
+        """See :meth:`Stage.publish_clock`."""
+        if self._clock:
+            self._post(lambda: self._send_clock(time))
+
+    def waiting_bytes(self) -> int:
+        """See :meth:`Stage.waiting_bytes`: they are taken when the playing has ended, too."""
+        return 0
+
+    def print(self, text: str, end: str = "\n") -> None:
+        """See :meth:`Stage.print`: nothing is printed, the page shows the state."""
+
+    def _send_clock(self, time: int) -> None:
+        if self._clock:
+            self._clock.publish(CLOCK.pack(*divmod(time, _SECOND)))
+
+    def _post(self, send: Callable[[], None]) -> None:
+        """Have the loop publish; wait while it is behind."""
+
+        def run() -> None:
+            self._free.release()
+            send()
+
+        while not self._free.acquire(timeout=0.2):
+            if self._is_closed.is_set():
+                return
+        try:
+            self._loop.call_soon_threadsafe(run)
+        except RuntimeError:
+            # The loop has ended.
+            self._free.release()
+
+
+class OpenBag:
+    """A bag that is shown: a timeline, and a player that is paused at its start. Methods block: not on the loop.
+
+    ``on_change`` is called in the player's thread when that has moved, or ended. Raise BagError, OSError.
+    """
+
+    def __init__(
+        self, path: Path, name: str, stage: GraphStage, on_change: Callable[[], object] = lambda: None
+    ) -> None:
+        self.name = name
+        self.stage = stage
+        self.failure = ""
+        """Why the playing has ended, if it has."""
+        self._files = ExitStack()
+        with ExitStack() as opened:
+            try:
+                self.timeline = Timeline(open_reader(path, opened))
+                self.span = self.timeline.span or (0, 0)
+                self._bags = opened.enter_context(Bags([str(path)]))
+            except BagUnindexedError as error:
+                raise BagError(f"{name}: {error}. Run `rosbag reindex {name}`") from error
+            self._files = opened.pop_all()
+        self._is_ready = threading.Event()
+        options = PlayOptions(paused=True, delay=0, quiet=True)
+        self.player = Player(self._bags, options, lambda first, last: self._is_ready.set(), stage)
+        self.player.on_change = self._on_change = on_change
+        self._thread = threading.Thread(target=self._play, name="bag-player", daemon=True)
+        if self.timeline.topics:
+            self._thread.start()
+            # Before that it cannot be controlled.
+            self._is_ready.wait()
+
+    @property
+    def state(self) -> PlayerState:
+        """Return the state of the player; its time is in the bag from the first moment on. From any thread."""
+        found = self.player.state()
+        return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
+
+    def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
+        """Return the last message of each of these topics that is latched, which late subscribers need."""
+        return [
+            (topic, message.body)
+            for topic in topics
+            if self.timeline.topics[topic].is_latched
+            and (message := self.timeline.message_at(topic, time)) is not None
+        ]
+
+    def close(self) -> None:
+        """End the player, and close the file."""
+        self.player.end()
+        if self._thread.ident is not None:
+            self._thread.join()
+        self._files.close()
+
+    def _play(self) -> None:
+        try:
+            self.player.run()
+        except (MinirospyError, OSError) as error:
+            self.failure = str(error)
+        except Exception:  # noqa: BLE001 - the page shows that the player has ended
+            self.failure = "the player failed: the terminal of the dashboard shows why"
+            _log.exception("the player of %s", self.name)
+        finally:
+            self._is_ready.set()
+            self._on_change()

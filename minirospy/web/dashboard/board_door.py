@@ -1,0 +1,168 @@
+"""The virtual board for the page: its lights, buttons and person, by JSON over WebSocket.
+
+The server sends ``{"name", "boards", "leds": [[pin, color, level]], "buttons": [[pin, level]], "pins": [[pin, function, level]],
+"person": [x, y] | null, "fields": [...], "writes"}`` whenever something has changed; a client sends ``{"press": pin}``,
+``{"release": pin}`` and ``{"person": [x, y] | null}``. What a client holds down is released when it disconnects.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Mapping
+from concurrent.futures import Future
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from minirospy.base.errors import BoardError
+from minirospy.board.board import Board
+from minirospy.board.model import BUTTONS, LEDS, PINS, Function
+from minirospy.board.place import Place
+from minirospy.board.scanner import FIELDS
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number
+
+if TYPE_CHECKING:
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["SUBPROTOCOL", "BoardDoor", "BoardSession"]
+
+SUBPROTOCOL = "minirospy.board.v1"
+
+_log = logging.getLogger(__name__)
+
+_LOOK_SECONDS = 0.02
+
+
+class BoardDoor(JsonDoor["BoardSession"]):
+    """Serves boards of this machine; each client names its own, ``?board=NAME``."""
+
+    def __init__(self) -> None:
+        super().__init__(SUBPROTOCOL, BoardSession)
+
+
+class BoardSession(JsonSession):
+    """One client. The board's calls block, so they run in the thread of the session."""
+
+    subject: ClassVar[str] = "the board"
+    longest: ClassVar[int] = 1000
+    pace: ClassVar[float] = _LOOK_SECONDS
+
+    def __init__(self, client: WebClient) -> None:
+        self._pressed: set[int] = set()
+        self._opening: Future[Board] | None = None
+        self._board: Board | None = None
+        self._boards: list[str] = []
+        self._sent = ""
+        handlers: Mapping[str, Handler] = {
+            "press": self._press,
+            "release": self._release,
+            "person": self._move_person,
+        }
+        super().__init__(client, handlers)
+
+    def refusal(self) -> str:
+        """See :meth:`JsonSession.refusal`."""
+        return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
+
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        (name,) = fields
+        return name, fields
+
+    async def started(self) -> None:
+        """Open the board."""
+        name = self.client.request.query.get("board") or None
+        try:
+            place = Place.find(name)
+            self._boards = await self.in_thread(place.names)
+            # A board that is opened is started where it does not run: a program.
+            if name and name not in self._boards and not self.client.is_owner:
+                raise BoardError(
+                    f"there is no board [{place.name}]: {self.client.why_not_owner('start boards')}"
+                )
+            self._opening = self._thread.submit(Board, name)
+            self._board = await asyncio.wrap_future(self._opening)
+            self._boards = await self.in_thread(place.names)
+        except BoardError as error:
+            self.send_error(str(error))
+
+    async def follow(self) -> float | None:
+        """Send what has changed."""
+        if self._board is None:
+            return None
+        state = {**state_of(self._board), "boards": self._boards, "writes": self.client.may_write}
+        text = json.dumps(state)
+        if text != self._sent:
+            self._sent = text
+            self.client.send_text_message("board", text.encode(), newest_only=True)
+        return _LOOK_SECONDS
+
+    async def left(self) -> None:
+        """Release what the client holds down, and disconnect from the board."""
+        if self._opening:
+            await asyncio.wrap_future(self._thread.submit(_leave, self._opening, self._pressed))
+
+    async def _press(self, fields: Fields) -> None:
+        pin = _pin(fields["press"])
+        # Released in any case, also where the client leaves before the answer.
+        self._pressed.add(pin)
+        await self.in_thread(partial(self._opened().press, pin))
+
+    async def _release(self, fields: Fields) -> None:
+        pin = _pin(fields["release"])
+        await self.in_thread(partial(self._opened().release, pin))
+        self._pressed.discard(pin)
+
+    async def _move_person(self, fields: Fields) -> None:
+        place = fields["person"]
+        if place is not None and not (isinstance(place, list) and len(place) == 2):
+            raise TypeError("a person is at [x, y]")
+        position = (number(place[0]), number(place[1])) if place else None
+        await self.in_thread(partial(self._opened().move_person, position))
+
+    def _opened(self) -> Board:
+        if self._board is None:
+            raise BoardError("the board is not open")
+        return self._board
+
+
+def state_of(board: Board) -> dict[str, object]:
+    """Return what the page shows of a board."""
+    state = board.state()
+    wired = {*LEDS, *BUTTONS}
+    others = [
+        [pin, "out" if each.function is Function.OUT else "in", each.level]
+        for pin, each in enumerate(state.pins)
+        if pin not in wired and (each.function is Function.OUT or each.level)
+    ]
+    return {
+        "name": state.name,
+        "leds": [[pin, color, state.level(pin)] for pin, color in LEDS.items()],
+        "buttons": [[pin, state.level(pin)] for pin in BUTTONS],
+        "pins": others,
+        "person": list(state.person) if state.person else None,
+        "fields": list(FIELDS),
+    }
+
+
+def _pin(value: object) -> int:
+    if not isinstance(value, int):
+        raise TypeError(f"{value!r:.40} is not a pin")
+    if not 0 <= value < PINS:
+        raise BoardError(f"pin {value!s:.40} does not exist: BCM numbers are 0 to {PINS - 1}")
+    return value
+
+
+def _leave(opening: Future[Board], pressed: set[int]) -> None:
+    """Release the buttons, and disconnect from the board, if it was opened; on the session's thread."""
+    if opening.cancelled() or opening.exception():
+        return
+    board = opening.result()
+    try:
+        for pin in pressed:
+            board.release(pin)
+    except BoardError as error:
+        _log.warning("a button could not be released: %s", error)
+    finally:
+        board.close()

@@ -1,0 +1,82 @@
+"""The dashboard as a whole: a bridge at one port, with the page and its doors in it."""
+
+from __future__ import annotations
+
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+from minirospy.aio.node import Node
+from minirospy.web.bridge import Addition, Bridge, BridgeOptions
+from minirospy.web.dashboard.bag_door import BagDoor
+from minirospy.web.dashboard.bag_folder import BagFolder
+from minirospy.web.dashboard.board_door import BoardDoor
+from minirospy.web.dashboard.codes import Codes
+from minirospy.web.dashboard.drive_door import DriveDoor
+from minirospy.web.dashboard.files import handlers, read_folder
+from minirospy.web.dashboard.joint_door import JointDoor
+from minirospy.web.dashboard.launch_door import LaunchDoor
+from minirospy.web.dashboard.rviz_door import RvizDoor
+from minirospy.web.dashboard.tools_door import ToolsDoor
+
+__all__ = ["PORT", "Dashboard"]
+
+PORT = 8766
+
+
+class Dashboard:
+    """Serves the page. On the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        options: BridgeOptions,
+        rviz_file: Path | None = None,
+        bags: BagFolder | None = None,
+        *,
+        publishes_joints: bool = False,
+    ) -> None:
+        """``options.foxglove_port`` is the port of the page and of its data; the 3D view opens ``rviz_file``.
+
+        ``bags`` are those that may be opened, of the working folder unless given. ``publishes_joints``: as
+        joint_state_publisher_gui does, also while no page is open.
+        """
+        master_uri = node._node.environment.master_uri
+        self.codes = Codes()
+        self._board = BoardDoor()
+        self.rviz = RvizDoor(rviz_file)
+        self._tools = ToolsDoor(master_uri)
+        self._bags = BagDoor(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
+        self._launches = LaunchDoor(master_uri)
+        self._joints = JointDoor(node, lambda: self.bridge.graph, always_publishes=publishes_joints)
+        driving = DriveDoor(lambda: self.bridge.graph)
+        own = (self.rviz, self._bags, self._launches, self._joints)
+        doors = (self._board, self._tools, driving, *own)
+        pages = {**handlers(read_folder()), "/token": self.codes.serve}
+        self.bridge = Bridge(node, options, addition=Addition(doors, pages))
+
+    @property
+    def port(self) -> int:
+        """Return the port of the page, once it is served."""
+        return self.bridge.listeners["foxglove"].port
+
+    async def start(self) -> None:
+        """Listen. Raises BridgeError."""
+        await self.bridge.start()
+        if self._joints.always_publishes:
+            self._joints.start_work()
+
+    async def close(self) -> None:
+        """Disconnect all clients. Idempotent."""
+        self.codes.close()
+        async with AsyncExitStack() as closing:
+            # In reverse, and all, whichever fails. Players publish until their sessions end, and the graph is the bridge's.
+            for part in (
+                self._tools,
+                self._board,
+                self.bridge,
+                self.rviz,
+                self._launches,
+                self._joints,
+                self._bags,
+            ):
+                closing.push_async_callback(part.close)

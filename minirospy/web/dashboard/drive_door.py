@@ -1,0 +1,331 @@
+"""Driving from the page: what a person holds is published, and zero as soon as the page lets go, is lost, or is silent.
+
+A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic", "axes": [...],
+"buttons": [...]}``, again and again while something is held, and ``{"leave": topic}`` for a topic that it drives no more. The
+server sends ``{"writes": bool}`` at first, ``{"stopped": topic}`` where it has stopped what was silent, and
+``{"error": text, "topic"}``.
+The last message of each topic is zero, whatever happens to the client: it is published by this process, and for a client that
+is silent by a thread of its own (:mod:`minirospy.runtime.stop_guard`), whatever holds up the event loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING, Protocol
+
+from minirospy.base.errors import BridgeError, ROSException
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.introspect.graph import why_illegal
+from minirospy.runtime.stop_guard import StopGuard
+
+if TYPE_CHECKING:
+    from minirospy.web.graph import Publication, SharedGraph
+    from minirospy.web.server.client import WebClient
+
+__all__ = [
+    "SILENT_SECONDS",
+    "SUBPROTOCOL",
+    "Command",
+    "DriveDoor",
+    "DriveSession",
+    "Joystick",
+    "Velocity",
+    "parse",
+]
+
+SUBPROTOCOL = "minirospy.drive.v1"
+
+SILENT_SECONDS = 0.5
+"""A client that holds something and sends nothing for this long is lost: what it drives is stopped."""
+
+_log = logging.getLogger(__name__)
+
+_MOST_TOPICS = 20
+_MOST_VALUES = 100
+_LONGEST = 20_000
+"""Characters of a command."""
+
+_LARGEST_AXIS = 3.4028234663852886e38
+"""Of a float32."""
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A geometry_msgs/Twist: metres a second, radians a second."""
+
+    values: tuple[float, ...]
+
+    @property
+    def is_zero(self) -> bool:
+        """Return whether nothing moves."""
+        return not any(self.values)
+
+    def zero(self) -> Velocity:
+        """Return that which stops."""
+        return Velocity((0.0,) * 6)
+
+
+@dataclass(frozen=True)
+class Joystick:
+    """A sensor_msgs/Joy: axes from -1 to 1, buttons that are 0 or 1."""
+
+    axes: tuple[float, ...]
+    buttons: tuple[int, ...]
+
+    @property
+    def is_zero(self) -> bool:
+        """Return whether nothing is held."""
+        return not any(self.axes) and not any(self.buttons)
+
+    def zero(self) -> Joystick:
+        """Return the same joystick with nothing held."""
+        return Joystick((0.0,) * len(self.axes), (0,) * len(self.buttons))
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a client sends: a topic, and what is to be published there; None: it drives the topic no more."""
+
+    topic: str
+    held: Velocity | Joystick | None
+
+
+def parse(text: str) -> Command:
+    """Return the command of a text. Raise ValueError."""
+    if len(text) > _LONGEST:
+        raise ValueError(f"it has more than {_LONGEST} characters")
+    try:
+        fields = json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deep") from None
+    if not isinstance(fields, Mapping):
+        raise ValueError("it is not an object")
+    names = set(fields)
+    if names == {"leave"}:
+        return Command(_topic(fields["leave"]), None)
+
+    if names == {"topic", "twist"}:
+        values = _numbers(fields["twist"])
+        if len(values) != 6:
+            raise ValueError("a twist has 6 numbers")
+        return Command(_topic(fields["topic"]), Velocity(values))
+    if names == {"topic", "axes", "buttons"}:
+        buttons = tuple(int(each) for each in _numbers(fields["buttons"]))
+        if not all(-(2**31) <= each < 2**31 for each in buttons):
+            raise ValueError("a button is 0 or 1")
+        axes = _numbers(fields["axes"])
+        if not all(abs(each) <= _LARGEST_AXIS for each in axes):
+            raise ValueError("an axis is from -1 to 1")
+        return Command(_topic(fields["topic"]), Joystick(axes, buttons))
+    raise ValueError(f"it has {', '.join(sorted(map(str, names)))[:80] or 'nothing'}")
+
+
+def _topic(value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise ValueError("a topic is a name")
+    why = why_illegal(value)
+    if why:
+        raise ValueError(f"topic [{value[:80]}]: {why}")
+    return value
+
+
+def _numbers(values: object) -> tuple[float, ...]:
+    if not isinstance(values, list) or len(values) > _MOST_VALUES:
+        raise ValueError(f"numbers are an array, of {_MOST_VALUES} at most")
+    try:
+        numbers = tuple(float(each) for each in values if isinstance(each, int | float))
+    except OverflowError:
+        numbers = ()
+    if len(numbers) != len(values) or not all(map(math.isfinite, numbers)):
+        raise ValueError("its numbers are not finite")
+    return numbers
+
+
+class DriveDoor:
+    """Opens a session for each client; ``graph`` returns the graph that they publish to."""
+
+    def __init__(self, graph: Callable[[], SharedGraph]) -> None:
+        self._graph = graph
+        self._guard = StopGuard()
+
+    def select(self, offered: Sequence[str]) -> str:
+        """Return the sub-protocol to use. Raise LookupError."""
+        if SUBPROTOCOL in offered:
+            return SUBPROTOCOL
+        raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
+
+    def open(self, client: WebClient) -> DriveSession:
+        """Start serving a client."""
+        return DriveSession(client, self._graph(), self._guard)
+
+
+class DriveSession:
+    """One client. On the loop."""
+
+    def __init__(self, client: WebClient, graph: SharedGraph, guard: StopGuard) -> None:
+        self._client = client
+        self._graph = graph
+        self._guard = guard
+        self._driven: dict[str, _Driven] = {}
+        self._send(writes=client.may_write)
+
+    def received_text(self, text: str) -> None:
+        """Carry out a command."""
+        if not self._client.may_write:
+            self._send(error="this token is read-only: it drives nothing")
+            return
+        try:
+            command = parse(text)
+        except ValueError as error:
+            self._send(error=f"not a command of driving: {error}")
+            return
+        try:
+            self._carry_out(command)
+        except BridgeError as error:
+            self._send(error=str(error), topic=command.topic)
+
+    def received_binary(self, data: bytes) -> None:
+        """Refuse what no client sends."""
+        self._send(error="binary messages have no meaning here")
+
+    def ended(self) -> None:
+        """Stop everything that the client drives, and leave it."""
+        for topic in list(self._driven):
+            try:
+                self._driven.pop(topic).close()
+            except Exception:  # noqa: BLE001 - whatever it is, the other topics are stopped
+                _log.exception("%s could not be stopped", topic)
+
+    def _carry_out(self, command: Command) -> None:
+        driven = self._driven.get(command.topic)
+        kind = type(command.held)
+        if driven and (command.held is None or driven.kind is not kind):
+            self._driven.pop(command.topic).close()
+            driven = None
+        if command.held is None:
+            return
+        if driven is None:
+            if len(self._driven) >= _MOST_TOPICS:
+                raise BridgeError(f"a client may drive {_MOST_TOPICS} topics")
+            driven = _Driven(self._graph, self._guard, command.topic, command.held, self._stopped)
+            self._driven[command.topic] = driven
+        driven.hold(command.held)
+
+    def _stopped(self, topic: str) -> None:
+        _log.warning("%s is stopped: its client %s is silent", topic, self._client.name)
+        self._send(stopped=topic)
+
+    def _send(self, **fields: object) -> None:
+        self._client.send_text(json.dumps(fields))
+
+
+class _Driven:
+    """A topic that a client drives. Commands come on the loop; the guard's thread stops what is silent."""
+
+    def __init__(
+        self,
+        graph: SharedGraph,
+        guard: StopGuard,
+        topic: str,
+        held: Velocity | Joystick,
+        stopped: Callable[[str], None],
+    ) -> None:
+        """Raise BridgeError where the topic may not be published, or has another type."""
+        self.kind = type(held)
+        self._graph = graph
+        self._guard = guard
+        self._topic = topic
+        self._stopped = stopped
+        self._loop = asyncio.get_running_loop()
+        self._lock = threading.Lock()
+        # For what follows: a command on the loop and the guard's zero are published one after the other.
+        self._last = held.zero()
+        self._deadline = math.inf
+        self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
+        self._joining: asyncio.Task[None] | None = None
+
+    def hold(self, held: Velocity | Joystick) -> None:
+        """Publish what is held; it is zero where no more comes in time. Raise BridgeError where nothing could stop it."""
+        deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
+        if held.is_zero:
+            self._guard.disarm(self._silent)
+        else:
+            # Before it moves: what cannot be stopped is not driven.
+            self._guard.arm(self._silent, deadline)
+        with self._lock:
+            self._deadline = deadline
+            self._publish(held)
+        if not self._publication.has_joined and self._joining is None:
+            self._joining = self._graph.spawn(self._publish_joined())
+
+    def close(self) -> None:
+        """Stop, and leave the topic."""
+        self._guard.disarm(self._silent)
+        with self._lock:
+            self._deadline = math.inf
+            if not self._last.is_zero:
+                self._publish(self._last.zero())
+        if self._joining and not self._joining.done():
+            # The zero is published by that task; the topic stays until then.
+            self._joining.add_done_callback(lambda _: self._publication.close())
+        else:
+            self._publication.close()
+
+    def _silent(self) -> None:
+        """Stop what is silent, in the guard's thread."""
+        with self._lock:
+            if self._deadline > time.monotonic():
+                return  # a command has come at this moment, or the topic was left
+            self._deadline = math.inf
+            # The topic is closed where the node has ended: then nothing is published there any more.
+            with contextlib.suppress(ROSException):
+                self._publish(self._last.zero())
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._stopped, self._topic)
+
+    def _publish(self, held: Velocity | Joystick) -> None:
+        """Publish now, or, while subscribers are being connected, the newest as soon as they are. With the lock."""
+        self._last = held
+        if self._publication.has_joined:
+            self._publication.publish(self._body())
+
+    async def _publish_joined(self) -> None:
+        await self._publication.joined()
+        with self._lock:
+            self._publication.publish(self._body())
+
+    def _body(self) -> bytes:
+        buffer = BytesIO()
+        _message_of(self._last, self._graph).serialize(buffer)
+        return buffer.getvalue()
+
+
+class _Message(Protocol):
+    def serialize(self, buff: BytesIO) -> None: ...
+
+
+def _type_of(held: Velocity | Joystick) -> InterfaceType:
+    from geometry_msgs.msg import Twist
+    from sensor_msgs.msg import Joy
+
+    return InterfaceType.of(Twist if isinstance(held, Velocity) else Joy)
+
+
+def _message_of(held: Velocity | Joystick, graph: SharedGraph) -> _Message:
+    from geometry_msgs.msg import Twist, Vector3
+    from sensor_msgs.msg import Joy
+
+    if isinstance(held, Velocity):
+        return Twist(Vector3(*held.values[:3]), Vector3(*held.values[3:]))
+    message = Joy(axes=list(held.axes), buttons=list(held.buttons))
+    message.header.stamp = graph.node.now()
+    return message

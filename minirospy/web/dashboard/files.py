@@ -1,0 +1,82 @@
+"""The files of the page, and the headers that they are served with. Pure but for reading the folder once.
+
+Every path that is served is in a table that is made of the folder's files: a request cannot name another file.
+The page has no secrets, so it needs no token; its WebSocket does. Source: CSP level 3 (w3.org/TR/CSP3).
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.web.server.client import Exchange, HttpHandler
+
+__all__ = ["FOLDER", "SECURITY", "PageFile", "handlers", "read_folder"]
+
+FOLDER = Path(__file__).parent / "page"
+
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".txt": "text/plain; charset=utf-8",
+}
+"""What is served; other files of the folder are not."""
+
+SECURITY = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; worker-src 'self'; connect-src 'self'; "
+    "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    # The browser keeps the file, and compares its tag at each start: a new release is never mixed with an old one.
+    "Cache-Control": "no-cache",
+}
+"""The headers of the page: no inline script, nothing of other sites, not inside of other pages."""
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """One file: its bytes, the same compressed by gzip, its type and its tag (an ETag)."""
+
+    body: bytes
+    packed: bytes
+    content_type: str
+    tag: str
+
+
+def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
+    """Return the files by the path of their request; ``/`` is index.html."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        content_type = _TYPES.get(path.suffix)
+        if content_type is None or not path.is_file():
+            continue
+        body = path.read_bytes()
+        tag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+        file = PageFile(body, gzip.compress(body, 6, mtime=0), content_type, tag)
+        found["/" + path.relative_to(folder).as_posix()] = file
+    found["/"] = found["/index.html"]
+    return found
+
+
+def handlers(files: Mapping[str, PageFile]) -> dict[str, HttpHandler]:
+    """Return what answers the request of each file."""
+    return {path: partial(_serve, file) for path, file in files.items()}
+
+
+def _serve(file: PageFile, exchange: Exchange) -> None:
+    headers = {name.replace("-", "_"): value for name, value in SECURITY.items()}
+    headers |= {"ETag": file.tag, "Vary": "Accept-Encoding"}
+    if file.tag in exchange.request.headers.get("if-none-match", ""):
+        exchange.respond(304, b"", file.content_type, **headers)
+    elif "gzip" in exchange.request.headers.get("accept-encoding", ""):
+        exchange.respond(200, file.packed, file.content_type, Content_Encoding="gzip", **headers)
+    else:
+        exchange.respond(200, file.body, file.content_type, **headers)

@@ -1,0 +1,366 @@
+"""The joints of a robot for the page: joint_state_publisher_gui, with its sliders in a browser, by JSON over WebSocket.
+
+A client sends ``{"op": NAME, ...}``: set {positions: {joint: number}}, center, randomize, publish {on}, reload. The server sends
+``{"writes"}``, ``{"joints": {"robot", "rows", "rate", ...} or null, "why"}``, ``{"state": {"positions", "publishing",
+"others"}}`` and ``{"error"}``. All clients set the same joints. Parameters and zeros: see minirospy/robots/joint_parameters.py.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import math
+import random
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.errors import MinirospyError, ROSException, UrdfError, UsageError
+from minirospy.core.urdf.elements import parse_xml
+from minirospy.introspect.graph import why_illegal
+from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
+from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
+
+if TYPE_CHECKING:
+    from sensor_msgs.msg import JointState
+
+    from minirospy.aio.node import Node
+    from minirospy.aio.topics import Publisher
+    from minirospy.introspect.snapshot import Changes
+    from minirospy.web.graph import SharedGraph
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["SUBPROTOCOL", "JointDoor", "JointSession"]
+
+SUBPROTOCOL = "minirospy.joints.v1"
+
+_log = logging.getLogger(__name__)
+
+_RELOAD_SECONDS = 2.0
+_TOPIC = "joint_states"
+_FARTHEST = 1e6
+
+
+class JointDoor(JsonDoor["JointSession"]):
+    """Serves the joints of robot_description. ``always_publishes``: as the node joint_state_publisher_gui does."""
+
+    def __init__(
+        self, node: Node, graph: Callable[[], SharedGraph], *, always_publishes: bool = False
+    ) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: JointSession(self, client))
+        self.node = node
+        self.always_publishes = always_publishes
+        self.joints: JointStates | None = None
+        self.parameters: JointParameters | None = None
+        self.why = ""
+        """Why there are no joints."""
+        self.warnings: list[str] = []
+        self.kinds: dict[str, str] = {}
+        self.robot = ""
+        self.generation = 0
+        """Counts descriptions that were read."""
+        self.is_publishing = False
+        self._graph = graph
+        self._values: dict[str, object] = {}
+        self._publisher: Publisher[JointState] | None = None
+        self._working: asyncio.Task[None] | None = None
+        self._work_changed = asyncio.Event()
+        self._faults = Faults(_log, "following and publishing joints")
+        self._sources: list[asyncio.Task[None]] = []
+
+    # --- Door
+
+    def open(self, client: WebClient) -> JointSession:
+        """See :meth:`JsonDoor.open`."""
+        if not self.sessions:
+            self._graph().watch(self._graph_changed)
+        self.start_work()
+        return super().open(client)
+
+    def left(self, session: JointSession) -> None:
+        """See :meth:`JsonDoor.left`: nothing is published for nobody."""
+        if not self.sessions:
+            self._graph().unwatch(self._graph_changed)
+            self.publish(is_on=False)
+
+    def _graph_changed(self, _: Changes) -> None:
+        self.changed()
+
+    def publish(self, *, is_on: bool) -> None:
+        """Publish from now on, or no more. Raise UsageError where clients may not publish the topic."""
+        topic = self.node.resolve(_TOPIC)
+        if is_on and not self._graph().filters.publishable(topic):
+            raise UsageError(f"topic [{topic}] may not be published by clients")
+        self.is_publishing = is_on or self.always_publishes
+        self._work_changed.set()
+        self.changed()
+
+    async def close(self) -> None:
+        """End all sessions, and publish nothing any more. Idempotent."""
+        await super().close()
+        working, self._working = self._working, None
+        tasks = [*self._sources, *([working] if working else [])]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if self._publisher:
+            await self._publisher.close()
+            self._publisher = None
+
+    # --- the joints
+
+    def start_work(self) -> None:
+        """Follow the parameters, and publish where wanted, from now on, while there is somebody who wants that."""
+        if self._working is None or self._working.done():
+            self.is_publishing = self.is_publishing or self.always_publishes
+            self._working = asyncio.ensure_future(keep_running(self._work, self._faults))
+
+    async def _work(self) -> None:
+        loop = asyncio.get_running_loop()
+        next_load = loop.time()
+        next_message = loop.time()
+        self._follow(self._legal_sources())
+
+        while self.sessions or self.always_publishes or self._publisher:
+            self._work_changed.clear()
+            now = loop.time()
+            if now >= next_load:
+                next_load = now + _RELOAD_SECONDS
+                with contextlib.suppress(MinirospyError):  # no master for a while
+                    await self.load()
+            end = next_load
+            if self.parameters and self.is_publishing:
+                if loop.time() >= next_message:
+                    await self._publish()
+                    next_message = max(next_message + 1 / self.parameters.rate, loop.time())
+                end = min(end, next_message)
+            elif self._publisher:
+                publisher, self._publisher = self._publisher, None
+                await publisher.close()
+            await wait_until(self._work_changed, end)
+        # The next page follows them again.
+        self._follow([])
+
+    async def load(self, *, is_forced: bool = False) -> None:
+        """Read the parameters, and the description again where one has changed. Raise MinirospyError."""
+        private = await self.node.get_param("~", {})
+        values: dict[str, object] = {}
+        missing = object()
+        for name in NAMES:
+            if isinstance(private, dict) and name in private:
+                values[f"~{name}"] = private[name]
+            if f"~{name}" not in values or name == "zeros":
+                found = await self.node.get_param(name, missing)
+                if found is not missing:
+                    values[name] = found
+        if values == self._values and self.generation and not is_forced:
+            return
+
+        warnings: list[str] = []
+        zeros = [values.get(key, {}) for key in ("~zeros", "zeros")]
+        parameters: JointParameters | None = None
+        joints: JointStates | None = None
+        robot, kinds, missing_because = self.robot, self.kinds, ""
+        try:
+            parameters = read_parameters(
+                lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
+            )
+            # A large description takes seconds.
+            loop = asyncio.get_running_loop()
+            joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
+        except (JointError, UrdfError) as error:
+            parameters = None
+            missing_because = str(error)
+        warnings += [
+            f"The source_list parameter has [{topic[:200]}]: {why}"
+            for topic in (parameters.sources if parameters else [])
+            if (why := why_illegal(topic))
+        ]
+
+        # Clients are sent each generation once: it is complete before it is counted.
+        self._values, self.parameters, self.joints = values, parameters, joints
+        self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
+        self.generation += 1
+        self._follow(self._legal_sources())
+        self.changed()
+
+    def _legal_sources(self) -> list[str]:
+        sources = self.parameters.sources if self.parameters else []
+        return [topic for topic in sources if not why_illegal(topic)]
+
+    def _follow(self, topics: Sequence[str]) -> None:
+        """Follow these topics of source_list, and no others."""
+        from sensor_msgs.msg import JointState
+
+        for task in self._sources:
+            task.cancel()
+
+        async def follow(topic: str) -> None:
+            subscription = self.node.subscribe(topic, JointState)
+            try:
+                async for state in subscription:
+                    if self.joints:
+                        self.joints.update(state.name, state.position, state.velocity, state.effort)
+                        self.changed()
+            finally:
+                await subscription.close()
+
+        self._sources = [
+            asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)) for topic in topics
+        ]
+
+    async def _publish(self) -> None:
+        from sensor_msgs.msg import JointState
+
+        if not self.joints or not self.parameters:
+            return
+        if self._publisher is None:
+            self._publisher = self.node.advertise(_TOPIC, JointState, queue_size=5)
+        if self.parameters.delta > 0:
+            self.joints.advance(self.parameters.delta)
+        values = self.joints.values()
+        if values.name:
+            state = JointState(name=values.name, position=values.position)
+            state.velocity, state.effort = values.velocity, values.effort
+            state.header.stamp = self.node.now()
+            with contextlib.suppress(ROSException):  # the node is being shut down
+                await self._publisher.publish(state)
+        if self.parameters.delta > 0:
+            self.changed()
+
+    def set(self, positions: Mapping[str, float]) -> None:
+        """Set joints, within their limits. Raise UsageError on a joint that cannot be set."""
+        free = self._free()
+        for name in positions:
+            if name not in free:
+                raise UsageError(f"there is no joint [{name[:200]}] that can be set")
+        for name, position in positions.items():
+            free[name].position = min(max(position, free[name].lower), free[name].upper)
+        self.changed()
+
+    def center(self) -> None:
+        """Set all joints to their zeros."""
+        for joint in self._free().values():
+            joint.position = joint.zero
+        self.changed()
+
+    def randomize(self) -> None:
+        """Set all joints anywhere between their limits."""
+        for joint in self._free().values():
+            joint.position = random.uniform(joint.lower, joint.upper)
+        self.changed()
+
+    def _free(self) -> dict[str, FreeJoint]:
+        return self.joints.free if self.joints else {}
+
+    def description(self) -> dict[str, object]:
+        """Return what the page shows of the joints, but for their positions."""
+        joints, parameters = self.joints, self.parameters
+        if joints is None or parameters is None:
+            return {"joints": None, "why": self.why}
+        rows = []
+        for name in joints.names:
+            free = joints.free.get(name)
+            limits = [_finite(each) for each in (free.lower, free.upper, free.zero)] if free else None
+            rows.append([name, self.kinds.get(name, "revolute"), limits])
+        found = {
+            "robot": self.robot,
+            "rows": rows,
+            "rate": parameters.rate,
+            "sources": parameters.sources,
+            "warnings": self.warnings,
+            "topic": self.node.resolve(_TOPIC),
+            "always": self.always_publishes,
+        }
+        return {"joints": found, "why": ""}
+
+    def state(self) -> dict[str, object]:
+        """Return the positions of all joints, also of those that follow others, and who publishes."""
+        values = self.joints.values() if self.joints else None
+        # A source may publish what JSON does not have.
+        pairs = zip(values.name, values.position, strict=False) if values else ()
+        positions = {name: position if math.isfinite(position) else None for name, position in pairs}
+        publishers = self._graph().snapshot.publishers.get(self.node.resolve(_TOPIC), ())
+        others = [each for each in publishers if each != self.node.name]
+        return {"positions": positions, "publishing": self.is_publishing, "others": others}
+
+
+class JointSession(JsonSession):
+    """One client."""
+
+    subject: ClassVar[str] = "joints"
+
+    def __init__(self, door: JointDoor, client: WebClient) -> None:
+        self._door = door
+        self._generation = 0
+        self._sent = ""
+        handlers: Mapping[str, Handler] = {
+            "set": self._set,
+            "center": self._center,
+            "randomize": self._randomize,
+            "publish": self._publish,
+            "reload": self._reload,
+        }
+        super().__init__(client, handlers)
+
+    def refusal(self) -> str:
+        """See :meth:`JsonSession.refusal`."""
+        return "" if self.client.may_write else "this token is read-only: it sets no joints"
+
+    async def follow(self) -> None:
+        """Send the joints, where they have been read again, and their positions."""
+        if self._generation != self._door.generation:
+            self._generation = self._door.generation
+            self.send(self._door.description())
+        text = json.dumps({"state": self._door.state()})
+        if text != self._sent:
+            self._sent = text
+            self.client.send_text_message("state", text.encode(), newest_only=True)
+
+    async def _set(self, fields: Fields) -> None:
+        self._door.set(_positions(fields))
+
+    async def _center(self, _: Fields) -> None:
+        self._door.center()
+
+    async def _randomize(self, _: Fields) -> None:
+        self._door.randomize()
+
+    async def _publish(self, fields: Fields) -> None:
+        self._door.publish(is_on=bool(fields["on"]))
+
+    async def _reload(self, _: Fields) -> None:
+        await self._door.load(is_forced=True)
+
+
+def _finite(value: float) -> float:
+    """Return a number that JSON has: limits may be infinite."""
+    return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
+
+
+def _positions(fields: Fields) -> dict[str, float]:
+    positions = fields["positions"]
+    if not isinstance(positions, dict):
+        raise TypeError("positions is an object")
+    return {name: number(value) for name, value in positions.items()}
+
+
+def _described(
+    parameters: JointParameters, warn: Callable[[str], None]
+) -> tuple[JointStates, str, dict[str, str]]:
+    """Return the joints of the description, the robot's name and the kinds of joints. Raise UrdfError, JointError."""
+    joints = read_joints(parameters.description, parameters.options, warn)
+    return (joints, *_kinds(parameters.description))
+
+
+def _kinds(description: str) -> tuple[str, dict[str, str]]:
+    """Return the robot's name, and the types of its joints, which have different units."""
+    root = parse_xml(description, "robot_description")
+    kinds = {
+        joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")
+    }
+    return root.attributes.get("name", ""), kinds

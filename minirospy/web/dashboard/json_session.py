@@ -1,0 +1,365 @@
+"""Sessions of the page's doors: operations of a client come in as JSON, answers go out as JSON.
+
+A text is an object that names its operation, ``{"op": NAME, ...}``. A client that may not carry it out, a text that is too long
+or is not an operation, and whatever goes wrong are answered with one line, ``{"error": text}``. Operations are carried out one
+after another in a task of the session. What a client is shown is looked at when something has changed, not all the time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import math
+import sys
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+
+from minirospy.aio.tasks import PAUSE_SECONDS, Faults
+from minirospy.base.errors import MinirospyError
+
+if TYPE_CHECKING:
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["Fields", "Handler", "JsonDoor", "JsonSession", "number", "text_of", "texts_of", "wait_until"]
+
+_log = logging.getLogger(__name__)
+
+_LONGEST_ERROR = 1000
+_VALUE_FACTOR = 4
+"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
+
+_INTERNAL_ERROR = 1011
+"""Of a WebSocket that is closed, RFC 6455, section 7.4.1."""
+
+_CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
+"""Of the loop's clock: 16 ms in Windows before Python 3.13."""
+
+_T = TypeVar("_T")
+Fields = Mapping[str, object]
+Handler = Callable[[Fields], Awaitable[object]]
+"""Carries out an operation; what it returns is sent."""
+
+
+class JsonSession:
+    """One client. Subclasses have the table of operations, and send what has changed in :meth:`follow`."""
+
+    subject: ClassVar[str]
+    """For texts of errors: an operation on this."""
+
+    owners_only: ClassVar[str] = ""
+    """What only a client that has the token may do; empty: others may have a part."""
+
+    longest: ClassVar[int] = 256_000
+    """Characters of an operation: parsing it holds up all clients."""
+
+    most_waiting: ClassVar[int] = 100
+    pace: ClassVar[float] = 0.05
+    """Seconds from one look to the next at least, however often something changes."""
+
+    def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
+        """``handlers`` are what carries out the operations, by name."""
+        self.client = client
+        self.is_ended = False
+        self._handlers = handlers
+        self._operations: deque[tuple[str, Fields, int]] = deque()
+        """Name, fields and memory of those that wait."""
+        self._carried_out_size = 0
+        """Memory of those that are carried out."""
+        self._operation_size = 0
+        """Memory of the operation that was received last."""
+        self._thread = ThreadPoolExecutor(1, type(self).__name__)
+        self._loop = asyncio.get_running_loop()
+        self._wake = asyncio.Event()
+        self._looked = -math.inf
+        self._next_look = -math.inf
+        self._is_change_posted = False
+        self._has_failed = False
+        self._faults = Faults(_log, f"serving {self.subject}")
+        self._task = asyncio.ensure_future(self._run())
+
+    # --- for subclasses
+
+    def refusal(self) -> str:
+        """Return why this client may carry out no operation, empty where it may."""
+        if self.owners_only and not self.client.is_owner:
+            return self.client.why_not_owner(self.owners_only)
+        return ""
+
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """Return an operation's name and fields. Raise ValueError, TypeError, LookupError."""
+        return str(fields["op"]), fields
+
+    async def started(self) -> None:
+        """Send what comes first."""
+        self.send({"writes": not self.refusal()})
+        if self.owners_only and (why := self.refusal()):
+            self.send_error(why)
+
+    async def follow(self) -> float | None:
+        """Send what has changed; return the seconds after which it changes by itself, None: it does not."""
+        return None
+
+    async def left(self) -> None:
+        """Release what the client had."""
+
+    def dispatch(self, name: str, fields: Fields) -> None:
+        """Have an operation carried out after those that wait."""
+        if len(self._operations) >= self.most_waiting:
+            self.send_error("too many operations wait: this one was dropped", fields)
+            return
+        self._operations.append((name, fields, self._operation_size))
+        self.count()
+        self._wake.set()
+
+    def count(self) -> None:
+        """Count what is kept of the client in the account of the server."""
+        self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """Run what blocks in the session's thread, after what was started there before."""
+        return await self._loop.run_in_executor(self._thread, work)
+
+    def send(self, fields: Fields) -> None:
+        """Send an answer."""
+        self.client.send_text(json.dumps(fields))
+
+    def send_error(self, text: str, fields: Fields | None = None) -> None:
+        """Send what went wrong; ``fields`` are those of the operation."""
+        self.send({"error": text[:_LONGEST_ERROR]})
+
+    def send_answer(self, answer: object, fields: Fields) -> None:
+        """Send what an operation returned."""
+        self.client.send_text(json.dumps(answer))
+
+    # --- from the connection
+
+    def received_text(self, text: str) -> None:
+        """Take over an operation."""
+        if why := self.refusal():
+            self.send_error(why)
+            return
+        if len(text) > self.longest:
+            self.send_error(f"an operation on {self.subject} has {self.longest} characters at most")
+            return
+        try:
+            self._operation_size = _VALUE_FACTOR * sys.getsizeof(text)
+            fields = json.loads(text)
+            if not isinstance(fields, dict):
+                raise TypeError("not an object")
+            name, fields = self.parse(fields)
+            if name not in self._handlers:
+                raise ValueError(name[:80])
+        except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
+            self.send_error(f"not an operation on {self.subject}: {_line(error)}")
+        else:
+            self.dispatch(name, fields)
+
+    def received_binary(self, data: bytes) -> None:
+        """Refuse what no client sends."""
+        self.send_error("binary messages have no meaning here")
+
+    def ended(self) -> None:
+        """End the session. Idempotent: what it leaves is released once, and not disturbed."""
+        if not self.is_ended:
+            self.is_ended = True
+            self._task.cancel()
+
+    # --- changes
+
+    def changed(self) -> None:
+        """Have :meth:`follow` called soon. On the loop."""
+        self._next_look = min(self._next_look, self._looked + self.pace)
+        self._wake.set()
+
+    def post_change(self) -> None:
+        """Do the same from any thread, as often as it likes."""
+        if not self._is_change_posted:
+            self._is_change_posted = True
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self.changed)
+
+    # --- the session's task
+
+    async def _run(self) -> None:
+        try:
+            await self.started()
+            while True:
+                self._wake.clear()
+                while self._operations:
+                    name, fields, self._carried_out_size = self._operations.popleft()
+                    await self.carry_out(name, fields)
+                    self._carried_out_size = 0
+                    self.count()
+                    self.changed()
+                await self._look()
+                if not self._operations:
+                    await wait_until(self._wake, self._next_look)
+        except Exception as error:  # noqa: BLE001 - the page connects again, and the fault is in the log
+            self._faults.report(error)
+            self.client.close(_INTERNAL_ERROR, "the dashboard failed: its terminal shows why")
+        finally:
+            try:
+                await self.left()
+            except Exception as error:  # noqa: BLE001 - nobody is there to be notified
+                self._faults.report(error)
+            self._thread.shutdown(wait=False)
+
+    async def _look(self) -> None:
+        now = self._loop.time()
+        if now < self._next_look:
+            return
+        self._looked, self._next_look = now, math.inf
+        self._is_change_posted = False
+        if not (self.owners_only and self.refusal()):
+            try:
+                pause = await self.follow()
+                self._has_failed = False
+            except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
+                self._faults.report(error)
+                if not self._has_failed:
+                    # The text of other errors is for the terminal: it may name what is no client's business.
+                    why = (
+                        _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
+                    )
+                    self.send_error(f"the dashboard failed to show {self.subject}: {why}")
+                self._has_failed = True
+                pause = PAUSE_SECONDS
+            if pause is not None:
+                self._next_look = min(self._next_look, now + pause)
+
+    async def carry_out(self, name: str, fields: Fields) -> None:
+        """Carry out an operation, and send its answer, or what went wrong."""
+        try:
+            answer = await self._handlers[name](fields)
+        except (MinirospyError, OSError) as error:
+            self.send_error(_line(error), fields)
+        except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
+            self.send_error(f"not an operation on {self.subject}: {name}: {_line(error)}", fields)
+        except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
+            self._faults.report(error)
+            self.send_error(f"the dashboard failed on this operation: {type(error).__name__}", fields)
+        else:
+            if answer is not None:
+                self.send_answer(answer, fields)
+
+
+_S = TypeVar("_S", bound=JsonSession)
+
+
+class JsonDoor(Generic[_S]):
+    """Opens a session for each client of a sub-protocol; ``session`` makes one."""
+
+    def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:
+        self.sessions: set[_S] = set()
+        self._subprotocol = subprotocol
+        self._session = session
+        self.is_closed = False
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_change_posted = False
+
+    def select(self, offered: Sequence[str]) -> str:
+        """Return the sub-protocol to use. Raise LookupError."""
+        if self._subprotocol in offered:
+            return self._subprotocol
+        raise LookupError(f"sub-protocol {self._subprotocol} is required")
+
+    def open(self, client: WebClient) -> _S:
+        """Start serving a client."""
+        self._loop = asyncio.get_running_loop()
+        session = self._session(client)
+        self.sessions.add(session)
+        session._task.add_done_callback(lambda _: self._left(session))
+        if self.is_closed:
+            session.ended()
+        return session
+
+    def _left(self, session: _S) -> None:
+        self.sessions.discard(session)
+        self.left(session)
+
+    def left(self, session: _S) -> None:
+        """Note that a session has ended."""
+
+    def changed(self) -> None:
+        """Have all sessions look at what has changed. On the loop."""
+        self._is_change_posted = False
+        for session in self.sessions:
+            session.changed()
+
+    def post_change(self) -> None:
+        """Do the same from any thread, as often as it likes."""
+        if self._loop and not self._is_change_posted:
+            self._is_change_posted = True
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self.changed)
+
+    def spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
+        """Run what goes on where its client leaves, until it is done; :meth:`close` waits for it."""
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._spawned_ended)
+        return task
+
+    def _spawned_ended(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        # What fails is reported to the client, if it is still there.
+        if not task.cancelled() and (error := task.exception()) and not isinstance(error, MinirospyError):
+            _log.error("%s: %s", type(self).__name__, error, exc_info=error)
+
+    async def close(self) -> None:
+        """End all sessions, and wait for what they have started. Idempotent."""
+        self.is_closed = True
+        sessions = list(self.sessions)
+        for session in sessions:
+            session.ended()
+        await asyncio.gather(*(session._task for session in sessions), return_exceptions=True)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+async def wait_until(event: asyncio.Event, end: float) -> None:
+    """Wait for an event, until a time of the loop at most; by then the loop's clock has passed it."""
+    # asyncio.wait_for before Python 3.12 may lose a cancelling that comes with the event.
+    # A loop calls what is due within its clock's resolution: callers that look at the clock would spin until it goes on.
+    loop = asyncio.get_running_loop()
+    timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
+    try:
+        await event.wait()
+    finally:
+        if timer:
+            timer.cancel()
+
+
+def text_of(fields: Fields, name: str) -> str:
+    """Return a text of an operation. Raise LookupError, TypeError."""
+    value = fields[name]
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is a text")
+    return value
+
+
+def texts_of(fields: Fields, name: str) -> list[str]:
+    """Return a list of texts of an operation. Raise LookupError, TypeError."""
+    value = fields[name]
+    if not isinstance(value, list):
+        raise TypeError(f"{name} is a list of texts")
+    return [str(each) for each in value]
+
+
+def number(value: object) -> float:
+    """Return a finite number of an operation. Raise TypeError, OverflowError."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError(f"{value!r:.40} is not a number")
+    return float(value)
+
+
+def _line(error: Exception) -> str:
+    """Return the text of an error in one line."""
+    if isinstance(error, KeyError):
+        return f"{error.args[0]!s:.80} is missing"
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,146 @@
+"""A recording for the page: `rosbag record` as a child, which ends with this process and completes its file first."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import minirospy
+from minirospy.base.errors import UsageError
+from minirospy.base.names import is_legal_name
+from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
+
+__all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
+
+_TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
+"""After SIGINT the file is completed: what waits for a slow disk takes its time."""
+
+_TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
+"""No file is open yet: an interpreter that starts may lose a SIGINT, where it comes while a callback of importlib runs."""
+
+_MOST_LINES = 20
+COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
+                ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
+"""Words of `rosbag record` for each kind of file."""
+
+
+class RecordingState(NamedTuple):
+    """A recording: its file's name, topics, seconds, bytes; ``is_ended``, and then the error, "" for none."""
+
+    name: str
+    topics: tuple[str, ...]
+    seconds: float
+    size: int
+    is_ended: bool
+    error: str
+
+
+class Recording:
+    """One run of `rosbag record` into ``path``, whose suffix is .bag or .mcap. Raise MinirospyError."""
+
+    def __init__(self, path: Path, topics: Sequence[str], compression: str, master_uri: str) -> None:
+        words = COMPRESSIONS[path.suffix].get(compression)
+        if words is None:
+            known = ", ".join(COMPRESSIONS[path.suffix])
+            raise UsageError(
+                f"{path.suffix} files have no compression '{compression[:40]}': there is {known}"
+            )
+        if not topics:
+            raise UsageError("choose at least one topic to record")
+        for topic in topics:
+            if not topic.startswith("/") or not is_legal_name(topic):
+                raise UsageError(f"'{topic[:200]}' is not the name of a topic")
+
+        self._path = path
+        self._paths = (path.with_name(f"{path.name}.active"), path)
+        self._master_uri = master_uri
+        self._topics = tuple(topics)
+        self._lines: deque[str] = deque(maxlen=_MOST_LINES)
+        self._started = time.monotonic()
+        self._seconds: float | None = None
+        self._guardian = Guardian(_TIMEOUTS, master_uri)
+        try:
+            self._process = self._start(words)
+        except BaseException:
+            self._guardian.close()
+            raise
+        self._guardian.add(self._process)
+        self._reader = threading.Thread(target=self._read, name="recording-output", daemon=True)
+        self._reader.start()
+
+    def _start(self, words: Sequence[str]) -> Process:
+        topics = [word for topic in self._topics for word in ("--topic", topic)]
+        kind = ["--mcap"] if self._path.suffix == ".mcap" else []
+        command = [
+            sys.executable,
+            "-m",
+            "minirospy",
+            "bag",
+            "record",
+            *kind,
+            *words,
+            "-O",
+            str(self._path),
+            *topics,
+        ]
+
+        return start_process(
+            "rosbag record",
+            command,
+            environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
+            # -m imports from the working folder first: not from one with bags and a person's own modules.
+            folder=Path(minirospy.__file__).parents[2],
+            stdout=subprocess.PIPE,
+            log_errors=True,
+        )
+
+    def _read(self) -> None:
+        """Keep the last lines, and notice the end."""
+        stream = self._process.popen.stdout
+        assert stream
+        with stream:
+            for line in stream:
+                self._lines.append(line.decode("utf-8", "replace").rstrip())
+        self._process.popen.wait()
+        self._seconds = time.monotonic() - self._started
+
+    def state(self) -> RecordingState:
+        """Return the state now."""
+        # First: of one that has ended the sizes are the last ones.
+        status = self._process.exit_code
+        size = 0
+        for path in self._paths:
+            try:
+                size = max(size, path.stat().st_size)
+            except OSError:
+                continue
+        seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
+        error = ""
+        # An interpreter that starts may also end without a fault.
+        if status is not None and self._process.is_ending and not size:
+            error = "it was stopped before it had started: nothing was recorded"
+        elif status:
+            error = next(
+                (line for line in reversed(tuple(self._lines)) if "ERROR" in line or "rror" in line),
+                f"rosbag record ended with status {status}",
+            )
+        return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
+
+    async def stop(self) -> None:
+        """Have the file completed, and wait for that. Idempotent."""
+        await asyncio.get_running_loop().run_in_executor(None, self._stop)
+
+    def _stop(self) -> None:
+        has_file = any(path.exists() for path in self._paths)
+        end_processes([self._process], _TIMEOUTS if has_file else _TIMEOUTS_BEFORE_FILE, lambda _: None)
+        self._reader.join()
+        self._guardian.remove(self._process)
+        self._guardian.close()

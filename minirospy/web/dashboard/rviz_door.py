@@ -1,0 +1,145 @@
+"""Reading and saving .rviz files for the 3D view, by JSON over WebSocket: one operation, one answer.
+
+``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the file of the command, null where it does not exist yet;
+``{"save": config}`` -> ``{"name"}``: saved there, for clients that have the read-write token; ``{"parse": text}`` ->
+``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``. No
+operation names a file.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+from minirospy.base.errors import BridgeError, RvizFileError
+from minirospy.base.private_files import create_file
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
+from minirospy.web.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
+
+if TYPE_CHECKING:
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["SUBPROTOCOL", "RvizDoor", "RvizSession", "read_file"]
+
+SUBPROTOCOL = "minirospy.rviz.v1"
+
+_T = TypeVar("_T")
+
+
+def read_file(path: Path) -> dict[str, object] | None:
+    """Return the contents of a .rviz file, None where there is none. Raise RvizFileError."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            text = file.read(MOST_CHARACTERS + 1)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise RvizFileError(str(path), 0, error.strerror or str(error)) from None
+    return parse_rviz(text, str(path))
+
+
+def _write_file(path: Path, text: str) -> None:
+    """Write a file whole or not at all: one that is half written would be lost. Raise RvizFileError."""
+    # A link stays one, and its target keeps its rights.
+    file = path.resolve()
+    part = file.with_name(f".{file.name}.part")
+    try:
+        # Its name is known to others who may write there: what they have put is not written through.
+        with os.fdopen(create_file(part, 0o666), "w", encoding="utf-8") as stream:
+            stream.write(text)
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copymode(file, part)
+        part.replace(file)
+    except (OSError, ValueError) as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        why = error.strerror if isinstance(error, OSError) else None
+        raise RvizFileError(str(path), 0, why or str(error)) from None
+
+
+class RvizDoor(JsonDoor["RvizSession"]):
+    """Serves the file of the command, if there is one."""
+
+    def __init__(self, file: Path | None = None) -> None:
+        super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
+        self.file = file
+        self.thread = ThreadPoolExecutor(1, "rviz-files")
+        """Of all sessions: files that are parsed at the same time hold up the loop longer, and may be written over each other."""
+
+    async def close(self) -> None:
+        """End all sessions; what is being saved is completed."""
+        await super().close()
+        self.thread.shutdown(wait=False)
+
+
+class RvizSession(JsonSession):
+    """One client; its operations read and parse in the door's thread."""
+
+    subject: ClassVar[str] = ".rviz files"
+    longest: ClassVar[int] = 600_000
+    most_waiting: ClassVar[int] = 20
+
+    def __init__(self, door: RvizDoor, client: WebClient) -> None:
+        self._door = door
+        handlers: Mapping[str, Handler] = {
+            "read": self._read,
+            "parse": self._parse,
+            "format": self._format,
+            "save": self._save,
+        }
+        super().__init__(client, handlers)
+
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        (name,) = fields
+        return name, fields
+
+    async def started(self) -> None:
+        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """See :meth:`JsonSession.in_thread`: in that of the door."""
+        return await asyncio.get_running_loop().run_in_executor(self._door.thread, work)
+
+    async def _read(self, _: Fields) -> Fields:
+        file = self._file()
+        config = await self.in_thread(partial(read_file, file))
+        return {"config": config, "name": file.name, "writes": self.client.is_owner}
+
+    async def _parse(self, fields: Fields) -> Fields:
+        return {"config": await self.in_thread(partial(parse_rviz, text_of(fields, "parse")))}
+
+    async def _format(self, fields: Fields) -> Fields:
+        return {"text": await self.in_thread(partial(format_rviz, _config(fields["format"])))}
+
+    async def _save(self, fields: Fields) -> Fields:
+        file, config = self._file(), _config(fields["save"])
+        if not self.client.is_owner:
+            raise BridgeError(self.client.why_not_owner("save the file"))
+
+        def save() -> None:
+            text = format_rviz(config)
+            parse_rviz(text)
+            _write_file(file, text)
+
+        # The page may be closed meanwhile: what was to be saved is.
+        await asyncio.shield(self._door.spawn(self.in_thread(save)))
+        return {"name": file.name}
+
+    def _file(self) -> Path:
+        if self._door.file is None:
+            raise BridgeError("the dashboard was not started with a .rviz file (rviz -d FILE)")
+        return self._door.file
+
+
+def _config(value: object) -> dict[str, object]:
+    if not isinstance(value, dict):
+        raise TypeError("the contents of a file are an object")
+    return value

@@ -1,0 +1,325 @@
+"""What the views need besides the Foxglove protocol, by JSON over WebSocket: requests about nodes, types and files.
+
+A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error": "..."}``.
+The requests are in ``ToolsSession.handlers``. After ``watch`` it sends ``{"report": ...}`` every few seconds until ``unwatch``:
+the graph and all nodes, as minirospy/introspect/survey.py describes them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
+from minirospy.introspect.configurations import parameter_values
+from minirospy.introspect.graph import Graph, why_illegal
+from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes
+from minirospy.introspect.parameters import set_parameter
+from minirospy.introspect.processes import ProcessLoads
+from minirospy.introspect.survey import Survey, describe, survey
+from minirospy.introspect.type_texts import installed_type
+from minirospy.introspect.values import check_parameter, format_value, parse_value
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of, texts_of
+
+if TYPE_CHECKING:
+    from minirospy.web.server.client import WebClient
+
+__all__ = ["SUBPROTOCOL", "ToolsDoor", "ToolsSession"]
+
+SUBPROTOCOL = "minirospy.tools.v1"
+
+_T = TypeVar("_T")
+_log = logging.getLogger(__name__)
+
+# bool first: it is an int, too.
+_TYPE_NAMES: Mapping[type, str] = {
+    bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
+}  # fmt: skip
+_MOST_PREVIEW = 200
+"""Characters of a value that are shown while it is typed."""
+
+_REPORT_SECONDS = 2.0
+_AT_ONCE = 4
+"""Requests of one client that are answered at the same time: nodes that do not answer take seconds."""
+
+
+class ToolsDoor(JsonDoor["ToolsSession"]):
+    """Serves the requests of pages. ``tool`` is the name by which nodes are called."""
+
+    def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
+        super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
+        self.parser = ThreadPoolExecutor(1, "tools-parser")
+        """Parses files, one after another: several at once would hold up the loop longer."""
+        self._master_uri = master_uri
+        self._tool = tool
+        self._watching: set[ToolsSession] = set()
+        self._reporting: asyncio.Task[None] | None = None
+        self._surveyor = ThreadPoolExecutor(1, "tools-survey")
+        self._last: Survey | None = None
+        self._processes = ProcessLoads()
+
+    async def close(self) -> None:
+        """Cancel what still runs."""
+        await super().close()
+        reporting, self._reporting = self._reporting, None
+        if reporting:
+            reporting.cancel()
+            await asyncio.gather(reporting, return_exceptions=True)
+        for threads in (self.parser, self._surveyor):
+            threads.shutdown(wait=False, cancel_futures=True)
+
+    def graph(self) -> Graph:
+        """Return the graph, with a separate connection to the master: calls run in threads."""
+        return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
+
+    def watch(self, session: ToolsSession) -> None:
+        """Send a session a report of the graph now and every few seconds."""
+        self._watching.add(session)
+        if self._reporting is None or self._reporting.done():
+            self._last = None
+            faults = Faults(_log, "the report of the nodes")
+            self._reporting = asyncio.ensure_future(keep_running(self._report, faults))
+        elif self._last:
+            session.report(_report_of(describe(self._last)))
+
+    def unwatch(self, session: ToolsSession) -> None:
+        """End it; nobody queries the nodes while nobody watches."""
+        self._watching.discard(session)
+        if not self._watching and self._reporting:
+            self._reporting.cancel()
+            self._reporting = None
+
+    async def _report(self) -> None:
+        while True:
+            started = time.monotonic()
+            try:
+                # In one thread: where a survey is cancelled, the next one waits for its end.
+                now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
+            except (MinirospyError, OSError) as error:
+                fields: Mapping[str, object] = {"trouble": str(error)}
+            else:
+                fields = describe(now, self._last)
+                self._last = now
+            data = _report_of(fields)
+            for session in tuple(self._watching):
+                session.report(data)
+            # Nodes that answer slowly are not queried without a pause.
+            await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
+
+    def topic_types(self) -> Mapping[str, str]:
+        """Return the types of topics that the master knows; ``*`` where a subscriber takes any."""
+        with self.graph() as graph:
+            return graph.master.get_topic_types()
+
+    def _survey(self) -> Survey:
+        with self.graph() as graph:
+            return survey(graph, self._processes)
+
+
+class ToolsSession(JsonSession):
+    """One client. Its requests are answered as they are done, each with its ``id``."""
+
+    subject: ClassVar[str] = "the graph"
+    longest: ClassVar[int] = 100_000
+    most_waiting: ClassVar[int] = 20
+
+    def __init__(self, door: ToolsDoor, client: WebClient) -> None:
+        self._door = door
+        self._running: set[asyncio.Task[None]] = set()
+        self._threads = ThreadPoolExecutor(_AT_ONCE, "tools")
+        handlers: Mapping[str, Handler] = {
+            "watch": self._watch,
+            "unwatch": self._unwatch,
+            "ping": self._ping,
+            "kill": self._kill,
+            "cleanup": self._cleanup,
+            "type": self._type,
+            "yaml": self._yaml,
+            "value": self._value,
+            "set": self._set,
+        }
+        super().__init__(client, handlers)
+
+    def parse(self, fields: Fields) -> tuple[str, Fields]:
+        """See :meth:`JsonSession.parse`."""
+        number = fields["id"]
+        if not isinstance(number, int):
+            raise TypeError("id is an integer")
+        return text_of(fields, "do"), fields
+
+    async def started(self) -> None:
+        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
+
+    def dispatch(self, name: str, fields: Fields) -> None:
+        """See :meth:`JsonSession.dispatch`."""
+        if len(self._running) >= self.most_waiting:
+            self.send_error("too many requests wait for their answers", fields)
+            return
+        task = asyncio.ensure_future(self.carry_out(name, fields))
+        size = self._operation_size
+        self._running.add(task)
+        self._carried_out_size += size
+        self.count()
+
+        def ended(task: asyncio.Task[None]) -> None:
+            self._running.discard(task)
+            self._carried_out_size -= size
+            self.count()
+
+        task.add_done_callback(ended)
+
+    def send_answer(self, answer: object, fields: Fields) -> None:
+        """See :meth:`JsonSession.send_answer`."""
+        self.send({"id": fields["id"], "result": answer})
+
+    def send_error(self, text: str, fields: Fields | None = None) -> None:
+        """See :meth:`JsonSession.send_error`."""
+        self.send({**({"id": fields["id"]} if fields else {}), "error": text[:500]})
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """See :meth:`JsonSession.in_thread`: in one of several threads."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+
+    def ended(self) -> None:
+        """See :meth:`JsonSession.ended`."""
+        super().ended()
+        self._door.unwatch(self)
+        for task in tuple(self._running):
+            task.cancel()
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def report(self, data: bytes) -> None:
+        """Send a report; an older one that waits is dropped."""
+        self.client.send_text_message("report", data, newest_only=True)
+
+    async def _watch(self, _: Fields) -> Fields:
+        self._door.watch(self)
+        return {}
+
+    async def _unwatch(self, _: Fields) -> Fields:
+        self._door.unwatch(self)
+        return {}
+
+    async def _ping(self, fields: Fields) -> Fields:
+        """Return the seconds that a call to ``node`` takes."""
+
+        name = text_of(fields, "node")
+
+        def ping() -> float:
+            with self._door.graph() as graph:
+                return ping_node(graph, find_node(graph, name))
+
+        return {"seconds": await self.in_thread(ping)}
+
+    async def _kill(self, fields: Fields) -> Fields:
+        """Request ``node`` to shut down."""
+        self._require_writing("shuts down no node")
+        name = text_of(fields, "node")
+
+        def kill() -> None:
+            with self._door.graph() as graph:
+                node = find_node(graph, name)
+                ping_node(graph, node)  # of one that has exited already, the reason is reported
+                kill_node(graph, node, "requested in the dashboard")
+
+        await self.in_thread(kill)
+        return {}
+
+    async def _cleanup(self, fields: Fields) -> list[str]:
+        """Unregister those of ``nodes`` that still do not answer, as `rosnode cleanup` does; return their names."""
+        self._require_writing("unregisters no node")
+        wanted = texts_of(fields, "nodes")
+
+        def clean() -> list[str]:
+            with self._door.graph() as graph:
+                silent = [node for node in unreachable_nodes(graph) if node.name in wanted]
+                for node in silent:
+                    forget_node(graph, node)
+                return [node.name for node in silent]
+
+        return await self.in_thread(clean)
+
+    async def _type(self, fields: Fields) -> Fields:
+        """Return the full definition of the message type ``name``, of the packages that are installed here.
+
+        With ``topic`` instead, of the type that the master knows of it, also where it is only subscribed.
+        """
+        if "topic" in fields:
+            topic = text_of(fields, "topic")
+            name = (await self.in_thread(self._door.topic_types)).get(topic, "")
+            if "/" not in name:
+                raise NotFoundError("topic", topic, ())
+        else:
+            name = text_of(fields, "name")
+        found = await self.in_thread(partial(installed_type, name))
+        if found is None:
+            raise NotFoundError("message type", name, ())
+        return {"name": name, "definition": found.definition}
+
+    def _require_writing(self, what: str) -> None:
+        if not self.client.may_write:
+            raise UsageError(f"this token is read-only: it {what}")
+
+    async def _yaml(self, fields: Fields) -> Fields:
+        """Return the values of a file of rqt_reconfigure or dynparam by name."""
+        text = text_of(fields, "text")
+        loop = asyncio.get_running_loop()
+        values = await loop.run_in_executor(self._door.parser, parameter_values, text)
+        # JSON has no infinity.
+        return {
+            name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
+            for name, value in values.items()
+        }
+
+    async def _value(self, fields: Fields) -> Fields:
+        """Return the type and the text of the value that `rosparam set` makes of ``text``."""
+        value = await self._parsed(fields)
+        return {"type": _type_name(value), "text": format_value(value)[:_MOST_PREVIEW]}
+
+    async def _set(self, fields: Fields) -> Fields:
+        """Set the parameter ``name`` to the value of ``text``, as `rosparam set` does."""
+        self._require_writing("sets no parameter")
+        name = text_of(fields, "name")
+        why = why_illegal(name)
+        if why:
+            raise UsageError(f"parameter [{name}]: {why}")
+        value = await self._parsed(fields)
+
+        def set_value() -> None:
+            with self._door.graph() as graph:
+                set_parameter(graph, graph.resolve(name), value)
+
+        await self.in_thread(set_value)
+        return {}
+
+    async def _parsed(self, fields: Fields) -> object:
+        text = text_of(fields, "text")
+
+        def parse() -> object:
+            # No text is the empty text, as on the command line; to YAML it would be null.
+            value = parse_value(text) if text.strip() else ""
+            check_parameter(value, "the value")
+            return value
+
+        return await asyncio.get_running_loop().run_in_executor(self._door.parser, parse)
+
+
+def _type_name(value: object) -> str:
+    """Return the name of a parameter's type, as roscpp and the wiki call it."""
+    for type_, name in _TYPE_NAMES.items():
+        if isinstance(value, type_):
+            return name
+    raise AssertionError(f"a {type(value).__name__} is not a parameter")
+
+
+def _report_of(fields: Fields) -> bytes:
+    return json.dumps({"report": fields}).encode()

@@ -1,0 +1,140 @@
+"""The channels and services that all clients of the Foxglove protocol are offered: ids for what the graph has."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
+from minirospy.introspect.type_texts import ServiceInfo
+from minirospy.web.foxglove.protocol import Channel, Schema, ServiceOffer
+from minirospy.web.graph import SharedGraph
+
+__all__ = ["Channels", "Services"]
+
+_SECONDS = 3.0
+"""The types of topics that are not installed here are waited for this long: all clients wait for what is offered."""
+
+
+class Channels:
+    """Topics as channels. A topic whose type or definition changes becomes another channel."""
+
+    def __init__(self) -> None:
+        self.by_id: dict[int, Channel] = {}
+        self._ids = itertools.count(1)
+        self._by_topic: dict[str, Channel] = {}
+        self._types: dict[int, InterfaceType] = {}
+        self._declared: dict[int, str] = {}
+        self._definitions: dict[str, set[str]] = {}
+
+    def clear(self) -> None:
+        """Forget all, but not which ids were used."""
+        for table in (self.by_id, self._by_topic, self._types, self._declared, self._definitions):
+            table.clear()
+
+    def type_of(self, channel_id: int) -> InterfaceType:
+        """Return the type of a channel's messages."""
+        return self._types[channel_id]
+
+    async def update(self, graph: SharedGraph) -> tuple[list[Channel], list[int]]:
+        """Return the channels that are new and the ids of those that are no more, after a look at the graph."""
+        snapshot = graph.snapshot
+        wanted = {
+            topic: snapshot.types[topic]
+            for topic in snapshot.publishers
+            if snapshot.types.get(topic, ANY) != ANY
+        }
+        removed = [
+            channel.id
+            for topic, channel in self._by_topic.items()
+            if wanted.get(topic) != self._declared[channel.id]
+        ]
+        for id_ in removed:
+            self._remove(id_)
+
+        new = []
+        others = {}
+        for topic, declared in wanted.items():
+            if topic in self._by_topic:
+                continue
+            type_ = await graph.texts.installed(declared)
+            if type_:
+                new.append(self._add(topic, declared, type_))
+            else:
+                others[topic] = snapshot.publishers.get(topic, ())
+
+        # One whose publisher does not answer in time is known by its first message.
+        found = await graph.texts.of_publishers(others, _SECONDS)
+        new += [
+            self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
+            for topic in others
+        ]
+        return new, removed
+
+    def redefine(self, channel: Channel, header: Header) -> Channel | None:
+        """Return the channel that replaces one whose publisher sends messages of another definition.
+
+        None where the channel has been removed, or the definition was replaced before: publishers that contradict each other.
+        """
+        md5sum = header.get("md5sum", ANY)
+        if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:
+            return None
+        declared = self._declared[channel.id]
+        self._remove(channel.id, forgets=False)
+        type_ = InterfaceType(header.get("type", declared), md5sum, header.get("message_definition", ""))
+        return self._add(channel.topic, declared, type_)
+
+    def _add(self, topic: str, declared: str, type_: InterfaceType) -> Channel:
+        channel = Channel(next(self._ids), topic, Schema(type_.name, type_.definition))
+        self.by_id[channel.id] = self._by_topic[topic] = channel
+        self._types[channel.id] = type_
+        self._declared[channel.id] = declared
+        if type_.md5sum != ANY:
+            self._definitions.setdefault(topic, set()).add(type_.md5sum)
+        else:
+            self._definitions.setdefault(topic, set())
+        return channel
+
+    def _remove(self, id_: int, *, forgets: bool = True) -> None:
+        channel = self.by_id.pop(id_)
+        del self._by_topic[channel.topic], self._types[id_], self._declared[id_]
+        if forgets:
+            self._definitions.pop(channel.topic, None)
+
+
+class Services:
+    """Services with ids; one that moves to another type becomes another."""
+
+    def __init__(self) -> None:
+        self.by_id: dict[int, ServiceOffer] = {}
+        self.infos: dict[int, ServiceInfo] = {}
+        self._ids = itertools.count(1)
+
+    def clear(self) -> None:
+        """Forget all, but not which ids were used."""
+        self.by_id.clear()
+        self.infos.clear()
+
+    def update(self, graph: SharedGraph) -> tuple[list[ServiceOffer], list[int]]:
+        """Return the services that are new and the ids of those that are no more, after a look at the graph."""
+        infos = (graph.service_info(name) for name in graph.snapshot.services)
+        wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
+        removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]
+        for id_ in removed:
+            del self.infos[id_], self.by_id[id_]
+
+        known = {info.name for info in self.infos.values()}
+        new = []
+        for name, info in wanted.items():
+            if name not in known:
+                offer = ServiceOffer(
+                    next(self._ids),
+                    name,
+                    info.type,
+                    Schema(info.request.name, info.request.definition),
+                    Schema(info.response.name, info.response.definition),
+                )
+                self.by_id[offer.id], self.infos[offer.id] = offer, info
+                new.append(offer)
+        return new, removed

@@ -1,0 +1,232 @@
+"""The Foxglove protocol's server side: what all of its clients are offered, and when that changes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from minirospy.base.clock import time_of_clock_message
+from minirospy.base.environment import DISTRO
+from minirospy.core.wire.header import Header
+from minirospy.introspect.snapshot import Changes
+from minirospy.web.foxglove import protocol, serializing
+from minirospy.web.foxglove.assets import Assets
+from minirospy.web.foxglove.channels import Channels, Services
+from minirospy.web.foxglove.parameters import Parameters
+from minirospy.web.foxglove.protocol import Channel, GraphTables, PlaybackControl, PlaybackState
+from minirospy.web.foxglove.session import FoxgloveSession
+from minirospy.web.graph import Arrival, SharedGraph
+
+if TYPE_CHECKING:
+    from minirospy.web.server.connection import WebClient
+
+__all__ = ["CAPABILITIES", "FoxgloveDoor", "FoxgloveOptions", "Playback"]
+
+_log = logging.getLogger(__name__)
+
+CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
+"""What clients may do where nothing is switched off."""
+
+_FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
+_DROP_REPORT_SECONDS = 2.0
+
+
+class Playback(Protocol):
+    """A player that clients may control."""
+
+    @property
+    def range(self) -> tuple[int, int]:
+        """Start and end of what is played, in nanoseconds."""
+
+    def now(self) -> int:
+        """Return the time of what is played, which stamps messages."""
+
+    def state(self) -> PlaybackState: ...
+
+    def control(self, control: PlaybackControl) -> None: ...
+
+
+@dataclass(frozen=True)
+class FoxgloveOptions:
+    """``name`` is what the server calls itself; ``session_id`` differs for each start of the bridge."""
+
+    name: str = "minirospy bridge"
+    capabilities: Sequence[str] = CAPABILITIES
+    session_id: str = ""
+    metadata: Mapping[str, str] = field(default_factory=lambda: {"ROS_DISTRO": DISTRO.strip()})
+
+
+class FoxgloveDoor:
+    """Serves the Foxglove protocol. On the loop."""
+
+    def __init__(
+        self,
+        graph: SharedGraph,
+        assets: Assets,
+        options: FoxgloveOptions | None = None,
+        playback: Playback | None = None,
+    ) -> None:
+        self.graph = graph
+        self.assets = assets
+        self.playback = playback
+        self.channels = Channels()
+        self.services = Services()
+        self.parameters = Parameters(graph)
+
+        self.sessions: set[FoxgloveSession] = set()
+        self._options = options or FoxgloveOptions()
+        self._waiting: set[FoxgloveSession] = set()
+        """Clients that have not been offered channels yet."""
+        self._is_known = False
+        self._updating: asyncio.Task[None] | None = None
+        self._is_outdated = False
+        self._reporting: asyncio.TimerHandle | None = None
+
+    # --- Door
+
+    def select(self, offered: Sequence[str]) -> str:
+        """Return the sub-protocol to use. Raise LookupError."""
+        for name in protocol.SUBPROTOCOLS:
+            if name in offered:
+                return name
+        raise LookupError(f"sub-protocol {' or '.join(protocol.SUBPROTOCOLS)} is required")
+
+    def open(self, client: WebClient) -> FoxgloveSession:
+        """Start serving a client."""
+        session = FoxgloveSession(self, client)
+        session.send(
+            serializing.server_info(
+                self._options.name,
+                self.capabilities_of(client),
+                self._options.metadata,
+                self._options.session_id,
+                self.playback.range if self.playback else None,
+            )
+        )
+        if self.playback:
+            client.send_binary(serializing.playback_state(self.playback.state()))
+
+        is_first = not self.sessions
+        self.sessions.add(session)
+        if is_first:
+            self._start()
+        if self._is_known:
+            self._offer_all(session)
+        else:
+            self._waiting.add(session)
+        return session
+
+    def left(self, session: FoxgloveSession) -> None:
+        """Forget a client."""
+        self.sessions.discard(session)
+        self._waiting.discard(session)
+        if not self.sessions:
+            self._stop()
+
+    # --- for sessions
+
+    def capabilities_of(self, client: WebClient) -> list[str]:
+        """Return what a client may do."""
+        found = list(self._options.capabilities)
+        if self.graph.node.simulated or self.playback:
+            found.append("time")
+        if self.playback:
+            found.append("playbackControl")
+        return [each for each in found if client.may_write or each not in _FOR_WRITERS]
+
+    def send_graph(self, session: FoxgloveSession) -> None:
+        """Send the whole graph to a client."""
+        snapshot = self.graph.snapshot
+        tables = GraphTables(snapshot.publishers, snapshot.subscribers, snapshot.services)
+        session.send(serializing.connection_graph_update(tables, (), ()))
+
+    def definition_differs(self, channel: Channel, header: Header) -> None:
+        """Replace a channel whose publisher sends messages of another definition than the installed one."""
+        replaced = self.channels.redefine(channel, header)
+        if replaced:
+            _log.info(
+                "%s: [%s] has another definition than the installed one", channel.topic, replaced.schema.name
+            )
+            for session in list(self.sessions):
+                session.channels_removed([channel.id])
+                session.send(serializing.advertise([replaced]))
+
+    def playback_changed(self, state: PlaybackState) -> None:
+        """Report a player's state to all clients."""
+        for session in list(self.sessions):
+            session.client.send_binary(serializing.playback_state(state))
+
+    # --- within
+
+    def _start(self) -> None:
+        self.graph.watch(self._graph_changed)
+        if self.graph.node.simulated:
+            self.graph.subscribe("/clock", self._clock)
+        loop = asyncio.get_running_loop()
+        self._reporting = loop.call_later(_DROP_REPORT_SECONDS, self._report_drops)
+
+    def _stop(self) -> None:
+        self.graph.unwatch(self._graph_changed)
+        self.graph.unsubscribe("/clock", self._clock)
+        if self._reporting:
+            self._reporting.cancel()
+        if self._updating:
+            self._updating.cancel()
+            self._updating = None
+        self._is_known = False
+        self.channels.clear()
+        self.services.clear()
+
+    def _graph_changed(self, changes: Changes) -> None:
+        tables = GraphTables(changes.publishers, changes.subscribers, changes.services)
+        if changes:
+            text = serializing.connection_graph_update(
+                tables, changes.removed_topics, changes.removed_services
+            )
+            for session in list(self.sessions):
+                if session.wants_graph:
+                    session.send(text)
+        self._is_outdated = True
+        if self._updating is None or self._updating.done():
+            self._updating = self.graph.spawn(self._update())
+
+    async def _update(self) -> None:
+        """Offer what is new and withdraw what has disappeared, until the graph is as it was when this started."""
+        while self._is_outdated:
+            self._is_outdated = False
+            new_services, removed_services = self.services.update(self.graph)
+            new, removed = await self.channels.update(self.graph)
+            for session in list(self.sessions - self._waiting):
+                if removed:
+                    session.channels_removed(removed)
+                if new:
+                    session.send(serializing.advertise(new))
+                if "services" not in self.capabilities_of(session.client):
+                    continue
+                if removed_services:
+                    session.send(serializing.unadvertise_services(removed_services))
+                if new_services:
+                    session.send(serializing.advertise_services(new_services))
+
+        self._is_known = True
+        while self._waiting:
+            self._offer_all(self._waiting.pop())
+
+    def _offer_all(self, session: FoxgloveSession) -> None:
+        session.send(serializing.advertise(self.channels.by_id.values()))
+        if "services" in self.capabilities_of(session.client):
+            session.send(serializing.advertise_services(self.services.by_id.values()))
+
+    def _clock(self, arrival: Arrival) -> None:
+        if (now := time_of_clock_message(arrival.body)) is not None:
+            frame = serializing.time_frame(now)
+            for session in list(self.sessions):
+                session.send_time(frame)
+
+    def _report_drops(self) -> None:
+        for session in list(self.sessions):
+            session.report_drops()
+        self._reporting = asyncio.get_running_loop().call_later(_DROP_REPORT_SECONDS, self._report_drops)

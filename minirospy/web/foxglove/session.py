@@ -1,0 +1,392 @@
+"""One client of the Foxglove protocol: its subscriptions, publications, calls and requests."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import sys
+from collections.abc import Callable, Coroutine, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from minirospy.base.errors import (
+    BridgeError,
+    BridgeProtocolError,
+    MasterUnreachableError,
+    RpcError,
+    ServiceException,
+)
+from minirospy.core.wire.tcpros import ANY, InterfaceType
+from minirospy.web.foxglove import parsing, protocol, serializing
+from minirospy.web.foxglove.protocol import Channel, Event, Parameter, StatusLevel
+from minirospy.web.graph import Arrival, Publication
+from minirospy.web.server.files import FileAnswer
+
+if TYPE_CHECKING:
+    from minirospy.web.foxglove.door import FoxgloveDoor
+    from minirospy.web.server.connection import WebClient
+
+__all__ = ["FoxgloveSession"]
+
+_log = logging.getLogger(__name__)
+
+_MOST_CALLS = 200
+"""Calls and requests of one client that may be under way."""
+
+_MOST_CHANNELS = 1000
+"""Topics that one client may publish, and its subscriptions: each of them gets each message."""
+
+_MOST_PARAMETERS = 10_000
+"""Names of parameters whose changes one client may subscribe to."""
+
+_MAX_STATUSES = 100  # about one message of a client: it may name thousands of channels that do not exist
+_VALUE_FACTOR = 4
+"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
+
+_TIME = "time"
+"""The key under which the time waits for a slow client."""
+
+
+class FoxgloveSession:
+    """The state of one client; called by its connection, on the loop."""
+
+    def __init__(self, door: FoxgloveDoor, client: WebClient) -> None:
+        self.client = client
+        self.wants_graph = False
+        self._door = door
+        self._graph = door.graph
+        self._subscriptions: dict[int, tuple[Channel, Callable[[Arrival], None]]] = {}
+        self._publications: dict[int, Publication] = {}
+        self._calls: set[asyncio.Task[None]] = set()
+        self._calls_size = 0
+        """Memory of the calls under way."""
+        self._operation_size = 0
+        """Memory of the operation that is being carried out."""
+        self._dropped = 0
+        self._are_drops_shown = False
+        self._statuses = 0
+        # About the message that is handled now.
+
+        self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
+            protocol.Subscribe: self._subscribe,
+            protocol.Unsubscribe: self._unsubscribe,
+            protocol.ClientAdvertise: self._advertise,
+            protocol.ClientUnadvertise: self._unadvertise,
+            protocol.ClientMessage: self._publish,
+            protocol.GetParameters: self._get_parameters,
+            protocol.SetParameters: self._set_parameters,
+            protocol.SubscribeParameterUpdates: self._subscribe_parameters,
+            protocol.UnsubscribeParameterUpdates: self._unsubscribe_parameters,
+            protocol.SubscribeConnectionGraph: self._subscribe_graph,
+            protocol.UnsubscribeConnectionGraph: self._unsubscribe_graph,
+            protocol.FetchAsset: self._fetch_asset,
+            protocol.ServiceRequest: self._call_service,
+            protocol.PlaybackControl: self._control_playback,
+        }
+
+    # --- from the connection
+
+    def received_text(self, text: str) -> None:
+        """Take over a JSON message."""
+        self._operation_size = _VALUE_FACTOR * sys.getsizeof(text)
+        self._handle(parsing.parse_text, text)
+
+    def received_binary(self, data: bytes) -> None:
+        """Take over a binary message."""
+        self._operation_size = len(data)
+        self._handle(parsing.parse_binary, data)
+
+    def ended(self) -> None:
+        """End everything that the client has."""
+        for channel, listener in self._subscriptions.values():
+            self._graph.unsubscribe(channel.topic, listener)
+        self._subscriptions.clear()
+        for publication in self._publications.values():
+            publication.close()
+        self._publications.clear()
+        for task in list(self._calls):
+            task.cancel()
+        self._door.parameters.forget(self)
+        self._door.left(self)
+
+    # --- from the door
+
+    def send(self, text: str) -> None:
+        """Send a JSON message."""
+        self.client.send_text(text)
+
+    def send_time(self, frame: bytes) -> None:
+        """Send the time; only the last one waits."""
+        self.client.send_message(_TIME, frame, b"", newest_only=True)
+
+    def channels_removed(self, ids: list[int]) -> None:
+        """End the subscriptions of channels that are no more."""
+        for subscription_id, (channel, listener) in list(self._subscriptions.items()):
+            if channel.id in ids:
+                del self._subscriptions[subscription_id]
+                self._graph.unsubscribe(channel.topic, listener)
+        self.send(serializing.unadvertise(ids))
+
+    def report_drops(self) -> None:
+        """Say that messages were dropped, or that none are any more; called now and then."""
+        dropped = self.client.queue.dropped
+        if dropped > self._dropped:
+            counts = self.client.queue.dropped_of.most_common(3)
+            topics = [self._subscriptions[key][0].topic for key, _ in counts if key in self._subscriptions]
+            self._status(
+                StatusLevel.WARNING,
+                f"Send buffer limit reached: {dropped} messages dropped, most of {', '.join(topics) or 'the time'}: "
+                "this connection is slower than what it subscribes to",
+                "drops",
+            )
+            self._are_drops_shown = True
+        elif self._are_drops_shown:
+            self.send(serializing.remove_status(["drops"]))
+            self._are_drops_shown = False
+        self._dropped = dropped
+
+    def parameters_changed(self, changed: list[Parameter]) -> None:
+        """Report changes of parameters."""
+        self.send(serializing.parameter_values(changed))
+
+    # --- within
+
+    def _handle(self, parse: Callable[[Any], Event], data: str | bytes) -> None:
+        self._statuses = 0
+        try:
+            event = parse(data)
+            self._handlers[type(event)](event)
+        except (BridgeProtocolError, BridgeError) as error:
+            self._status(StatusLevel.ERROR, str(error))
+
+    def _status(self, level: StatusLevel, text: str, id_: str | None = None) -> None:
+        if id_ is None:
+            self._statuses += 1
+            if self._statuses > _MAX_STATUSES:
+                return
+            if self._statuses == _MAX_STATUSES:
+                text = "further faults of this message are not reported"
+        self.send(serializing.status(level, text, id_))
+
+    def _require(self, capability: str, doing: str) -> None:
+        """Raise BridgeError where the client may not do this."""
+        if capability not in self._door.capabilities_of(self.client):
+            why = (
+                "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"
+            )
+            raise BridgeError(f"{doing} is not allowed: {why}")
+
+    def _spawn(self, work: Coroutine[object, object, object]) -> None:
+        """Start the request that was received, which keeps the content of its message."""
+        if len(self._calls) >= _MOST_CALLS:
+            work.close()
+            raise BridgeError(f"{_MOST_CALLS} requests are under way: wait for an answer")
+        task = self._graph.spawn(work)
+        self._calls.add(task)
+        size = self._operation_size
+        self._count_call(size)
+
+        def ended(task: asyncio.Task[None]) -> None:
+            self._calls.discard(task)
+            self._count_call(-size)
+
+        task.add_done_callback(ended)
+
+    def _count_call(self, size: int) -> None:
+        self._calls_size += size
+        self.client.holds(self._calls_size)
+
+    def _subscribe(self, event: protocol.Subscribe) -> None:
+        for subscription_id, channel_id in event.subscriptions:
+            channel = self._door.channels.by_id.get(channel_id)
+            if subscription_id in self._subscriptions:
+                self._status(
+                    StatusLevel.ERROR,
+                    f"Client subscription id {subscription_id} was already used; ignoring subscription",
+                )
+            elif channel is None:
+                self._status(
+                    StatusLevel.WARNING,
+                    f"Channel {channel_id} is not available; ignoring subscription {subscription_id}",
+                )
+            elif len(self._subscriptions) >= _MOST_CHANNELS:
+                raise BridgeError(f"a client may have {_MOST_CHANNELS} subscriptions")
+            else:
+                listener = partial(
+                    self._arrived, subscription_id, channel, self._door.channels.type_of(channel_id).md5sum
+                )
+                self._subscriptions[subscription_id] = (channel, listener)
+                self._graph.subscribe(channel.topic, listener)
+
+    def _arrived(self, subscription_id: int, channel: Channel, md5sum: str, arrival: Arrival) -> None:
+        if (arrival.header["md5sum"] != md5sum and md5sum != ANY) or (
+            not channel.schema.text and md5sum == ANY
+        ):
+            # The text that the client decodes with does not fit this publisher.
+            self._door.definition_differs(channel, arrival.header)
+            return
+        head = serializing.message_head(subscription_id, arrival.nanoseconds)
+        self.client.send_message(subscription_id, head, arrival.body)
+
+    def _unsubscribe(self, event: protocol.Unsubscribe) -> None:
+        for subscription_id in event.ids:
+            found = self._subscriptions.pop(subscription_id, None)
+            if found is None:
+                self._status(
+                    StatusLevel.WARNING,
+                    f"Client subscription id {subscription_id} did not exist; ignoring unsubscription",
+                )
+                continue
+            self._graph.unsubscribe(found[0].topic, found[1])
+            self.client.discard(subscription_id)
+
+    def _advertise(self, event: protocol.ClientAdvertise) -> None:
+        self._require("clientPublish", "publishing")
+        for channel in event.channels:
+            if channel.id in self._publications:
+                self._status(StatusLevel.ERROR, f"Channel {channel.id} is advertised already; ignoring it")
+            elif channel.encoding != protocol.MESSAGE_ENCODING:
+                self._status(
+                    StatusLevel.ERROR,
+                    f"Unsupported encoding '{channel.encoding}' of channel {channel.id}. Only 'ros1' encoding is "
+                    "supported at the moment.",
+                )
+            elif len(self._publications) >= _MOST_CHANNELS:
+                raise BridgeError(f"a client may publish {_MOST_CHANNELS} topics")
+            else:
+                self._advertise_topic(channel)
+
+    def _advertise_topic(self, channel: protocol.ClientChannel) -> None:
+        from minirospy.introspect.graph import why_illegal
+        from minirospy.introspect.type_texts import installed_type, type_of_text
+
+        why = why_illegal(channel.topic)
+        if why:
+            raise BridgeError(f"topic [{channel.topic}]: {why}")
+        name = channel.schema.name
+        type_: InterfaceType | None = installed_type(name)
+        if type_ is None and channel.schema.text:
+            type_ = type_of_text(name, channel.schema.text)
+        if type_ is None:
+            raise BridgeError(
+                f"Failed to retrieve type information of data type '{name}': its package is not installed here. "
+                f"Unable to advertise topic {channel.topic}"
+            )
+        self._publications[channel.id] = self._graph.advertise(self._graph.node.resolve(channel.topic), type_)
+
+    def _unadvertise(self, event: protocol.ClientUnadvertise) -> None:
+        for id_ in event.ids:
+            publication = self._publications.pop(id_, None)
+            if publication:
+                publication.close()
+            else:
+                self._status(StatusLevel.WARNING, f"Channel {id_} is not advertised; ignoring it")
+
+    def _publish(self, event: protocol.ClientMessage) -> None:
+        publication = self._publications.get(event.channel_id)
+        if publication is None:
+            raise BridgeError(f"Channel {event.channel_id} is not advertised: its message is dropped")
+        publication.publish_when_joined(bytes(event.payload))
+
+    def _get_parameters(self, event: protocol.GetParameters) -> None:
+        self._require("parameters", "reading parameters")
+        self._spawn(self._send_parameters(event.names, event.id, lists_unset=True))
+
+    async def _send_parameters(self, names: tuple[str, ...], id_: str | None, *, lists_unset: bool) -> None:
+        try:
+            found = await self._door.parameters.read(names)
+        except (MasterUnreachableError, RpcError) as error:
+            self._status(StatusLevel.ERROR, f"parameters cannot be read: {error}")
+            return
+        unset = [parameter.name for parameter in found if not parameter.is_set]
+        if unset and lists_unset:
+            self._status(
+                StatusLevel.ERROR, f"Failed to retrieve the following parameters: {', '.join(unset[:20])}"
+            )
+        self.send(serializing.parameter_values((each for each in found if each.is_set), id_))
+
+    def _set_parameters(self, event: protocol.SetParameters) -> None:
+        self._require("parameters", "setting parameters")
+        if not self.client.may_write:
+            raise BridgeError("setting parameters is not allowed: this token is read-only")
+        self._spawn(self._write_parameters(event))
+
+    async def _write_parameters(self, event: protocol.SetParameters) -> None:
+        for why in await self._door.parameters.write(event.parameters):
+            self._status(StatusLevel.ERROR, why)
+        if event.id is not None:
+            names = tuple(parameter.name for parameter in event.parameters)
+            if names:
+                await self._send_parameters(names, event.id, lists_unset=False)
+
+    def _subscribe_parameters(self, event: protocol.SubscribeParameterUpdates) -> None:
+        self._require("parametersSubscribe", "subscribing to parameters")
+        if self._door.parameters.count(self) + len(event.names) > _MOST_PARAMETERS:
+            raise BridgeError(
+                f"a client may subscribe to {_MOST_PARAMETERS} parameters, or to all without names"
+            )
+        self._door.parameters.subscribe(self, event.names)
+
+    def _unsubscribe_parameters(self, event: protocol.UnsubscribeParameterUpdates) -> None:
+        self._door.parameters.unsubscribe(self, event.names)
+
+    def _subscribe_graph(self, _: protocol.SubscribeConnectionGraph) -> None:
+        self._require("connectionGraph", "subscribing to the graph")
+        self.wants_graph = True
+        self._door.send_graph(self)
+
+    def _unsubscribe_graph(self, _: protocol.UnsubscribeConnectionGraph) -> None:
+        if not self.wants_graph:
+            raise BridgeError("Client was not subscribed to connection graph updates")
+        self.wants_graph = False
+
+    def _fetch_asset(self, event: protocol.FetchAsset) -> None:
+        try:
+            self._require("assets", "fetching assets")
+        except BridgeError as error:
+            self.client.send_binary(serializing.asset_failure(event.request_id, str(error)))
+            return
+        self.client.send_file(
+            FileAnswer(
+                partial(self._door.assets.open, event.uri),
+                lambda _: serializing.asset_head(event.request_id),
+                partial(serializing.asset_failure, event.request_id),
+            )
+        )
+
+    def _call_service(self, event: protocol.ServiceRequest) -> None:
+        try:
+            self._require("services", "calling services")
+            info = self._door.services.infos.get(event.service_id)
+            if info is None:
+                raise BridgeError(f"Service with id {event.service_id} does not exist")
+            if event.encoding != protocol.MESSAGE_ENCODING:
+                raise BridgeError(
+                    f"Service request encoding '{event.encoding}' is not supported. Only 'ros1' encoding is supported"
+                )
+            self._spawn(self._call(event, info.name, info.md5sum))
+        except BridgeError as error:
+            self._call_failed(event, str(error))
+
+    async def _call(self, event: protocol.ServiceRequest, name: str, md5sum: str) -> None:
+        try:
+            response = await self._graph.call(name, md5sum, event.payload)
+        except (ServiceException, BridgeError) as error:
+            self._call_failed(event, str(error))
+        except Exception:
+            # Logged by the task; the client waits for the answer.
+            self._call_failed(event, "the bridge failed on this call")
+            raise
+        else:
+            self.client.send_binary(
+                serializing.service_response_head(event.service_id, event.call_id), response
+            )
+
+    def _call_failed(self, event: protocol.ServiceRequest, why: str) -> None:
+        self.send(serializing.service_call_failure(event.service_id, event.call_id, why))
+
+    def _control_playback(self, event: protocol.PlaybackControl) -> None:
+        self._require("playbackControl", "controlling the player")
+        assert self._door.playback
+        self._door.playback.control(event)
+        self._door.playback_changed(self._door.playback.state())

@@ -1,0 +1,397 @@
+"""The ROS side that all clients share: one subscription a topic, one publication a topic, one look at the graph.
+
+Messages stay bytes. What the graph is, is known to ``introspect/``; nodes, topics and services are those of ``aio/``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, field
+
+from minirospy.aio.node import Node
+from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
+from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.topics import Publisher
+from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
+from minirospy.base.name_filter import NameFilter
+from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.framing import Frame
+from minirospy.core.wire.header import Header
+from minirospy.core.wire.tcpros import ANY, InterfaceType
+from minirospy.introspect.node_queries import NodeQueries
+from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch
+from minirospy.introspect.type_texts import ServiceInfo, TypeTexts, described
+
+__all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", "TopicListener"]
+
+_log = logging.getLogger(__name__)
+
+FASTEST_LOOK = 0.25
+"""Seconds from one look at the graph to the next while it changes."""
+
+_QUEUE = 100
+_MOST_WAITING = 32_000_000
+"""Bytes of clients' messages that wait for the subscribers of new topics; beyond, each topic's newest alone."""
+
+_QUERY_SECONDS = 2.0
+"""After this the graph is reported without the types of services that are still looked up."""
+
+
+@dataclass(frozen=True)
+class Filters:
+    """Names that clients may use."""
+
+    topics: NameFilter = field(default_factory=NameFilter)
+    publishable: NameFilter = field(default_factory=NameFilter)
+    services: NameFilter = field(default_factory=NameFilter)
+    parameters: NameFilter = field(default_factory=NameFilter)
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A message: its bytes, its publisher's connection header, when it came (nanoseconds of the node's time)."""
+
+    body: bytes | memoryview
+    header: Header
+    nanoseconds: int
+
+
+TopicListener = Callable[[Arrival], object]
+GraphListener = Callable[[Changes], object]
+
+
+class SharedTopic:
+    """A topic that at least one client listens to."""
+
+    def __init__(self, graph: SharedGraph, topic: str) -> None:
+        self.topic = topic
+        self.received = 0
+        self.received_bytes = 0
+        self._graph = graph
+        self._listeners: list[TopicListener] = []
+        # By the identity of the header, which belongs to one connection.
+        self._latched: dict[int, Arrival] = {}
+        self._subscription: RawSubscription | None = None
+
+    @property
+    def headers(self) -> list[Header]:
+        """The connection headers of the publishers that are connected."""
+        return self._subscription.headers if self._subscription else []
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anybody listens."""
+        return bool(self._listeners)
+
+    def add(self, listener: TopicListener) -> None:
+        """Call ``listener`` with the last message of each latched publisher, then with each that comes."""
+        if self._subscription is None:
+            self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
+        # While it is being unsubscribed its connections are still there, and bring no latched message again.
+        self._forget_disconnected()
+        for arrival in list(self._latched.values()):
+            listener(Arrival(arrival.body, arrival.header, self._graph.now()))
+        self._listeners.append(listener)
+
+    def remove(self, listener: TopicListener) -> None:
+        """Call it no more."""
+        with contextlib.suppress(ValueError):
+            self._listeners.remove(listener)
+
+    async def close(self) -> None:
+        """Unsubscribe."""
+        subscription, self._subscription = self._subscription, None
+        if subscription:
+            await subscription.close()
+
+    def _deliver(self, frame: Frame, header: Header) -> None:
+        arrival = Arrival(frame, header, self._graph.now())
+        self.received += 1
+        self.received_bytes += len(frame)
+        if header.get("latching") == "1":
+            if id(header) not in self._latched:
+                self._forget_disconnected()
+            self._latched[id(header)] = arrival
+        for listener in tuple(self._listeners):
+            listener(arrival)
+
+    def _forget_disconnected(self) -> None:
+        connected = {id(header) for header in self.headers}
+        for key in [key for key in self._latched if key not in connected]:
+            del self._latched[key]
+
+
+class Publication:
+    """A client's share of a topic that this node publishes. ``publish(bytes)``."""
+
+    def __init__(self, graph: SharedGraph, topic: str, shared: _SharedPublisher) -> None:
+        self.topic = topic
+        self._graph = graph
+        self._shared: _SharedPublisher | None = shared
+        self._waiting: deque[bytes] | None = None
+        """Messages that wait for the subscribers."""
+
+    @property
+    def has_joined(self) -> bool:
+        """Return whether the subscribers that the master knew when the topic was advertised are connected."""
+        return self._shared is None or self._shared.joining is None or self._shared.joining.done()
+
+    async def joined(self) -> None:
+        """Wait for those subscribers, for a second at most: a message that is published before does not reach them."""
+        if self._shared and self._shared.joining:
+            await asyncio.wait([self._shared.joining])
+
+    def publish(self, body: bytes) -> None:
+        """Publish a serialized message. Does not wait. For any thread."""
+        shared = self._shared
+        if shared:
+            shared.publisher.publish_raw(body)
+
+    def publish_when_joined(self, body: bytes) -> None:
+        """Publish once the subscribers of that moment are connected, in order. Does not wait; the newest messages are kept."""
+        if self._waiting is None:
+            if self.has_joined or not (self._shared and self._shared.joining):
+                self.publish(body)
+                return
+            self._waiting = deque()
+            self._shared.joining.add_done_callback(lambda _: self._publish_waiting())
+
+        self._waiting.append(body)
+        self._graph.waiting_bytes += len(body)
+        while len(self._waiting) > _QUEUE or (
+            self._graph.waiting_bytes > _MOST_WAITING and len(self._waiting) > 1
+        ):
+            self._graph.waiting_bytes -= len(self._waiting.popleft())
+
+    def _publish_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, None
+        for body in waiting or ():
+            self._graph.waiting_bytes -= len(body)
+            self.publish(body)
+
+    def close(self) -> None:
+        """End it; the topic is advertised until its last client has left. Idempotent."""
+        self._publish_waiting()
+        shared, self._shared = self._shared, None
+        if shared:
+            self._graph.left_publisher(self.topic, shared)
+
+
+@dataclass
+class _SharedPublisher:
+    type: InterfaceType
+    latch: bool
+    publisher: Publisher[Message]
+    joining: asyncio.Task[None] | None = None
+    clients: int = 0
+
+
+class SharedGraph:
+    """The graph for all clients of the bridge; on the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        filters: Filters | None = None,
+        *,
+        slowest_look: float = 1.0,
+        clock: Callable[[], int] | None = None,
+    ) -> None:
+        """``slowest_look``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
+        self.node = node
+        self._clock = clock
+        self.waiting_bytes = 0
+        """Bytes of the clients' messages that wait for subscribers of new topics."""
+        self.filters = filters or Filters()
+        self.snapshot = Snapshot()
+        self.topics: dict[str, SharedTopic] = {}
+        self.texts = TypeTexts(node)
+        self._is_first_look = True
+        self._slowest_look = max(slowest_look, FASTEST_LOOK)
+        self._listeners: list[GraphListener] = []
+        self._publishers: dict[str, _SharedPublisher] = {}
+        self._look_soon = asyncio.Event()
+        self._looking = asyncio.Lock()
+        self._faults = Faults(_log, "a task of the bridge")
+        self._watching: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._has_new_types = False
+        self._service_types = NodeQueries(
+            self._service_type, Faults(_log, "the query for a service's type"), arrived_late=self.look_soon
+        )
+
+    def now(self) -> int:
+        """Return the time of messages in nanoseconds: the node's, unless ``clock`` gives another."""
+        if self._clock:
+            return self._clock()
+        now = self.node.now()
+        return now.secs * 1_000_000_000 + now.nsecs
+
+    async def close(self) -> None:
+        """End everything. Idempotent."""
+        tasks = [*self._tasks, *([self._watching] if self._watching else [])]
+        self._watching = None
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._service_types.close()
+        await self.texts.close()
+
+    # --- the graph
+
+    def watch(self, listener: GraphListener) -> None:
+        """Call ``listener`` with each change of the graph, the first of which is the whole graph where nobody watched."""
+        self._listeners.append(listener)
+        if self._watching is None:
+            self.snapshot = Snapshot()
+            self._is_first_look = True
+            self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
+        self._look_soon.set()
+
+    def unwatch(self, listener: GraphListener) -> None:
+        """Call it no more; nobody looks at the graph while nobody watches."""
+        with contextlib.suppress(ValueError):
+            self._listeners.remove(listener)
+        if not self._listeners and self._watching:
+            self._watching.cancel()
+            self._watching = None
+
+    def look_soon(self) -> None:
+        """Look at the graph now: it has changed."""
+        self._look_soon.set()
+
+    async def look(self) -> None:
+        """Look at the graph, and report what has changed. Raises MasterUnreachableError, RpcError."""
+        # One at a time: a look that started earlier must not replace the snapshot of a later one.
+        async with self._looking:
+            found = await fetch(self.node._node.master)
+            await self._look_up_services(found)
+            after = found.filtered(self.filters.topics, self.filters.services)
+            before, self.snapshot = self.snapshot, after
+            changes = compare(before, after)
+            is_first, self._is_first_look = self._is_first_look, False
+            has_types, self._has_new_types = self._has_new_types, False
+            if changes or is_first or has_types or before.types != after.types:
+                for listener in tuple(self._listeners):
+                    try:
+                        listener(changes)
+                    except Exception as error:  # noqa: BLE001 - of one client: the others are notified
+                        self._faults.report(error)
+
+    async def _watch(self) -> None:
+        pause = FASTEST_LOOK
+        is_reported = False
+
+        # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the event.
+        task = asyncio.current_task()
+        while self._watching is task:
+            self._look_soon.clear()
+            before = self.snapshot
+            try:
+                await self.look()
+                is_reported = False
+            except (MasterUnreachableError, RpcError) as error:
+                if not is_reported:
+                    _log.warning("the graph cannot be read: %s. Will keep trying.", error)
+                is_reported = True
+            pause = (
+                FASTEST_LOOK
+                if self.snapshot is not before and self.snapshot != before
+                else min(pause * 1.5, self._slowest_look)
+            )
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._look_soon.wait(), pause)
+
+    def service_info(self, service: str) -> ServiceInfo | None:
+        """Return a service's type; None where it is not known, or not installed here."""
+        return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
+
+    async def _look_up_services(self, found: Snapshot) -> None:
+        """Find the types of new services, which the master does not know: their nodes do."""
+        wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
+        await self._service_types.look(wanted, _QUERY_SECONDS)
+
+    async def _service_type(self, key: tuple[str, tuple[str, ...]]) -> ServiceInfo:
+        found = described(key[0], await service_header(self.node, key[0]))
+        self._has_new_types = True
+        return found
+
+    # --- topics
+
+    def subscribe(self, topic: str, listener: TopicListener) -> None:
+        """Call ``listener`` with each message of a topic, and now with what its latched publishers sent last."""
+        shared = self.topics.get(topic)
+        if shared is None:
+            shared = self.topics[topic] = SharedTopic(self, topic)
+        shared.add(listener)
+
+    def unsubscribe(self, topic: str, listener: TopicListener) -> None:
+        """End it; the topic is unsubscribed with its last listener."""
+        shared = self.topics.get(topic)
+        if shared:
+            shared.remove(listener)
+            if not shared.is_wanted:
+                self.spawn(self._end_topic(shared))
+
+    async def _end_topic(self, shared: SharedTopic) -> None:
+        if shared.is_wanted:
+            return  # again
+        await shared.close()
+        if not shared.is_wanted and self.topics.get(shared.topic) is shared:
+            del self.topics[shared.topic]
+
+    def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
+        """Publish a topic. Raise BridgeError where it may not be, or is published with another type."""
+        if not self.filters.publishable(topic):
+            raise BridgeError(f"topic [{topic}] may not be published by clients")
+        shared = self._publishers.get(topic)
+        if shared is None:
+            known = self.snapshot.types.get(topic)
+            if known not in (None, ANY, type_.name):
+                raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
+            publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
+            joining = self.spawn(publisher._wait_for_expected())
+            shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
+            self.look_soon()
+        elif shared.type.md5sum != type_.md5sum:
+            raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")
+        shared.clients += 1
+        return Publication(self, topic, shared)
+
+    def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
+        """Unadvertise a topic with its last client."""
+        shared.clients -= 1
+        if not shared.clients and self._publishers.get(topic) is shared:
+            del self._publishers[topic]
+            self.spawn(shared.publisher.close())
+            self.look_soon()
+
+    # --- services
+
+    async def call(self, service: str, md5sum: str, request: bytes) -> bytes:
+        """Return the bytes of a service's response. Raise ServiceException; BridgeError where it may not be called."""
+        if not self.filters.services(service):
+            raise BridgeError(f"service [{service}] may not be called by clients")
+        return await call_raw(self.node, service, md5sum, request)
+
+    def spawn(self, work: Coroutine[object, object, object]) -> asyncio.Task[None]:
+        """Run a coroutine until :meth:`close`; what it raises is logged."""
+
+        async def guarded() -> None:
+            try:
+                await work
+            except (MasterUnreachableError, RpcError, ServiceException, BridgeError) as error:
+                _log.warning("%s", error)
+            except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+                self._faults.report(error)
+
+        task = asyncio.ensure_future(guarded())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        # A task that is cancelled before its first step has not started the work.
+        task.add_done_callback(lambda _: work.close())
+        return task

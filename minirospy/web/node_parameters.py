@@ -1,0 +1,90 @@
+"""Private parameters of the bridge's nodes, checked; their tokens, which come from the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TypeVar
+
+from minirospy.aio.node import Node
+from minirospy.base.environment import Environment
+from minirospy.base.errors import BridgeError
+from minirospy.web.access import Access, is_loopback
+from minirospy.web.addresses import host_names
+from minirospy.web.tokens import Tokens, kept_tokens
+
+__all__ = ["access_of", "address_of", "globs", "number", "private_parameters", "texts", "value"]
+
+_T = TypeVar("_T", str, int, bool)
+
+_OFF = (None, False, 0, "", "None")
+"""Values of parameters that switch nothing on."""
+
+
+async def private_parameters(
+    node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
+) -> dict[str, object]:
+    """Return a node's private parameters and those ``given`` as arguments; warn of each that is set ``without_effect``."""
+    found = await node.get_param("~", {})
+    private = {**(found if isinstance(found, dict) else {}), **given}
+    for name in without_effect:
+        if private.get(name) not in _OFF:
+            node.log.warning("parameter ~%s has no effect", name)
+    return private
+
+
+def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
+    """Return a parameter. Raises BridgeError where it is of another type."""
+    found = private.get(name, default)
+    if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
+        raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")
+    return found
+
+
+def number(private: Mapping[str, object], name: str, default: float) -> float:
+    """Return a parameter that is a number. Raises BridgeError."""
+    found = private.get(name, default)
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a number")
+    return float(found)
+
+
+def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
+    """Return a parameter that is a list of strings. Raises BridgeError."""
+    found = private.get(name, default)
+    if not isinstance(found, list | tuple) or not all(isinstance(each, str) for each in found):
+        raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a list of strings")
+    return list(found)
+
+
+def globs(private: Mapping[str, object], name: str) -> list[str]:
+    """Return the globs of a parameter as rosbridge has them: a list, or a text such as "['/tf', '/odom*']"; none: all."""
+    found = private.get(name, "")
+    if isinstance(found, str):
+        found = [each.strip().strip("'\"") for each in found.strip().strip("[]").split(",")]
+    return [each for each in texts({name: found}, name, ()) if each]
+
+
+def address_of(private: Mapping[str, object]) -> str:
+    """Return the address to listen at. Raises BridgeError."""
+    return value(private, "address", str, "") or "127.0.0.1"
+
+
+def access_of(
+    private: Mapping[str, object], environ: Mapping[str, str], origins: Iterable[str] = ()
+) -> Access:
+    """Return the rules for clients, with the tokens of the environment.
+
+    Where other machines may connect and there are none, the tokens are those that are kept for this user. Raises BridgeError.
+    """
+    beyond = not is_loopback(address_of(private))
+    tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))
+    if beyond and not any(tokens):
+        tokens = kept_tokens(Environment.read().home)
+    return Access(
+        hosts=tuple(host_names()),
+        origins=tuple(origins),
+        read_token=tokens.read,
+        write_token=tokens.write,
+        requires_token=beyond or any(tokens),
+    )

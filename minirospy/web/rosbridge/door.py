@@ -1,0 +1,176 @@
+"""The rosbridge protocol's server side: what all of its clients share."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from minirospy.base.errors import BridgeError
+from minirospy.core.idl.protocols import Message
+from minirospy.introspect.snapshot import Changes
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+from minirospy.web.graph import Arrival, Publication, SharedGraph
+from minirospy.web.rosbridge import conversion, png
+from minirospy.web.rosbridge.cbor import encode_cbor
+from minirospy.web.rosbridge.services import ClientService
+from minirospy.web.rosbridge.session import RosbridgeSession
+from minirospy.web.rosbridge.types import ArrivingTypes
+
+if TYPE_CHECKING:
+    from minirospy.web.server.connection import WebClient
+
+__all__ = ["RosbridgeDoor", "RosbridgeOptions"]
+
+_SUBPROTOCOL = "rosbridge_v2"
+_LOG_LINES = 20
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class RosbridgeOptions:
+    """``fragment_timeout`` and ``unregister_timeout`` in seconds; ``fragment_size``: of messages to clients, None: whole."""
+
+    fragment_timeout: float = 600.0
+    unregister_timeout: float = 10.0
+    fragment_size: int | None = None
+    authenticate: bool = False
+
+
+class RosbridgeDoor:
+    """Serves the rosbridge protocol. On the loop."""
+
+    def __init__(
+        self,
+        graph: SharedGraph,
+        options: RosbridgeOptions | None = None,
+        on_clients: Callable[[Sequence[RosbridgeSession]], object] = lambda _: None,
+    ) -> None:
+        """``on_clients`` is called with the sessions when one comes or leaves."""
+        self.graph = graph
+        self.options = options or RosbridgeOptions()
+        self.sessions: list[RosbridgeSession] = []
+        self.services: dict[str, ClientService] = {}
+        """Services that clients offer, by name."""
+        self._closing: dict[str, asyncio.Task[None]] = {}
+        self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
+
+        self._thread: ThreadPoolExecutor | None = None
+        self._is_in_thread = asyncio.Lock()
+        self._types = ArrivingTypes()
+        self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
+        self._on_clients = on_clients
+
+    # --- Door
+
+    def select(self, offered: Sequence[str]) -> str | None:
+        """Return the sub-protocol to use."""
+        return _SUBPROTOCOL if _SUBPROTOCOL in offered else None
+
+    def open(self, client: WebClient) -> RosbridgeSession:
+        """Start serving a client."""
+        session = RosbridgeSession(self, client)
+        if not self.sessions:
+            self.graph.watch(_ignore)
+        self.sessions.append(session)
+        self._on_clients(self.sessions)
+        return session
+
+    def close(self) -> None:
+        """End the thread of large messages, after the one that it works on. Idempotent."""
+        if self._thread:
+            self._thread.shutdown(wait=False, cancel_futures=True)
+            self._thread = None
+
+    # --- for sessions
+
+    async def in_thread(self, work: Callable[[], _T]) -> _T:
+        """Return what some work on a large message returns; one thread does it for all clients, one after another."""
+        # What waits is not with the thread: the message of a client that leaves is freed immediately.
+        async with self._is_in_thread:
+            if self._thread is None:
+                self._thread = ThreadPoolExecutor(1, "rosbridge-large")
+            return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    def left(self, session: RosbridgeSession) -> None:
+        """Forget a client."""
+        self.sessions.remove(session)
+        if not self.sessions:
+            self.graph.unwatch(_ignore)
+            self._encoded.clear()
+        self._on_clients(self.sessions)
+
+    def release(self, publication: Publication) -> None:
+        """End a publication after the time that a client may need to advertise it again."""
+        asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
+
+    def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
+        """Start to end a service of a client; return the task."""
+        name = service.name
+        del self.services[name]
+        task = self._closing[name] = self.graph.spawn(service.close(why))
+        task.add_done_callback(lambda _: self._closing.pop(name))
+        return task
+
+    async def free_service(self, name: str, why: str) -> None:
+        """End the service that a client offers by this name, and wait until the name is free."""
+        while name in self.services or name in self._closing:
+            if name in self.services:
+                self.close_service(self.services[name], why)
+            await asyncio.wait([self._closing[name]])
+
+    def forget_topic(self, topic: str) -> None:
+        """Forget the last message of a topic."""
+        self._encoded.pop(topic, None)
+
+    def class_of(self, arrival: Arrival) -> type[Message] | None:
+        """Return the class of a message that came, None where nobody knows it."""
+        return self._types.of(arrival.header)
+
+    def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
+        """Return a message as clients get it, encoded once for all of them. Raises BridgeError where it cannot be."""
+        known = self._encoded.get(topic)
+        if known is None or known[0] is not arrival:
+            known = self._encoded[topic] = arrival, {}
+        made = known[1].get(compression)
+        if made is None:
+            made = known[1][compression] = _encoded(topic, class_, arrival, compression)
+        return made
+
+
+def _ignore(_: Changes) -> None:
+    """Sessions look at the graph when they need it."""
+
+
+def _encoded(topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
+    if compression == "cbor-raw":
+        secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
+        raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}
+        return encode_cbor({"op": "publish", "topic": topic, "msg": raw})
+
+    message = _message(topic, class_, arrival)
+    if compression == "cbor":
+        return encode_cbor({"op": "publish", "topic": topic, "msg": conversion.cbor_values(message)})
+    fields = {"op": "publish", "topic": topic, "msg": conversion.values(message)}
+    text = json.dumps(fields, separators=(",", ":"), allow_nan=False)
+    if compression == "png":
+        text = json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+    return text.encode()
+
+
+def _message(topic: str, class_: type[Message] | None, arrival: Arrival) -> Message:
+    if class_ is None:
+        raise BridgeError(
+            f"messages of [{topic}] are of type [{arrival.header.get('type')}], which is not installed here"
+        )
+    message = class_()
+    try:
+        message.deserialize(bytes(arrival.body))
+    except Exception as error:  # whatever a class of another generator raises on bad bytes
+        raise BridgeError(f"a message of [{topic}] does not fit [{message._type}]: {error}") from error
+    return message

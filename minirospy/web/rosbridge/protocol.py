@@ -1,0 +1,506 @@
+"""The rosbridge protocol, version 2: a client's operations in, events out; the fields of messages out, frames out.
+
+Pure. Texts of errors are those of rosbridge_library. Source: ROSBRIDGE_PROTOCOL.md of
+https://github.com/RobotWebTools/rosbridge_suite, branch ros1.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from minirospy.base.errors import BridgeProtocolError
+from minirospy.web.json_text import MAX_QUICK_CHARACTERS, is_quick_text, load_json, load_json_in_pieces
+from minirospy.web.rosbridge import png
+from minirospy.web.rosbridge.cbor import decode_cbor, encode_cbor
+
+__all__ = [
+    "OPERATIONS",
+    "Advertise",
+    "AdvertiseService",
+    "Auth",
+    "CallService",
+    "Event",
+    "Fragment",
+    "OperationError",
+    "Publish",
+    "ServiceResponse",
+    "SetLevel",
+    "StatusLevel",
+    "Subscribe",
+    "Unadvertise",
+    "UnadvertiseService",
+    "Unsubscribe",
+    "decode",
+    "decode_in_pieces",
+    "encode",
+    "fragments",
+    "is_quick",
+    "parse",
+    "service_call",
+    "service_response",
+    "status",
+]
+
+Id = str | int | float | None
+Compression = str
+COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+
+_MOST_FRAGMENTS = 2_000
+"""Of a message to a client: it may want fragments of one character, each of which is a message."""
+
+_LONGEST_ID = 1000
+_SHOWN = 200
+"""Characters of a client's message that an error repeats."""
+
+
+class StatusLevel(IntEnum):
+    """The severity of a status message; a client gets those up to its level."""
+
+    NONE = 0
+    ERROR = 1
+    WARNING = 2
+    INFO = 3
+
+
+class OperationError(BridgeProtocolError):
+    """An operation that is refused; ``id`` is that of the client's message."""
+
+    def __init__(self, text: str, id_: Id = None) -> None:
+        super().__init__(text)
+        self.id = id_
+
+
+@dataclass(frozen=True)
+class Event:
+    """An operation of a client."""
+
+    id: Id
+
+
+@dataclass(frozen=True)
+class TopicEvent(Event):
+    """An operation on a topic."""
+
+    topic: str
+
+
+@dataclass(frozen=True)
+class ServiceEvent(Event):
+    """An operation on a service."""
+
+    service: str
+
+
+@dataclass(frozen=True)
+class Advertise(TopicEvent):
+    """Publish a topic."""
+
+    type: str
+    latch: bool
+    queue_size: int
+
+
+class Unadvertise(TopicEvent):
+    """Publish it no more."""
+
+
+@dataclass(frozen=True)
+class Publish(TopicEvent):
+    """Send a message."""
+
+    message: object
+    latch: bool
+
+
+@dataclass(frozen=True)
+class Subscribe(TopicEvent):
+    """Receive a topic's messages; ``throttle_rate`` in milliseconds."""
+
+    type: str | None
+    throttle_rate: int
+    queue_length: int
+    fragment_size: int | None
+    compression: Compression
+
+
+class Unsubscribe(TopicEvent):
+    """Receive them no more."""
+
+
+@dataclass(frozen=True)
+class CallService(ServiceEvent):
+    """``arguments``: the fields of the request, a list of their values, or anything else for none."""
+
+    arguments: object
+    fragment_size: int | None
+    compression: Compression
+
+
+@dataclass(frozen=True)
+class ServiceResponse(ServiceEvent):
+    """Answer a call; ``values`` is a text where ``result`` is false."""
+
+    values: object
+    result: bool
+
+
+@dataclass(frozen=True)
+class AdvertiseService(ServiceEvent):
+    """Offer a service."""
+
+    type: str
+
+
+class UnadvertiseService(ServiceEvent):
+    """Offer it no more."""
+
+
+@dataclass(frozen=True)
+class Fragment(Event):
+    data: str
+    number: int
+    total: int
+
+
+@dataclass(frozen=True)
+class SetLevel(Event):
+    level: StatusLevel
+
+
+@dataclass(frozen=True)
+class Auth(Event):
+    """A request of http://wiki.ros.org/rosauth; times in seconds."""
+
+    mac: str
+    client: str
+    dest: str
+    rand: str
+    time: float
+    level: str
+    end: float
+
+
+Fields = Mapping[str, Any]
+
+
+# --- in
+
+
+def is_quick(data: str | bytes) -> bool:
+    """Return whether a message is decoded in a few milliseconds."""
+    return is_quick_text(data) if isinstance(data, str) else len(data) <= MAX_QUICK_CHARACTERS
+
+
+def decode(data: str | bytes) -> Fields:
+    """Return the object that a message is: JSON as text, CBOR as bytes. Raises OperationError."""
+    return _decode(data, load_json)
+
+
+def decode_in_pieces(data: str | bytes) -> Fields:
+    """Do the same for a thread beside the event loop, without keeping the GIL for long."""
+    return _decode(data, load_json_in_pieces)
+
+
+def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
+    try:
+        found = load(data) if isinstance(data, str) else decode_cbor(data)
+    except (ValueError, RecursionError) as error:
+        shown = data[:_SHOWN] if isinstance(data, str) else f"{len(data)} bytes of CBOR ({error})"
+        raise OperationError(f"Unable to deserialize message from client: {shown}") from error
+    if not isinstance(found, dict):
+        shown = _shown(found)
+        raise OperationError(f"Unable to deserialize message from client: {shown}")
+    return found
+
+
+def parse(fields: Fields) -> Event:
+    """Return the event of an operation; a PNG's content is that of the operation in it. Raises OperationError."""
+    id_ = _id(fields)
+    op = fields.get("op")
+    if op is None:
+        raise _without_op(fields, id_)
+    if not isinstance(op, str) or op not in OPERATIONS:
+        raise OperationError(f"Unknown operation: {_shown(op)}.  Allowed operations: {list(OPERATIONS)}", id_)
+    try:
+        if op in _READERS:
+            return _READERS[op](fields, id_)
+        event, readers = _FIELDS[op]
+        return event(id_, *(read(fields) for read in readers))
+    except OperationError:
+        raise
+    except BridgeProtocolError as error:
+        raise OperationError(f"{op}: {error}", id_) from error
+
+
+def _without_op(fields: Fields, id_: Id) -> OperationError:
+    shown = _shown(dict(fields))
+    if "receiver" in fields:
+        return OperationError(
+            "Received a rosbridge v1.0 message.  Please refer to rosbridge.org for the correct format of rosbridge "
+            f"v2.0 messages.  Original message was: {shown}"
+        )
+    return OperationError(
+        "Received a message without an op.  All messages require 'op' field with value one of: "
+        f"{list(OPERATIONS)}.  Original message was: {shown}",
+        id_,
+    )
+
+
+def _shown(value: object) -> str:
+    """Return the start of ``str(value)``, without making the text of all that is in it."""
+    return _text_of(value, _SHOWN)[:_SHOWN]
+
+
+def _text_of(value: object, most: int) -> str:
+    """Return ``str(value)``, or a text that has the same first ``most`` characters, and more."""
+    return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
+
+
+def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
+    """Return the first values in a value from JSON or CBOR: each has a character at least in the text."""
+    if isinstance(value, str) and len(value) > most:
+        # The quotes around a text depend on those in it, also behind the cut.
+        return value[: most + 1] + "".join(quote for quote in "'\"" if quote in value)
+    if isinstance(value, bytes):
+        return value[: most + 1]
+    if isinstance(value, list):
+        first = itertools.takewhile(lambda _: next(numbers) <= most, value)
+        return [_cut(each, most, numbers) for each in first]
+    if isinstance(value, dict):
+        pairs = itertools.takewhile(lambda _: next(numbers) <= most, value.items())
+        return {_cut(key, most, numbers): _cut(each, most, numbers) for key, each in pairs}
+    return value
+
+
+def _id(fields: Fields) -> Id:
+    found = fields.get("id")
+    if found is None or isinstance(found, bool | int | float):
+        return found
+    text = _text_of(found, _LONGEST_ID)
+    if len(text) > _LONGEST_ID:
+        raise OperationError(f"an id has {_LONGEST_ID} characters at most")
+    return text
+
+
+def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
+    """Return a field, ``default`` where it is absent. Raises BridgeProtocolError, with rosbridge's texts."""
+    found = fields.get(name)
+    if found is None:
+        if default is ...:
+            raise BridgeProtocolError(f"Expected a {name} field but none was found.")
+        return default
+    if not isinstance(found, types) or (isinstance(found, bool) and bool not in types):
+        raise BridgeProtocolError(
+            f"Expected field {name} to be one of {types}. Invalid value: {_shown(found)}"
+        )
+    return found
+
+
+def _text(fields: Fields, name: str, default: Any = ...) -> Any:
+    return _value(fields, name, (str,), default)
+
+
+def _compression(fields: Fields) -> Compression:
+    found: str = _text(fields, "compression", "none")
+    if found not in COMPRESSIONS:
+        raise BridgeProtocolError(
+            f"compression {found[:_SHOWN]!r} is unknown: there is {', '.join(COMPRESSIONS)}"
+        )
+    return found
+
+
+def _fragment_size(fields: Fields) -> int | None:
+    found: int | None = _value(fields, "fragment_size", (int,), None)
+    if found is not None and found < 1:
+        raise BridgeProtocolError(f"fragment_size is {found}: it is a number of characters")
+    return found
+
+
+def _number(fields: Fields, name: str, default: float | None = None) -> float:
+    found = _value(fields, name, (int, float), ... if default is None else default)
+    try:
+        number = float(found)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise BridgeProtocolError(f"field {name} is not a number of seconds or milliseconds: {_shown(found)}")
+    return number
+
+
+def _throttle_rate(fields: Fields) -> int:
+    return max(0, int(_number(fields, "throttle_rate", 0)))
+
+
+def _queue_length(fields: Fields) -> int:
+    return max(0, int(_value(fields, "queue_length", (int,), 0)))
+
+
+_Read = Callable[[Fields], object]
+
+
+def _required(name: str) -> _Read:
+    return lambda fields: _text(fields, name)
+
+
+def _latch(fields: Fields) -> bool:
+    return bool(fields.get("latch"))
+
+
+_TOPIC, _SERVICE, _TYPE = (_required(name) for name in ("topic", "service", "type"))
+
+_FIELDS: Mapping[str, tuple[Callable[..., Event], tuple[_Read, ...]]] = {
+    "advertise": (
+        Advertise,
+        (_TOPIC, _TYPE, _latch, lambda fields: _value(fields, "queue_size", (int,), 100)),
+    ),
+    "unadvertise": (Unadvertise, (_TOPIC,)),
+    "publish": (Publish, (_TOPIC, lambda fields: fields.get("msg", {}), _latch)),
+    "subscribe": (
+        Subscribe,
+        (
+            _TOPIC,
+            lambda fields: _text(fields, "type", None) or None,
+            _throttle_rate,
+            _queue_length,
+            _fragment_size,
+            _compression,
+        ),
+    ),
+    "unsubscribe": (Unsubscribe, (_TOPIC,)),
+    "service_response": (
+        ServiceResponse,
+        (_SERVICE, lambda fields: fields.get("values", {}), lambda fields: _value(fields, "result", (bool,))),
+    ),
+    "advertise_service": (AdvertiseService, (_SERVICE, _TYPE)),
+    "unadvertise_service": (UnadvertiseService, (_SERVICE,)),
+    "auth": (
+        Auth,
+        (
+            *(_required(name) for name in ("mac", "client", "dest", "rand")),
+            lambda fields: _number(fields, "t"),
+            _required("level"),
+            lambda fields: _number(fields, "end"),
+        ),
+    ),
+}
+"""The operations whose record has a field for each of these, in its order."""
+
+
+def _call_service(fields: Fields, id_: Id) -> Event:
+    service: str = _text(fields, "service")
+    name, _, old_id = service.partition("#")  # an id of old clients: /rosapi/topics#33
+    return CallService(
+        id_ if id_ is not None or not old_id else old_id,
+        name,
+        fields.get("args", []),
+        _fragment_size(fields),
+        _compression(fields),
+    )
+
+
+def _fragment(fields: Fields, id_: Id) -> Event:
+    number, total, data = (fields.get(name) for name in ("num", "total", "data"))
+    if (
+        id_ is None
+        or type(number) is not int
+        or type(total) is not int
+        or not isinstance(data, str)
+        or not 0 <= number < total
+    ):
+        raise OperationError("received invalid fragment!", id_)
+    return Fragment(id_, data, number, total)
+
+
+def _png(fields: Fields, _: Id) -> Event:
+    text = png.decode(_text(fields, "data"))
+    inner = decode(text)
+    if inner.get("op") == "png":
+        raise BridgeProtocolError("a PNG in a PNG")
+    return parse(inner)
+
+
+def _set_level(fields: Fields, id_: Id) -> Event:
+    level: str = _text(fields, "level")
+    try:
+        return SetLevel(id_, StatusLevel[level.upper()])
+    except KeyError:
+        names = ", ".join(each.name.lower() for each in reversed(StatusLevel))
+        raise BridgeProtocolError(f"Invalid status level {level[:_SHOWN]}; must be one of {names}") from None
+
+
+_READERS: Mapping[str, Callable[[Fields, Id], Event]] = {
+    "call_service": _call_service,
+    "fragment": _fragment,
+    "png": _png,
+    "set_level": _set_level,
+}
+OPERATIONS = (
+    *("call_service", "advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "fragment"),
+    *("advertise_service", "service_response", "unadvertise_service", "png", "set_level", "auth"),
+)
+"""The operations that clients may send, in the order in which errors list them."""
+
+
+# --- out
+
+
+def encode(fields: Fields, compression: Compression = "none") -> str | bytes:
+    """Return a message as text, with CBOR as bytes."""
+    if compression in ("cbor", "cbor-raw"):
+        return encode_cbor(fields)
+    text = json.dumps(fields, separators=(",", ":"), allow_nan=False)
+    if compression == "png":
+        return json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+    return text
+
+
+def fragments(text: str, size: int, id_: Id) -> list[str]:
+    """Return the messages that carry a text in pieces of ``size`` characters; the text itself where it is not longer.
+
+    They are longer where there would be too many.
+    """
+    size = max(size, -(-len(text) // _MOST_FRAGMENTS))
+    if len(text) <= size:
+        return [text]
+    total = -(-len(text) // size)
+    return [
+        json.dumps(
+            {
+                "op": "fragment",
+                "id": id_,
+                "data": text[at * size : (at + 1) * size],
+                "num": at,
+                "total": total,
+            },
+            separators=(",", ":"),
+        )
+        for at in range(total)
+    ]
+
+
+def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
+    """Return a status message."""
+    fields: dict[str, object] = {"op": "status", "level": level.name.lower(), "msg": text}
+    return fields if id_ is None else {**fields, "id": id_}
+
+
+def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
+    """Return the answer to a call; ``values`` is a text where ``result`` is false."""
+    fields: dict[str, object] = {
+        "op": "service_response",
+        "service": service,
+        "values": values,
+        "result": result,
+    }
+    return fields if id_ is None else {**fields, "id": id_}
+
+
+def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
+    """Return the call of a service that the client offers."""
+    return {"op": "call_service", "id": id_, "service": service, "args": arguments}

@@ -1,0 +1,135 @@
+"""Services for clients of rosbridge: calls that they make, and services that they offer."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from minirospy.aio.handle import serialized
+from minirospy.aio.raw import service_header
+from minirospy.base.errors import BridgeError, ServiceException
+from minirospy.core.idl.protocols import Message
+from minirospy.web.graph import SharedGraph
+from minirospy.web.rosbridge import conversion, protocol
+from minirospy.web.rosbridge.types import service_class
+
+if TYPE_CHECKING:
+    from minirospy.aio.services import Service
+    from minirospy.web.rosbridge.session import RosbridgeSession
+
+__all__ = ["ClientService", "InThread", "call"]
+
+_T = TypeVar("_T")
+
+
+class InThread(Protocol):
+    """Runs work on a large message in a thread."""
+
+    async def __call__(self, work: Callable[[], _T]) -> _T: ...
+
+
+async def call(
+    graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
+) -> Message:
+    """Return a service's response. Raises BridgeError, ServiceException, ROSSerializationException.
+
+    ``in_thread`` runs the conversion of arguments that are large.
+    """
+    service = graph.node.resolve(name)
+    info = graph.service_info(service)
+    if info:
+        type_ = info.type
+    else:
+        try:
+            type_ = (await service_header(graph.node, service)).get("type", "")
+        except ServiceException as error:
+            if str(error).endswith("unavailable"):
+                raise BridgeError(f"Service {service} does not exist") from error
+            raise
+    found = service_class(type_)
+
+    def body() -> bytes:
+        request = found._request_class()
+        conversion.fill(request, conversion.request_values(request, arguments), graph.node.now)
+        return serialized(request)
+
+    data = await in_thread(body) if in_thread else body()
+    response = found._response_class()
+    response.deserialize(await graph.call(service, found._md5sum, data))
+    return response
+
+
+class ClientService:
+    """A service that a client offers: calls of the graph go to it, and its answers back."""
+
+    def __init__(self, session: RosbridgeSession, graph: SharedGraph, name: str, type_: str) -> None:
+        """Raise BridgeError where the type is unknown, ServiceException where this node offers the service itself."""
+        self.session = session
+        self.name = name
+        self._graph = graph
+        self._class = service_class(type_)
+        self._ids = itertools.count(1)
+        self._waiting: dict[object, asyncio.Future[Message]] = {}
+        self._service: Service = graph.node.serve(name, self._class, self._handle)
+        graph.look_soon()
+
+    async def close(self, why: str) -> None:
+        """End it; calls under way fail with ``why``."""
+        for future in self._waiting.values():
+            if not future.done():
+                future.set_exception(ServiceException(why))
+        self._waiting.clear()
+        await self._service.close()
+        self._graph.look_soon()
+
+    def answered(self, event: protocol.ServiceResponse) -> None:
+        """Take over a client's answer. Raises BridgeError: values that do not fit, or no call waits for it."""
+        future = self._taken(event)
+        if not event.result:
+            future.set_exception(ServiceException(str(event.values)))
+            return
+        try:
+            response = self._response(event)
+        except conversion.ConversionError as error:
+            future.set_exception(ServiceException(str(error)))
+            raise
+        future.set_result(response)
+
+    async def answered_large(self, event: protocol.ServiceResponse, in_thread: InThread) -> None:
+        """Do the same with a large answer, which is converted in a thread."""
+        future = self._taken(event)
+        try:
+            response = await in_thread(lambda: self._response(event)) if event.result else None
+        except conversion.ConversionError as error:
+            if not future.done():
+                future.set_exception(ServiceException(str(error)))
+            raise
+        if future.done():
+            return  # the call was given up meanwhile
+        if response is None:
+            future.set_exception(ServiceException(str(event.values)))
+        else:
+            future.set_result(response)
+
+    def _taken(self, event: protocol.ServiceResponse) -> asyncio.Future[Message]:
+        future = self._waiting.pop(event.id, None)
+        if future is None or future.done():
+            raise BridgeError(f"no call of service {self.name} with id {event.id} waits for a response")
+        return future
+
+    def _response(self, event: protocol.ServiceResponse) -> Message:
+        response: Message = self._class._response_class()
+        conversion.fill(response, event.values, self._graph.node.now)
+        return response
+
+    async def _handle(self, request: Message) -> Message:
+        id_ = f"service_request:{self.name}:{next(self._ids)}"
+        future = self._waiting[id_] = asyncio.get_running_loop().create_future()
+        self.session.send(protocol.service_call(self.name, conversion.values(request), id_))
+        try:
+            response: Message = await future
+            return response
+        finally:
+            self._waiting.pop(id_, None)

@@ -1,0 +1,187 @@
+"""A client's subscriptions to one topic as one, and when its messages are sent; fragments that come in. Pure."""
+
+from __future__ import annotations
+
+import sys
+from collections import OrderedDict, deque
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from minirospy.web.json_text import width_of
+from minirospy.web.rosbridge.protocol import Fragment, OperationError, Subscribe
+from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES
+
+__all__ = ["Fragments", "Merged", "Pacer", "Room", "merge"]
+
+_T = TypeVar("_T")
+_STRENGTH = ("none", "png", "cbor", "cbor-raw")
+
+MOST_FRAGMENT_BYTES = 64_000_000
+"""Memory of the incomplete messages of one client, and of what keeps them: a wide character takes two or four bytes."""
+_MOST_FRAGMENTS = 100_000
+_FRAGMENT_BYTES = 200
+_MESSAGE_BYTES = 1000
+"""Memory that a fragment takes besides its text, and an incomplete message besides its fragments."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """How the messages of a topic are sent; ``throttle`` in seconds."""
+
+    throttle: float
+    queue_length: int
+    fragment_size: int | None
+    compression: str
+
+
+def merge(subscriptions: Iterable[Subscribe]) -> Merged:
+    """Return what satisfies all subscriptions: the shortest interval, queue and fragments, the strongest compression."""
+    each = tuple(subscriptions)
+    sizes = [one.fragment_size for one in each if one.fragment_size is not None]
+    return Merged(
+        min(one.throttle_rate for one in each) / 1000,
+        min(one.queue_length for one in each),
+        min(sizes, default=None),
+        max((one.compression for one in each), key=_STRENGTH.index),
+    )
+
+
+@dataclass
+class Room:
+    """The bytes of messages that wait for their time, of all topics of a client, and how many may."""
+
+    most: int = DEFAULT_LIMIT
+    taken: int = 0
+
+
+class Pacer(Generic[_T]):
+    """The messages of a topic in time: one in ``throttle`` seconds; the newest ``queue_length`` wait, others are dropped."""
+
+    def __init__(self, room: Room, size_of: Callable[[_T], int]) -> None:
+        """``room`` may be that of other topics, too; ``size_of`` returns the bytes of a message."""
+        self.throttle = 0.0
+        self._room = room
+        self._size_of = size_of
+        self.dropped = 0
+        self._last = float("-inf")
+        self._length = 0
+        self._waiting: deque[_T] = deque()
+
+    def set(self, throttle: float, queue_length: int) -> None:
+        """Change the interval and the length of the queue; the newest stay."""
+        self.throttle, self._length = throttle, queue_length
+        self._trim()
+
+    def arrived(self, message: _T, now: float) -> bool:
+        """Return whether a message is to be sent now; else it waits, or is dropped."""
+        if not self._waiting and now >= self._last + self.throttle:
+            self._last = now
+            return True
+        if self._length:
+            self._waiting.append(message)
+            self._room.taken += self._size_of(message) + ENTRY_BYTES
+            self._trim()
+        else:
+            self.dropped += 1
+        return False
+
+    @property
+    def due(self) -> float | None:
+        """Return when the next message that waits is to be sent."""
+        return self._last + self.throttle if self._waiting else None
+
+    def next(self, now: float) -> _T | None:
+        """Return a message that is due."""
+        if not self._waiting or now < self._last + self.throttle:
+            return None
+        self._last = now
+        return self._popped()
+
+    def clear(self) -> None:
+        """Drop what waits."""
+        while self._waiting:
+            self._popped()
+
+    def _popped(self) -> _T:
+        message = self._waiting.popleft()
+        self._room.taken -= self._size_of(message) + ENTRY_BYTES
+        return message
+
+    def _trim(self) -> None:
+        while (count := len(self._waiting)) > self._length or (
+            count > 1 and self._room.taken > self._room.most
+        ):
+            self._popped()
+            self.dropped += 1
+
+
+class _Parts(NamedTuple):
+    total: int
+    parts: dict[int, str]
+    since: list[float]
+
+    @property
+    def size(self) -> int:
+        return _MESSAGE_BYTES + sum(sys.getsizeof(part) + _FRAGMENT_BYTES for part in self.parts.values())
+
+
+class Fragments:
+    """The fragments of one client that wait for others of their message."""
+
+    def __init__(self, timeout: float = 600.0) -> None:
+        """``timeout``: seconds after which an incomplete message is forgotten."""
+        self._timeout = timeout
+        # The one that got a fragment longest ago is first.
+        self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
+        self.size = 0
+        """Bytes of memory that all of them take."""
+
+    def add(self, fragment: Fragment, now: float) -> str | None:
+        """Return the message that a fragment completes. Raises OperationError."""
+        self._forget_old(now)
+        known = self._messages.get(fragment.id)
+        if known is None:
+            known = self._messages[fragment.id] = _Parts(fragment.total, {}, [now])
+            self.size += known.size
+        if fragment.total != known.total or fragment.number in known.parts:
+            raise OperationError(f"error while trying to append fragment {fragment.number}", fragment.id)
+        self.size += sys.getsizeof(fragment.data) + _FRAGMENT_BYTES
+        known.parts[fragment.number] = fragment.data
+        known.since[0] = now
+        self._messages.move_to_end(fragment.id)
+        if self.size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
+            self._forget(fragment.id)
+            raise OperationError(
+                f"the fragments of message {fragment.id} are too many: {MOST_FRAGMENT_BYTES} bytes and "
+                f"{_MOST_FRAGMENTS} fragments may wait",
+                fragment.id,
+            )
+
+        if len(known.parts) < known.total:
+            return None
+        self._forget(fragment.id)
+        # One wide character makes all of the message wide.
+        width = max(map(width_of, known.parts.values()))
+        if width * sum(map(len, known.parts.values())) > MOST_FRAGMENT_BYTES:
+            raise OperationError(
+                f"message {fragment.id} is too large: {MOST_FRAGMENT_BYTES} bytes of memory are allowed, of which each "
+                f"character takes {width}",
+                fragment.id,
+            )
+        return "".join(known.parts[number] for number in range(known.total))
+
+    def clear(self) -> None:
+        """Forget all incomplete messages."""
+        self._messages.clear()
+        self.size = 0
+
+    def _forget_old(self, now: float) -> None:
+        while self._messages:
+            id_, oldest = next(iter(self._messages.items()))
+            if now - oldest.since[0] <= self._timeout:
+                return
+            self._forget(id_)
+
+    def _forget(self, id_: Hashable) -> None:
+        self.size -= self._messages.pop(id_).size

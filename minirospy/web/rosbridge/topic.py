@@ -1,0 +1,128 @@
+"""A topic that a client of rosbridge subscribes to: its subscriptions merged, its messages in time."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from minirospy.base.errors import BridgeError
+from minirospy.web.graph import Arrival
+from minirospy.web.rosbridge import protocol
+from minirospy.web.rosbridge.protocol import StatusLevel
+from minirospy.web.rosbridge.subscription import Merged, Pacer, merge
+
+if TYPE_CHECKING:
+    from minirospy.web.rosbridge.door import RosbridgeDoor
+    from minirospy.web.rosbridge.session import RosbridgeSession
+
+__all__ = ["MOST_IDS", "ClientTopic"]
+
+MOST_IDS = 100
+"""Subscriptions of one client to one topic, and its advertisements of one."""
+
+
+class ClientTopic:
+    """One subscription to the graph, for all of a client to one topic."""
+
+    def __init__(self, session: RosbridgeSession, door: RosbridgeDoor, name: str) -> None:
+        self.name = name
+        self._session = session
+        self._door = door
+        self._topic = door.graph.node.resolve(name)
+        self._subscriptions: dict[object, protocol.Subscribe] = {}
+        self._merged: Merged | None = None
+        self._pacer: Pacer[Arrival] = Pacer(session.room, lambda arrival: len(arrival.body))
+        self._timer: asyncio.TimerHandle | None = None
+        self._reported: set[str] = set()
+        self._is_closed = False
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether any subscription is left."""
+        return bool(self._subscriptions)
+
+    def add(self, event: protocol.Subscribe) -> None:
+        """Add a subscription; one with an id that is known is replaced."""
+        is_first = not self._subscriptions
+        if event.id not in self._subscriptions and len(self._subscriptions) >= MOST_IDS:
+            raise BridgeError(f"a client may subscribe to a topic {MOST_IDS} times")
+        self._subscriptions[event.id] = event
+        self._update()
+        self._door.graph.subscribe(self._topic, self._arrived)
+        if not is_first:
+            # It was subscribed to once more for the sake of latched messages, which each subscription gets.
+            self._door.graph.unsubscribe(self._topic, self._arrived)
+
+    def remove(self, id_: object) -> None:
+        """Remove a subscription, without an id all."""
+        if id_ is None:
+            self._subscriptions.clear()
+        else:
+            self._subscriptions.pop(id_, None)
+        if self._subscriptions:
+            self._update()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._is_closed = True
+        self._door.graph.unsubscribe(self._topic, self._arrived)
+        self._door.forget_topic(self.name)
+        self._session.client.discard(self.name)
+        self._pacer.clear()
+        if self._timer:
+            self._timer.cancel()
+
+    def _update(self) -> None:
+        self._merged = merge(self._subscriptions.values())
+        self._pacer.set(self._merged.throttle, self._merged.queue_length)
+
+    def _arrived(self, arrival: Arrival) -> None:
+        now = asyncio.get_running_loop().time()
+        if self._pacer.arrived(arrival, now):
+            self._send(arrival)
+            return
+        self._session.count()
+        if self._timer is None:
+            self._wait()
+
+    def _wait(self) -> None:
+        due = self._pacer.due
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_at(due, self._is_due) if due is not None else None
+
+    def _is_due(self) -> None:
+        arrival = self._pacer.next(asyncio.get_running_loop().time())
+        if arrival:
+            self._session.count()
+            self._send(arrival)
+        self._wait()
+
+    def _send(self, arrival: Arrival) -> None:
+        # Encoding a large message, and cutting it into fragments, takes milliseconds for each client.
+        self._session.client.in_turn(lambda: self._send_now(arrival), len(arrival.body))
+
+    def _send_now(self, arrival: Arrival) -> None:
+        if not self._subscriptions or self._is_closed:
+            return
+        assert self._merged
+        compression = self._merged.compression
+        try:
+            class_ = None if compression == "cbor-raw" else self._door.class_of(arrival)
+            data = self._door.encoded(self.name, class_, arrival, compression)
+        except BridgeError as error:
+            if str(error) not in self._reported and len(self._reported) < 10:
+                self._reported.add(str(error))
+                self._session.status(StatusLevel.ERROR, f"subscribe: {error}")
+            return
+
+        client, newest_only = self._session.client, self._merged.queue_length == 1
+        size = self._merged.fragment_size or self._door.options.fragment_size
+        if compression.startswith("cbor"):
+            client.send_message(self.name, b"", data, newest_only=newest_only)
+        elif size and len(data) > size:
+            id_ = f"publish:{self.name}:{arrival.nanoseconds}"
+            client.send_texts(
+                self.name, protocol.fragments(data.decode(), size, id_), newest_only=newest_only
+            )
+        else:
+            client.send_text_message(self.name, data, newest_only=newest_only)

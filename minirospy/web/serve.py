@@ -1,0 +1,188 @@
+"""Running a bridge as a process: its node, until Ctrl-C, SIGTERM or `rosnode kill`."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import importlib
+import signal
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from minirospy.aio.node import Node
+from minirospy.base.errors import BridgeError, MinirospyError, ROSInterruptException
+from minirospy.base.escape import escaped
+from minirospy.base.installation import install_command
+from minirospy.base.signal_dispatch import interrupt_signals
+from minirospy.runtime.master.heap import return_large_blocks
+from minirospy.runtime.transport.loop import new_event_loop
+
+if TYPE_CHECKING:
+    from minirospy.web.bridge import Bridge
+
+__all__ = [
+    "Part",
+    "announce",
+    "exit_status",
+    "prefer_the_loop",
+    "require_libraries",
+    "run",
+    "run_program",
+]
+
+
+_LARGE_BLOCK = 4 * 1024 * 1024
+"""Bytes of a block that goes back to the system when it is freed; a camera's images are smaller, and mapping each costs time."""
+
+
+class Part(Protocol):
+    """What a node does: a bridge, or services."""
+
+    async def start(self) -> None: ...
+
+    async def close(self) -> None: ...
+
+
+_P = TypeVar("_P", bound=Part)
+
+_SWITCH_SECONDS = (
+    0.0005  # a thread keeps the GIL; with Python's 5 ms the loop waits so long after each of its calls
+)
+
+
+def prefer_the_loop() -> None:
+    """Let this process's event loop wait less: for threads that work on large messages, and for the garbage collector.
+
+    Called once all is imported: the collector would visit what was, 15 ms each time that a client sends thousands of arrays.
+    """
+    sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
+    gc.collect()
+    gc.freeze()
+
+
+def require_libraries() -> None:
+    """Raise BridgeError with what to install where the library of the web servers is missing."""
+    try:
+        import websockets.server  # noqa: F401 only whether it is there
+    except ImportError as error:
+        raise BridgeError(
+            f"the bridge needs the library {error.name}: {install_command('minirospy[web]')}"
+        ) from error
+
+
+def run_program(name: str, module: str) -> int:
+    """Run a node's program, whose module imports the libraries; return the exit status, 1 where one is missing."""
+
+    def body() -> int:
+        require_libraries()
+        return int(importlib.import_module(module).main())
+
+    return exit_status(name, body)
+
+
+def exit_status(name: str, body: Callable[[], int]) -> int:
+    """Return the exit status of a program; 1 where ``body`` raises MinirospyError, which is printed in one line."""
+    try:
+        return body()
+    except MinirospyError as error:
+        print(f"{name}: ERROR: {error}", file=sys.stderr)
+        return 1
+
+
+def announce(bridge: Bridge, door: str, text: str, scheme: str = "ws") -> None:
+    """Log where a door is, and whether it needs a token."""
+    listener = bridge.listeners[door]
+    scheme += "s" if listener.is_encrypted else ""
+    bridge.node.log.info("%s %s://%s:%d", text, scheme, listener.host, listener.port)
+    if bridge.options.access.requires_token:
+        bridge.node.log.info(
+            "a token is required: `minirospy bridge --show-tokens` prints those of this user"
+        )
+
+
+def run(
+    name: str,
+    argv: Sequence[str] | None,
+    start: Callable[[Node], Awaitable[_P]],
+    on_started: Callable[[_P], None],
+    *,
+    imports_messages: bool = True,
+    connect: Callable[[_P], Awaitable[None]] | None = None,
+) -> int:
+    """Run a bridge on a node of this name until it is shut down; return the exit status.
+
+    ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
+    it would import message classes. ``connect`` opens what may fail before the node takes its name: the master ends a running
+    node of that name.
+    """
+    return_large_blocks(_LARGE_BLOCK)
+    loop = new_event_loop()
+    try:
+        words = sys.argv[1:] if argv is None else argv
+        node = Node(name, argv=words, rosout=imports_messages, simulated_time=imports_messages)
+        return loop.run_until_complete(_run(node, start, on_started, connect))
+    finally:
+        loop.close()
+
+
+async def _run(
+    node: Node,
+    start: Callable[[Node], Awaitable[_P]],
+    on_started: Callable[[_P], None],
+    connect: Callable[[_P], Awaitable[None]] | None = None,
+) -> int:
+    loop = asyncio.get_running_loop()
+    main = asyncio.current_task()
+    assert main
+    interrupted = False
+
+    def interrupt() -> None:
+        nonlocal interrupted
+        interrupted = True
+        # Before there is a master, the wait for it ends; later the node shuts down.
+        if node.is_started:
+            node.shutdown("signal")
+        else:
+            main.cancel()
+
+    before = {
+        number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
+        for number in (*interrupt_signals(), signal.SIGTERM)
+    }
+    # On Windows a signal is noticed when the loop next wakes up.
+    ticking = asyncio.ensure_future(_tick())
+    bridge: _P | None = None
+    try:
+        if connect is not None:
+            node._start_logging()
+            bridge = await start(node)
+            await connect(bridge)
+        async with node:
+            if bridge is None:
+                bridge = await start(node)
+            try:
+                await bridge.start()
+                on_started(bridge)
+                prefer_the_loop()
+                await node.spin()
+                if node.shutdown_request:
+                    node.log.warning("shutdown request: %s", escaped(node.shutdown_request))
+            finally:
+                await bridge.close()
+    except (asyncio.CancelledError, ROSInterruptException):
+        if not interrupted:
+            raise
+    finally:
+        if bridge is not None:
+            await bridge.close()  # where the node has not been started
+        ticking.cancel()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0
+
+
+async def _tick() -> None:
+    while True:
+        await asyncio.sleep(0.5)

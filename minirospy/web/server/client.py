@@ -1,0 +1,301 @@
+"""The peers that sessions of a protocol and handlers of pages send to: one WebSocket client, one HTTP request."""
+
+from __future__ import annotations
+
+import http
+import struct
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from minirospy.web.access import Credentials, Grant, Refusal
+from minirospy.web.server.account import MAX_BYTES, Account
+from minirospy.web.server.files import FileAnswer
+from minirospy.web.server.queue import DEFAULT_LIMIT, Piece, SendQueue
+from minirospy.web.server.turns import FairTurns
+
+if TYPE_CHECKING:
+    from minirospy.web.server.connection import Connection
+
+__all__ = [
+    "PLAIN_HEADERS",
+    "Door",
+    "Exchange",
+    "HttpHandler",
+    "HttpRequest",
+    "Limits",
+    "Session",
+    "Site",
+    "WebClient",
+    "frame_head",
+    "response_head",
+]
+
+_HEAD_16 = struct.Struct("!BBH")
+_HEAD_64 = struct.Struct("!BBQ")
+_TEXT = 0x81
+_BINARY = 0x82
+
+PLAIN_HEADERS = {
+    "Connection": "close",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
+"""The headers of every answer: what is served changes by the moment, and its path may carry a token."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of one client: bytes of a message, frames a second, bytes that wait, seconds without progress.
+
+    ``connections`` is the number of all clients together; an address may open ``connections_a_second``, and at first
+    ``connection_burst``.
+    """
+
+    message: int = 64_000_000
+    read_only_message: int = 64 * 1024
+    """Bytes of a message of a client that may not write: it subscribes, and sends nothing large."""
+    memory: int = MAX_BYTES
+    """Bytes that are held for all clients together: see account.py."""
+    messages_a_second: int = 20_000
+    """Frames of any kind: empty ones, pings and parts of a message are counted too."""
+    queue: int = DEFAULT_LIMIT
+    connections: int = 256
+    connections_a_second: float = 50.0
+    connection_burst: int = 500
+    reserve: int = 32
+    """Connections beyond that number which may be open until their request is known."""
+    handshake_seconds: float = 30.0
+    """A browser opens connections in advance, and uses them for ten seconds: those must not end here first."""
+    ping_seconds: float = 20.0
+    silent_seconds: float = 60.0
+    """A client that answers no ping, or takes no byte, for this long is disconnected."""
+
+
+class HttpRequest(NamedTuple):
+    """A request; names of headers are in lower case."""
+
+    path: str
+    query: Mapping[str, str]
+    headers: Mapping[str, str]
+    peer: str
+    peer_port: int = 0
+    address: str = ""
+    port: int = 0
+    """The client's port, and the server's address and port, of this connection; see Endpoints in pipe.py."""
+
+
+class Session(Protocol):
+    """A client of a protocol. Called on the loop; what it raises ends the connection."""
+
+    def received_text(self, text: str) -> None: ...
+
+    def received_binary(self, data: bytes) -> None: ...
+
+    def ended(self) -> None: ...
+
+
+class Door(Protocol):
+    """A protocol over WebSocket."""
+
+    def select(self, offered: Sequence[str]) -> str | None:
+        """Return the sub-protocol to use, None for none. Raise LookupError with the reason for a refusal."""
+
+    def open(self, client: WebClient) -> Session: ...
+
+
+HttpHandler = Callable[["Exchange"], None]
+"""Answers a request now, or later, by the methods of the exchange."""
+
+
+class Site(Protocol):
+    """The contents that a listener serves."""
+
+    @property
+    def limits(self) -> Limits: ...
+
+    @property
+    def doors(self) -> Sequence[Door]: ...
+
+    @property
+    def turns(self) -> FairTurns: ...
+
+    def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal: ...
+
+    def page(self, path: str) -> HttpHandler | None: ...
+
+    def admit(self, connection: Connection, grant: Grant) -> Refusal | None: ...
+
+    @property
+    def account(self) -> Account: ...
+
+    def left(self, connection: Connection) -> None: ...
+
+
+class WebClient:
+    """One WebSocket client, for the session of its protocol."""
+
+    def __init__(
+        self, connection: Connection, request: HttpRequest, grant: Grant, subprotocol: str | None
+    ) -> None:
+        self.request = request
+        self.grant = grant
+        self.subprotocol = subprotocol
+        self._connection = connection
+
+    @property
+    def name(self) -> str:
+        """Return the client's address, for people."""
+        return self.request.peer
+
+    @property
+    def may_write(self) -> bool:
+        """Return whether the client may publish, call services and set parameters."""
+        return self.grant is not Grant.READ
+
+    @property
+    def is_owner(self) -> bool:
+        """Return whether the client may start programs and open files, as the user who runs the server."""
+        return self.grant is Grant.OWN
+
+    def why_not_owner(self, what: str) -> str:
+        """Return the line for a client that is no owner and so may not ``what``."""
+        if self.may_write:
+            return f"only a client that has the token may {what}: open the link that the command printed"
+        return f"this token is read-only: it does not let you {what}"
+
+    @property
+    def queue(self) -> SendQueue:
+        """Return the frames that wait for the client, and the counts."""
+        return self._connection.queue
+
+    def send_text(self, text: str) -> None:
+        """Send an answer as text; it is never dropped."""
+        data = text.encode()
+        self._connection.answer((frame_head(_TEXT, len(data)), data))
+
+    def send_binary(self, *pieces: Piece) -> None:
+        """Send an answer as one binary message; it is never dropped."""
+        self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
+
+    def send_file(self, answer: FileAnswer) -> None:
+        """Send a file as one binary message, read in pieces when its turn comes; ``answer`` is without frames."""
+        self._connection.answer_file(
+            FileAnswer(answer.open, partial(_file_head, answer), partial(_file_failure, answer))
+        )
+
+    def holds(self, count: int) -> None:
+        """Count the bytes that the session keeps of the client: of messages that wait for others, or are handled."""
+        self._connection.session_holds(count)
+
+    def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
+        """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
+        front = frame_head(_BINARY, len(head) + len(payload)) + head
+        self._connection.stream(key, (front, payload), newest_only=newest_only)
+
+    def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
+        """Do the same as a text message; ``text`` is UTF-8."""
+        self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
+
+    def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
+        """Send one message of a stream as several text messages, of which all wait or none."""
+        pieces: list[Piece] = []
+        for text in texts:
+            data = text.encode()
+            pieces += (frame_head(_TEXT, len(data)), data)
+        self._connection.stream(key, tuple(pieces), newest_only=newest_only)
+
+    def discard(self, key: Hashable) -> None:
+        """Drop what waits under a key."""
+        self._connection.queue.discard(key)
+
+    def in_turn(self, work: Callable[[], None], size: int) -> None:
+        """Do work that takes long for the client in its turn; ``size``: bytes that it keeps until then."""
+        self._connection.in_turn(work, size)
+
+    def pause(self) -> None:
+        """Handle no more of what the client sends, until :meth:`resume`."""
+        self._connection.hold(is_held=True)
+
+    def resume(self) -> None:
+        """Go on with what the client sends."""
+        self._connection.hold(is_held=False)
+
+    def close(self, code: int = 1000, reason: str = "") -> None:
+        """End the connection after what waits; ``reason`` is cut to 123 bytes."""
+        self._connection.close_websocket(code, reason)
+
+
+class Exchange:
+    """One HTTP request and its answer."""
+
+    def __init__(self, connection: Connection, request: HttpRequest, grant: Grant) -> None:
+        self.request = request
+        self.grant = grant
+        self.on_end: Callable[[], None] = lambda: None
+        """Called when the client has disconnected."""
+        self._connection = connection
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether the client is still there and the answer has not ended."""
+        return self._connection.is_open
+
+    @property
+    def queue(self) -> SendQueue:
+        """Return the frames that wait for the client, and the counts."""
+        return self._connection.queue
+
+    def respond(
+        self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
+    ) -> None:
+        """Answer, and close the connection."""
+        head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
+                                       "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
+        self._connection.answer((head, body))
+        self._connection.close_when_sent()
+
+    def start(self, status: int, content_type: str, **headers: str) -> None:
+        """Start an answer whose parts follow, until :meth:`end`."""
+        self._connection.answer(
+            (response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type, **_dashed(headers)}),)
+        )
+
+    def send(self, key: Hashable, *pieces: Piece, newest_only: bool = True) -> None:
+        """Send a part; older ones of ``key`` give way where the client is slow."""
+        self._connection.stream(key, pieces, newest_only=newest_only)
+
+    def end(self) -> None:
+        """End the answer after what waits."""
+        self._connection.close_when_sent()
+
+
+def _file_head(answer: FileAnswer, size: int) -> bytes:
+    head = answer.head(size)
+    return frame_head(_BINARY, len(head) + size) + head
+
+
+def _file_failure(answer: FileAnswer, why: str) -> bytes:
+    message = answer.failure(why)
+    return frame_head(_BINARY, len(message)) + message
+
+
+def frame_head(opcode: int, length: int) -> bytes:
+    """Return the head of a server's frame that is a whole message."""
+    if length < 126:
+        return bytes((opcode, length))
+    if length < 65536:
+        return _HEAD_16.pack(opcode, 126, length)
+    return _HEAD_64.pack(opcode, 127, length)
+
+
+def response_head(status: int, headers: Mapping[str, str]) -> bytes:
+    lines = [f"HTTP/1.1 {status} {http.HTTPStatus(status).phrase}"]
+    lines += [f"{name}: {value}" for name, value in headers.items()]
+    return ("\r\n".join(lines) + "\r\n\r\n").encode("latin-1", errors="replace")
+
+
+def _dashed(headers: Mapping[str, str]) -> dict[str, str]:
+    return {name.replace("_", "-"): value for name, value in headers.items()}

@@ -1,0 +1,289 @@
+"""A socket on the event loop: bytes in by a callback, pieces out without joining them.
+
+``PlainPipe`` hands the kernel the pieces as they are (``sendmsg``), so that an image is not copied for each client;
+``TlsPipe`` has asyncio encrypt them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+from minirospy.web.server.queue import Piece
+
+__all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
+
+SMALL_READ = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
+LARGE_READ = 256 * 1024  # of a client that is alone with a large message
+_MOST_PIECES = 128
+"""Pieces of one call of sendmsg; a system takes 1024 at most."""
+
+
+class Endpoints(NamedTuple):
+    """The peer's port, and the address and port of this end; empty if it has ended, or is not one of TCP."""
+
+    peer_port: int = 0
+    address: str = ""
+    port: int = 0
+
+
+class PipeEvents(Protocol):
+    """The callbacks of a pipe, on the loop."""
+
+    def received(self, data: bytes) -> None:
+        """Take over bytes."""
+
+    def writable(self) -> None:
+        """Write more: what was written before is with the kernel."""
+
+    def ended(self) -> None:
+        """Forget the connection, which has ended, however that was; called once."""
+
+
+class Pipe(Protocol):
+    """One connection. ``is_full``: what was written is not with the kernel yet; ``copies``: it waits as a copy.
+
+    ``read_bytes``: how many to take from the kernel at a time, where that can be chosen.
+    """
+
+    read_bytes: int
+
+    @property
+    def is_full(self) -> bool: ...
+
+    @property
+    def unsent(self) -> int: ...
+
+    @property
+    def copies(self) -> bool: ...
+
+    @property
+    def endpoints(self) -> Endpoints: ...
+
+    def write(self, pieces: Sequence[Piece]) -> None: ...
+
+    def pause(self) -> None: ...
+
+    def resume(self) -> None: ...
+
+    def close(self, *, flush: bool = True) -> None: ...
+
+
+class PlainPipe:
+    """A TCP connection."""
+
+    copies = False
+
+    def __init__(self, sock: socket.socket, loop: asyncio.AbstractEventLoop, events: PipeEvents) -> None:
+        self.read_bytes = SMALL_READ
+        self._sock = sock
+        self._loop = loop
+        self._events = events
+        self._rest: list[memoryview] = []
+        self._is_reading = False
+        self._is_closing = False
+        self._is_closed = False
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether something that was written waits for the kernel."""
+        return bool(self._rest)
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait for the kernel."""
+        return sum(map(len, self._rest))
+
+    @property
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._sock)
+
+    def write(self, pieces: Sequence[Piece]) -> None:
+        """Send pieces, or keep what the kernel does not take now."""
+        if self._is_closing:
+            return
+        was_full = bool(self._rest)
+        self._rest += [memoryview(piece) for piece in pieces if len(piece)]
+        if not was_full:
+            self._flush()
+            if self._rest and not self._is_closed:
+                self._loop.add_writer(self._sock, self._writable)
+
+    def pause(self) -> None:
+        """Read no more for now."""
+        if self._is_reading:
+            self._is_reading = False
+            self._loop.remove_reader(self._sock)
+
+    def resume(self) -> None:
+        """Read."""
+        if not self._is_reading and not self._is_closing:
+            self._is_reading = True
+            self._loop.add_reader(self._sock, self._readable)
+
+    def close(self, *, flush: bool = True) -> None:
+        """End the connection, with ``flush`` after what was written has been sent. Idempotent."""
+        self._is_closing = True
+        if not flush or not self._rest:
+            self._end()
+
+    def _readable(self) -> None:
+        try:
+            data = self._sock.recv(self.read_bytes)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._end()
+            return
+        self._events.received(data)
+
+    def _writable(self) -> None:
+        self._flush()
+        if self._is_closed or self._rest:
+            return
+        self._loop.remove_writer(self._sock)
+        if self._is_closing:
+            self._end()
+        else:
+            self._events.writable()
+
+    def _flush(self) -> None:
+        try:
+            while self._rest:
+                sent = _send(self._sock, self._rest[:_MOST_PIECES])
+                done = 0
+                while done < len(self._rest) and sent >= len(self._rest[done]):
+                    sent -= len(self._rest[done])
+                    done += 1
+                del self._rest[:done]
+                if sent:
+                    self._rest[0] = self._rest[0][sent:]
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            self._end()
+
+    def _end(self) -> None:
+        if self._is_closed:
+            return
+        self._is_closing = self._is_closed = True
+        self._rest.clear()
+        self._loop.remove_reader(self._sock)
+        self._loop.remove_writer(self._sock)
+        with contextlib.suppress(OSError):
+            # The peer gets what was sent, also where it has sent more than was read.
+            self._sock.shutdown(socket.SHUT_WR)
+        self._sock.close()
+        self._events.ended()
+
+
+def _endpoints(sock: socket.socket) -> Endpoints:
+    if sock.family not in (socket.AF_INET, socket.AF_INET6):
+        return Endpoints()
+    try:
+        return Endpoints(sock.getpeername()[1], *sock.getsockname()[:2])
+    except OSError:  # it has disconnected
+        return Endpoints()
+
+
+def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
+    if hasattr(sock, "sendmsg"):
+        return sock.sendmsg(pieces)
+    return sock.send(pieces[0])  # Windows
+
+
+class TlsPipe(asyncio.Protocol):
+    """An encrypted connection."""
+
+    copies = True
+
+    def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
+        """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
+        self._connected = connected
+        self.read_bytes = LARGE_READ  # asyncio's own size
+        self._events: PipeEvents | None = None
+        self._transport: asyncio.Transport | None = None
+        self._is_paused = False
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether more waits for the kernel than asyncio's bound."""
+        return self._is_paused
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait for the kernel."""
+        return self._transport.get_write_buffer_size() if self._transport else 0
+
+    @property
+    def endpoints(self) -> Endpoints:
+        """The ports of the peer and of this end, and this end's address."""
+        return _endpoints(self._transport.get_extra_info("socket")) if self._transport else Endpoints()
+
+    def write(self, pieces: Sequence[Piece]) -> None:
+        """Send pieces."""
+        if self._transport and not self._transport.is_closing():
+            self._transport.writelines(pieces)
+
+    def pause(self) -> None:
+        """Read no more for now."""
+        if self._transport and self._transport.is_reading():
+            self._transport.pause_reading()
+
+    def resume(self) -> None:
+        """Read."""
+        if self._transport and not self._transport.is_closing() and not self._transport.is_reading():
+            self._transport.resume_reading()
+
+    def close(self, *, flush: bool = True) -> None:
+        """End the connection. Idempotent."""
+        if self._transport:
+            if flush:
+                self._transport.close()
+            else:
+                self._transport.abort()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Start."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        peer = transport.get_extra_info("peername") or ("?",)
+        self._events = self._connected(self, str(peer[0]))
+        if self._events is None:
+            transport.close()
+
+    def data_received(self, data: bytes) -> None:
+        """Pass on bytes."""
+        if self._events:
+            self._events.received(data)
+
+    def pause_writing(self) -> None:
+        """Wait: the kernel takes no more."""
+        self._is_paused = True
+
+    def resume_writing(self) -> None:
+        """Go on."""
+        self._is_paused = False
+        if self._events:
+            self._events.writable()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End."""
+        events, self._events, self._transport = self._events, None, None
+        if events:
+            events.ended()
+
+
+def tls_context(certificate: str, key: str) -> ssl.SSLContext:
+    """Return what serves with a certificate and its key, both PEM files. Raises OSError, ssl.SSLError."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.load_cert_chain(certificate, key or None)
+    return context

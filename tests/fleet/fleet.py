@@ -1,0 +1,150 @@
+"""Masters, gateways and nodes of a fleet on one loop of the test: loopback alone, no multicast."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+from minirospy import Node
+from minirospy.fleet.gateway import Gateway, GatewayOptions
+from minirospy.fleet.network import NetworkOptions
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.transport.loop import LoopThread
+from tests.conftest import free_port
+
+_T = TypeVar("_T")
+SECONDS = 60.0
+
+
+class Place:
+    """A master with its nodes: a robot, or a control room."""
+
+    def __init__(self, fleet: Fleet, master: Master) -> None:
+        self.fleet = fleet
+        self.master = master
+        self.uri = f"http://localhost:{master.port}"
+        self.nodes: list[Node] = []
+
+    def node(self, name: str) -> Node:
+        async def start() -> Node:
+            node = Node(name, rosout=False, master_uri=self.uri)
+            await node.start()
+            self.nodes.append(node)
+            return node
+
+        return self.fleet.run(start())
+
+    def gateway(
+        self, name: str = "", *, endpoint: str = "", listens: bool = False, **options: Any
+    ) -> Gateway:
+        """Start a gateway: of a robot where it has a name, else of a control room."""
+        endpoint = endpoint or self.fleet.endpoint
+        network = NetworkOptions(listen=(endpoint,)) if listens else NetworkOptions(connect=(endpoint,))
+        options.setdefault("imports", not name)
+        gateway = Gateway(
+            self.node(f"fleet_{name or 'control'}"), GatewayOptions(name, network=network, **options)
+        )
+        self.fleet.gateways.append(gateway)
+        self.fleet.run(gateway.start())
+        return gateway
+
+    def names(self) -> set[str]:
+        """Return the topics that the master lists."""
+        return self.fleet.run(self._names())
+
+    def services(self) -> set[str]:
+        return self.fleet.run(self._services())
+
+    async def _names(self) -> set[str]:
+        published, subscribed, _ = await self._state()
+        return {name for name, _ in [*published, *subscribed]}
+
+    async def _services(self) -> set[str]:
+        return {name for name, _ in (await self._state())[2]}
+
+    async def _state(self) -> Any:
+        from minirospy.runtime.rpc.async_client import AsyncRpcClient
+
+        client = AsyncRpcClient()
+        try:
+            answer: Any = await client.call(self.uri, "getSystemState", "/test")
+            return answer[2]
+        finally:
+            await client.close()
+
+
+class Fleet:
+    """All that runs in a test."""
+
+    def __init__(self) -> None:
+        self.loop = LoopThread("test-fleet")
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.places: list[Place] = []
+        self.gateways: list[Gateway] = []
+
+    def run(self, work: Coroutine[object, object, _T]) -> _T:
+        return self.loop.run(work, SECONDS)
+
+    def call(self, function: Callable[[], _T]) -> _T:
+        async def calling() -> _T:
+            return function()
+
+        return self.run(calling())
+
+    def place(self) -> Place:
+        async def start() -> Master:
+            master = Master()
+            await master.start()
+            return master
+
+        place = Place(self, self.run(start()))
+        self.places.append(place)
+        return place
+
+    def until(self, condition: Callable[[], Any]) -> Any:
+        """Return when a condition, checked on the loop, holds: its value."""
+
+        async def waiting() -> Any:
+            while True:
+                found = condition()
+                if asyncio.iscoroutine(found):
+                    found = await found
+                if found:
+                    return found
+                await asyncio.sleep(0.02)
+
+        return self.run(waiting())
+
+    def until_shown(self, place: Place, *topics: str) -> None:
+        """Return when a place's master lists these topics."""
+
+        async def are_shown() -> bool:
+            return set(topics) <= await place._names()
+
+        self.until(are_shown)
+
+    def until_gone(self, place: Place, *topics: str) -> None:
+        async def are_gone() -> bool:
+            return not set(topics) & await place._names()
+
+        self.until(are_gone)
+
+    def stop(self, gateway: Gateway) -> None:
+        """End a gateway and its node, as a shutdown does."""
+
+        async def ending() -> None:
+            await gateway.close()
+            await gateway.node.close()
+
+        self.gateways.remove(gateway)
+        self.run(ending())
+
+    def close(self) -> None:
+        for gateway in reversed(self.gateways):
+            self.run(gateway.close())
+        for place in self.places:
+            for node in reversed(place.nodes):
+                self.run(node.close())
+            self.run(place.master.close())
+        self.loop.close()

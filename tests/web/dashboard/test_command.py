@@ -1,0 +1,261 @@
+"""`minirospy dashboard` and rqt's commands: as processes, and their usage."""
+
+from __future__ import annotations
+
+import queue
+import re
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+import pytest
+
+from minirospy.cli import dashboard as command
+from minirospy.web.dashboard import browser
+from minirospy.web.dashboard.browser import has_screen, open_link
+from minirospy.workspace.packages import Packages
+
+
+@pytest.fixture
+def started(master: str) -> Iterator[list[subprocess.Popen[str]]]:
+    """Return a list of processes that are ended with the test."""
+    processes: list[subprocess.Popen[str]] = []
+    yield processes
+    for each in processes:
+        if each.poll() is None:
+            each.terminate()
+        each.communicate(timeout=60)
+
+
+def link_of(started: list[subprocess.Popen[str]], *words: str) -> str:
+    started.append(
+        subprocess.Popen(
+            [sys.executable, *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+    )
+    stdout = started[-1].stdout
+    assert stdout
+    line = stdout.readline()
+    assert line.startswith("Open in a browser: "), line + stdout.read()
+    return line.removeprefix("Open in a browser: ").strip()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another process")
+def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
+    started: list[subprocess.Popen[str]],
+) -> None:
+    link = link_of(started, "-m", "minirospy", "dashboard", "topics", "--no-browser", "--port", "0")
+    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#/topics\?token=[\w-]{22}", link)
+    assert found
+    connection = HTTPConnection("127.0.0.1", int(found[1]), timeout=60)
+    connection.request("GET", "/")
+    assert connection.getresponse().status == 200
+    connection.close()
+    started[0].send_signal(signal.SIGINT)
+    assert started[0].wait(60) == 0
+
+
+@pytest.mark.parametrize("words", [["workshop"], ["--layout", "workshop"]])
+def test_layout_of_the_page_is_opened(started: list[subprocess.Popen[str]], words: list[str]) -> None:
+    link = link_of(started, "-m", "minirospy", "dashboard", *words, "--no-browser", "--port", "0")
+    assert "/#/layout?preset=workshop&token=" in link
+
+
+def test_second_dashboard_takes_another_port(started: list[subprocess.Popen[str]]) -> None:
+    links = {link_of(started, "-m", "minirospy", "dashboard", "--no-browser") for _ in range(2)}
+    assert len(links) == 2
+
+
+def test_port_in_use_is_one_line(
+    started: list[subprocess.Popen[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    link = link_of(started, "-m", "minirospy", "dashboard", "--no-browser", "--port", "0")
+    port = link.rpartition(":")[2].partition("/")[0]
+    assert command.dashboard(["--no-browser", "--port", port]) == 1
+    error = capsys.readouterr().err
+    assert f"cannot listen at 127.0.0.1:{port}" in error
+    assert error.count("\n") == 1
+
+
+def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.Popen[str]]) -> None:
+    link = link_of(
+        started,
+        "-m",
+        "minirospy",
+        "dashboard",
+        "--no-browser",
+        "--port",
+        "0",
+        "--listen",
+        "--address",
+        "127.0.0.1",
+    )
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#/topics\?token=[\w-]{22}", link)
+
+
+@pytest.mark.parametrize(
+    ("run", "words", "text"),
+    [
+        (command.dashboard, ["tpics"], "there is no view 'tpics'"),
+        (command.dashboard, ["--layout", "workshp"], "there is no layout 'workshp'"),
+        (command.dashboard, ["plot", "--layout", "teleop"], "'plot' and --layout teleop are two views"),
+        (command.dashboard, ["--port", "70000"], "--port 70000 is not between 0 and 65535"),
+        (command.dashboard, ["--address", "192.0.2.1"], "--address 192.0.2.1 lets other machines connect"),
+        (command.rqt, ["-s", "rqt_moveit"], "there is no view for the plug-in 'rqt_moveit'"),
+    ],
+)
+def test_usage_error_has_status_2(
+    run: object, words: list[str], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert callable(run)
+    assert run(words) == 2
+    assert text in capsys.readouterr().err
+
+
+class Opened(Exception):
+    """Ends the command when the browser has been opened."""
+
+
+def test_browser_is_started_with_a_file_without_code_or_token(
+    master: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    opened: queue.Queue[str] = queue.Queue()
+    pages: list[str] = []
+
+    def open_page(address: str) -> None:
+        pages.append(page_at(address).read_text(encoding="utf-8"))
+        opened.put(address)
+
+    def announce_end(*words: object, **options: object) -> None:
+        if str(words[0]).startswith("The browser opens"):
+            opened.put(opened.get(timeout=60))
+            raise Opened
+
+    monkeypatch.setattr(browser.webbrowser, "open", open_page)
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    monkeypatch.setattr(command, "print", announce_end, raising=False)
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(browser, "_SNAPS", ())
+    with pytest.raises(Opened):
+        command.dashboard(["--port", "0"])
+    assert "code" not in opened.get()
+    link = r"http://127\.0\.0\.1:\d+/#/topics\?code=[\w-]{22}"
+    assert re.search(f'url={link}"', pages[0])
+    assert re.search(f'href="{link}"', pages[0])
+    assert "token" not in pages[0]
+    # The dashboard has ended.
+    assert not list(tmp_path.iterdir())
+
+
+def page_at(address: str) -> Path:
+    assert address.startswith("file:///"), address
+    return Path(url2pathname(urlsplit(address).path))
+
+
+def test_browser_is_opened_with_a_file_of_this_user_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    opened: queue.Queue[str] = queue.Queue()
+    monkeypatch.setattr(browser.webbrowser, "open", opened.put)
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
+    remove = open_link("http://127.0.0.1:1/#/plot?path=/a&code=x")
+    page = page_at(opened.get(timeout=60))
+    assert page.is_relative_to(tmp_path)
+    assert 'href="http://127.0.0.1:1/#/plot?path=/a&amp;code=x"' in page.read_text(encoding="utf-8")
+    if sys.platform != "win32":
+        assert stat.S_IMODE(page.stat().st_mode) == 0o600
+        assert stat.S_IMODE(page.parent.stat().st_mode) == 0o700
+    assert remove
+    remove()
+    remove()
+    assert not list(tmp_path.iterdir())
+
+
+def test_browser_without_access_to_temporary_files_gets_one_in_the_home_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(browser, "_SNAPS", (Path(sys.executable),))
+    monkeypatch.setattr(browser.Path, "home", lambda: tmp_path)
+    file = browser.LinkFile("http://127.0.0.1:1/")
+    (folder,) = tmp_path.iterdir()
+    assert file.path.parent == folder
+    assert not folder.name.startswith(".")
+    file.remove()
+
+
+def test_no_browser_without_a_screen_or_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(browser.webbrowser, "open", pytest.fail)
+    monkeypatch.setattr(browser, "has_screen", lambda environ: False)
+    assert open_link("http://127.0.0.1:1/") is None
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
+    monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path / "missing"))
+    assert open_link("http://127.0.0.1:1/") is None
+
+
+def test_browser_of_windows_gets_the_link_from_wsl(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: queue.Queue[str] = queue.Queue()
+    monkeypatch.setattr(browser.webbrowser, "open", opened.put)
+    monkeypatch.setenv("WSL_DISTRO_NAME", "Debian")
+    assert open_link("http://127.0.0.1:1/#/topics?code=x")
+    assert opened.get(timeout=60) == "http://127.0.0.1:1/#/topics?code=x"
+
+
+def test_screen_is_known_by_the_environment() -> None:
+    assert not has_screen({}, "linux")
+    assert has_screen({"DISPLAY": ":0"}, "linux")
+    assert has_screen({"BROWSER": "firefox"}, "linux")
+    assert has_screen({}, "darwin")
+
+
+@pytest.mark.parametrize(
+    ("words", "end"),
+    [
+        (["rqt", "-s", "rqt_graph", "--clear-config"], "/#/graph"),
+        (["rqt_console", "__name:=console"], "/#/console"),
+        (
+            ["rqt_plot", "-P", "/turtle1/pose/x:y"],
+            "/#/plot?path=/turtle1/pose/x&path=/turtle1/pose/y&paused=1",
+        ),
+        (["rqt_graph"], "/#/graph"),
+        (["rqt_bag"], "/#/bag"),
+        (["rqt_image_view", "/camera/image_raw"], "/#/image?topic=/camera/image_raw"),
+        (["rqt_reconfigure", "lamp"], "/#/reconfigure?node=/lamp"),
+        (["rviz", "-f", "odom"], "/#/3d?frame=odom"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_commands_of_rqt_open_their_view(
+    started: list[subprocess.Popen[str]], words: list[str], end: str
+) -> None:
+    program = f"import sys; from minirospy.cli.dashboard import {words[0]}; sys.exit({words[0]}())"
+    link = link_of(started, "-c", program, *words[1:], "--no-browser", "--port", "0")
+    assert re.sub(r"[?&]token=[\w-]{22}$", "", link).endswith(end)
+
+
+def test_words_of_rqt_plot_that_are_not_paths_are_usage_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.rqt_plot(["x"]) == 2
+    assert "'x' is not a topic and a field, as /turtle1/pose/x" in capsys.readouterr().err
+
+
+def test_rosrun_finds_the_programs_of_rqt() -> None:
+    packages = Packages()
+    for name in (*command.WINDOWS, "rqt_gui"):
+        if name == "rqt":
+            continue
+        found = packages.find_executable(name, name)
+        assert any(Path(str(word)).name == name for word in found), found

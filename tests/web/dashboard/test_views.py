@@ -1,0 +1,74 @@
+"""Links to views, and the words of rqt's commands."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from minirospy.base.errors import UsageError
+from minirospy.cli.dashboard import _dashboard_parser
+from minirospy.web.dashboard.files import FOLDER
+from minirospy.web.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields, view_of_plugin
+
+
+def test_page_has_the_views_that_links_name() -> None:
+    table = re.search(
+        r"const VIEWS = \{(.*?)\};", (FOLDER / "js" / "main.js").read_text(encoding="utf-8"), re.DOTALL
+    )
+    assert table
+    assert tuple(re.findall(r'"?(\w+)"?: \[', table[1])) == VIEWS
+
+
+def test_page_has_the_layouts_that_links_name() -> None:
+    text = (FOLDER / "js" / "presets.js").read_text(encoding="utf-8")
+    assert tuple(re.findall(r"^  (\w+): \[", text, re.MULTILINE)) == LAYOUTS
+
+
+def test_help_names_all_layouts() -> None:
+    text = " ".join(_dashboard_parser().format_help().split())
+    assert f"several views side by side: {', '.join(LAYOUTS)}" in text
+    # "console" and "teleop" are those of one view.
+    assert "or a layout: workshop, rviz, classroom" in text
+
+
+def test_link_has_its_settings_and_token_in_the_fragment() -> None:
+    assert link("localhost", 8766, "topics") == "http://localhost:8766/#/topics"
+    assert (
+        link("::1", 1, "plot", {"path": ["/a/b[0:2]", "/c d"]}, token="t-1", encrypted=True)
+        == "https://[::1]:1/#/plot?path=/a/b[0:2]&path=/c%20d&token=t-1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "paths"),
+    [
+        (["/turtle1/pose/x"], ["/turtle1/pose/x"]),
+        (["/turtle1/pose/x:y:theta"], ["/turtle1/pose/x", "/turtle1/pose/y", "/turtle1/pose/theta"]),
+        (["/a/x,/b/y", "/c/z"], ["/a/x", "/b/y", "/c/z"]),
+        (["pose/x:y"], ["/pose/x", "/pose/y"]),
+        (["/scan/ranges[0:5]"], ["/scan/ranges[0:5]"]),
+        (["/button_state"], ["/button_state"]),
+        ([], []),
+    ],
+)
+def test_words_of_rqt_plot_become_paths(words: list[str], paths: list[str]) -> None:
+    assert plotted_fields(words) == paths
+
+
+@pytest.mark.parametrize("word", ["x", "/x:y"])
+def test_word_that_is_not_a_path_is_refused(word: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(word)):
+        plotted_fields([word])
+
+
+def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
+    assert view_of_plugin("topics") == "topics"
+    assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
+    assert view_of_plugin("rqt_top") == view_of_plugin("rqt_top/Top") == "nodes"
+    assert view_of_plugin("rqt_robot_steering") == "teleop"
+    assert view_of_plugin("rqt_robot_monitor") == view_of_plugin("rqt_runtime_monitor") == "diagnostics"
+    with pytest.raises(
+        UsageError, match=r"there is no view for the plug-in 'rqt_moveit': there are .*rqt_topic"
+    ):
+        view_of_plugin("rqt_moveit")

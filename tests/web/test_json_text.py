@@ -1,0 +1,177 @@
+"""Texts of clients: their memory; JSON with limits, and the parser in pieces against the library's."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import sys
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from minirospy.web import json_text
+from minirospy.web.json_text import is_quick_text, load_json, load_json_in_pieces, size_in_memory, width_of
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=30,
+)
+ALPHABET = '[]{}",:01.e-+ \n\\atrufalsn'
+
+
+def outcome(load: Any, text: str) -> str:
+    """Return what a parser makes of a text: a value's repr, which NaN has too, or that it is refused."""
+    try:
+        return repr(load(text))
+    except (ValueError, RecursionError):
+        return "refused"
+
+
+@pytest.fixture(autouse=True)
+def _small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(json_text, "_PIECE", 8)
+
+
+@given(VALUES, st.sampled_from([None, 0, 3]), st.booleans())
+def test_pieces_give_what_the_library_gives(value: object, indent: int | None, is_ascii: bool) -> None:
+    text = json.dumps(value, indent=indent, ensure_ascii=is_ascii)
+    assert outcome(load_json_in_pieces, text) == outcome(json.loads, text)
+
+
+@given(st.text(ALPHABET, max_size=40))
+def test_what_the_library_refuses_is_refused(text: str) -> None:
+    assert outcome(load_json_in_pieces, text) == outcome(json.loads, text)
+
+
+def test_mutations_give_what_the_library_gives() -> None:
+    chosen = random.Random(1)
+    base = json.dumps(
+        {"op": "publish", "msg": {"data": [1.5, -2, 3e9] * 8, "points": [{"x": 1}, [], [2, "a,]"]] * 3}}
+    )
+    for _ in range(20_000):
+        letters = list(base)
+        for _ in range(chosen.randrange(1, 4)):
+            at = chosen.randrange(len(letters))
+            letters[at : at + chosen.randrange(2)] = chosen.choice(ALPHABET)
+        text = "".join(letters)
+        assert outcome(load_json_in_pieces, text) == outcome(json.loads, text), text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[1,2,3,4,5,6,7,8,]",
+        "[1,          ,2]",
+        "[,1]",
+        "[1 2,3,4,5,6]",
+        "[" + "[" * 5000,
+        '["a" "b"]',
+        "[1,2",
+        "[NaN,1,]",
+    ],
+)
+def test_broken_arrays_are_refused(text: str) -> None:
+    assert outcome(load_json_in_pieces, text) == outcome(json.loads, text) == "refused"
+
+
+def test_one_call_of_the_library_parses_a_piece_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths: list[int] = []
+    loads = json.loads
+
+    def noting(text: str) -> Any:
+        lengths.append(len(text))
+        return loads(text)
+
+    monkeypatch.setattr(json, "loads", noting)
+    value = {"a": [[]] * 100 + [1.5] * 1000 + ["s"] * 50 + [2] * 1000}
+    assert load_json_in_pieces(json.dumps(value)) == value
+    assert lengths
+    assert max(lengths) <= 8 + 2
+
+
+def test_too_many_values_are_refused() -> None:
+    for load in (load_json, load_json_in_pieces):
+        with pytest.raises(ValueError, match="more than 1000000 values"):
+            load("[" + "[]," * 1_000_000 + "0]")
+    with pytest.raises(ValueError, match="more than 10 values"):
+        load_json("[" + "1," * 11 + "0]", max_values=10)
+    with pytest.raises(ValueError, match="more than 5 values"):
+        load_json("[[],[],[],[],[],[]]", max_collections=5)
+    assert math.isnan(load_json("NaN"))  # type: ignore[arg-type]
+
+
+def test_large_texts_of_few_values_are_quick() -> None:
+    assert is_quick_text("[" + "[]," * 20_000 + "0]")
+    assert not is_quick_text("[" + "[]," * 30_000 + "0]")
+    assert is_quick_text('{"data": "' + "A" * 2_000_000 + '"}')
+    assert not is_quick_text('{"data": "' + "A" * 5_000_000 + '"}')
+
+
+WIDE = "\U0001f600"
+
+
+def slow_width(text: str) -> int:
+    """Return the width by looking at each character."""
+    highest = max(map(ord, text), default=0)
+    return 4 if highest > 0xFFFF else 2 if highest > 0xFF else 1
+
+
+@given(st.text(max_size=20), st.integers(1, 60))
+@example("", 1)
+@example("a", 1000)
+@example("\x80", 1)
+@example("\xff", 1)
+@example("\u0100", 1)
+@example("\uffff", 1)
+@example("\U00010000", 1)
+@example("\xff", 99)
+@example("\xff", 100)
+@example("\u0100", 99)
+@example("\u0100", 100)
+@example("\uffff", 100)
+@example("\U00010000", 100)
+@example(WIDE, 1)
+def test_width_and_size_are_those_of_memory(part: str, times: int) -> None:
+    text = part * times
+    assert width_of(text) == slow_width(text)
+    # Not the text of the test itself, which may keep a copy in UTF-8.
+    made = "".join(text)
+    assert size_in_memory(text.encode(errors="surrogatepass")) == slow_width(made) * len(made)
+
+
+def test_one_wide_character_makes_a_text_four_times_as_large() -> None:
+    data = b"a" * 100_000
+    assert size_in_memory(data) == 100_000
+    data += WIDE.encode()
+    assert size_in_memory(data) == size_in_memory(bytearray(data)) == 4 * 100_001
+    assert sys.getsizeof(data.decode()) > 400_000
+
+
+@pytest.mark.parametrize(
+    ("mark", "most", "what"),
+    [(",", 5_000_000, "values"), ("[", 1_000_000, "values"), ("{", 1_000_000, "values")],
+)
+def test_values_lists_and_objects_are_limited(mark: str, most: int, what: str) -> None:
+    """Marks within strings count, too: such a text is quickly parsed."""
+    text = f'"{mark * most}"'
+    assert load_json(text) == mark * most
+    with pytest.raises(ValueError, match=f"more than {most} {what}"):
+        load_json(f'"{mark * (most + 1)}"')
+
+
+def test_lists_and_objects_count_together() -> None:
+    text = '"' + "[" * 600_000 + "{" * 400_000
+    assert load_json(f'{text}"')
+    with pytest.raises(ValueError, match="more than 1000000 values"):
+        load_json(f'{text}{{"')
+
+
+def test_short_texts_and_bytes_are_only_parsed() -> None:
+    assert load_json('{"a": [1, 2.5, null]}') == {"a": [1, 2.5, None]}
+    assert load_json(b"[]") == []
+    with pytest.raises(ValueError, match="Expecting value"):
+        load_json("")

@@ -1,0 +1,145 @@
+"""The ROS side that clients share: what is ended while it starts, and what ends while it waits."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+
+from minirospy.core.wire.header import serialize_header
+from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.introspect.snapshot import Snapshot
+from minirospy.web.graph import SharedGraph
+
+if TYPE_CHECKING:
+    from tests.web.conftest import Running
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running, turns: int) -> None:
+    async def advertise_and_close() -> None:
+        graph = bridge.bridge.graph
+        publication = graph.advertise("/short", InterfaceType.of(String))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        publication.close()
+        # Raises what a task has raised.
+        await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
+        assert "/short" not in graph.node._published
+
+    bridge.run(advertise_and_close())
+
+
+def test_nodes_that_do_not_answer_keep_nobody_from_the_others(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.web.foxglove.channels._SECONDS", 1.0)
+    bridge.publisher(bridge.node("talker"), "/chatter", String)
+    with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+
+        async def register() -> None:
+            master = bridge.bridge.node._node.master
+            for number in range(20):
+                uri = f"http://{address}/"
+                await master("registerPublisher", f"/t{number}", "odd_msgs/Odd", uri)
+                await master("registerService", f"/s{number}", f"rosrpc://{address}", uri)
+
+        bridge.run(register())
+        start = time.monotonic()
+        client = bridge.client()
+        assert client.channel("/chatter")
+        assert client.channel("/t19")
+        assert client.channels["/t19"]["schemaName"] == "odd_msgs/Odd"
+        assert time.monotonic() - start < 100
+
+
+def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
+    bridge.publisher(bridge.node("talker"), "/chatter", String)
+    may_answer = threading.Event()
+    fields = {"callerid": "/late", "type": Empty._type, "md5sum": Empty._md5sum}
+
+    def answer(server: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                sock, _ = server.accept()
+                with sock:
+                    may_answer.wait()
+                    # The probe may have given up: then there is another.
+                    with contextlib.suppress(OSError):
+                        sock.sendall(serialize_header(fields))
+                        sock.recv(4096)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=answer, args=(server,), daemon=True)
+        thread.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+
+        async def register() -> None:
+            master = bridge.bridge.node._node.master
+            await master("registerService", "/late", f"rosrpc://{address}", f"http://{address}/")
+
+        bridge.run(register())
+        client = bridge.client()
+        # Topics are offered when the bridge has waited for services.
+        assert client.channel("/chatter")
+        assert "/late" not in client.services
+        may_answer.set()
+        assert client.service("/late")
+
+
+def test_earlier_look_does_not_replace_the_snapshot_of_a_later_one(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    snapshots = [Snapshot(), Snapshot(publishers={"/new": ("/talker",)})]
+    is_waiting, may_end = asyncio.Event(), asyncio.Event()
+
+    async def fetch(_: object) -> Snapshot:
+        return snapshots.pop(0)
+
+    async def look_up_services(_: object) -> None:
+        """Wait for the type of a service in the first look."""
+        if not is_waiting.is_set():
+            is_waiting.set()
+            await may_end.wait()
+
+    async def look_twice() -> None:
+        graph = SharedGraph(bridge.bridge.node)
+        monkeypatch.setattr(graph, "_look_up_services", look_up_services)
+        monkeypatch.setattr("minirospy.web.graph.fetch", fetch)
+        looks = [asyncio.ensure_future(graph.look())]
+        await is_waiting.wait()
+        looks.append(asyncio.ensure_future(graph.look()))
+        for _ in range(10):
+            await asyncio.sleep(0)
+        may_end.set()
+        await asyncio.gather(*looks)
+        assert "/new" in graph.snapshot.publishers
+        await graph.close()
+
+    bridge.run(look_twice())
+
+
+@pytest.mark.parametrize("turns", range(6))
+def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns: int) -> None:
+    """In one of these turns asyncio.wait_for before Python 3.12 swallows the cancelling: the event has come with it."""
+
+    async def look_and_close() -> None:
+        graph = SharedGraph(bridge.bridge.node, slowest_look=60.0)
+        looked = asyncio.Event()
+        graph.watch(lambda _: looked.set())
+        await looked.wait()
+        await asyncio.sleep(0)
+        graph.look_soon()
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        await asyncio.wait_for(graph.close(), 60)
+
+    bridge.run(look_and_close())

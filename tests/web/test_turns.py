@@ -1,0 +1,203 @@
+"""How the clients of a server share its event loop: whose work is done when, with a clock that the test holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from minirospy.web.server.turns import FairTurns
+
+if TYPE_CHECKING:
+    from minirospy.web.server.turns import Share
+
+
+class Machine:
+    """A clock, the iterations of a loop, and clients whose pieces of work take a time."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.soon: list[Callable[[], None]] = []
+        self.done: list[str] = []
+        self.left: dict[str, int] = {}
+        self.shares: dict[str, Share] = {}
+        self.turns = FairTurns(self.soon.append, lambda: self.now, turn=0.004, slice_=0.001)
+
+    def join(self, name: str, seconds: float) -> None:
+        def work(end: float) -> bool:
+            while self.left[name]:
+                self.left[name] -= 1
+                self.done.append(name)
+                self.now += seconds
+                if self.now >= end:
+                    break
+            return bool(self.left[name])
+
+        self.left[name] = 0
+        self.shares[name] = self.turns.join(work)
+
+    def send(self, name: str, pieces: int) -> bool:
+        self.left[name] += pieces
+        return self.turns.start(self.shares[name])
+
+    def iterate(self) -> list[str]:
+        """Run an iteration of the loop; return the clients whose pieces were done, in order."""
+        before = len(self.done)
+        ready, self.soon[:] = list(self.soon), []
+        for function in ready:
+            function()
+        return self.done[before:]
+
+
+def test_little_work_is_done_immediately() -> None:
+    machine = Machine()
+    machine.join("a", 0.0001)
+    assert not machine.send("a", 1)
+    assert machine.done == ["a"]
+    assert not machine.soon
+    machine.now += 1
+    assert not machine.send("a", 5)
+    assert machine.done == ["a"] * 6
+
+
+def test_work_of_all_clients_in_one_iteration_is_bounded() -> None:
+    machine = Machine()
+    names = [f"c{number}" for number in range(250)]
+    for name in names:
+        machine.join(name, 0.0005)
+    start = machine.now
+    for name in names:
+        machine.send(name, 100)
+    # Two pieces are a slice, after which the others are queued; the credit of one turn is used up after four.
+    assert machine.now - start <= 0.005
+    for _ in range(20):
+        start = machine.now
+        assert machine.iterate()
+        assert machine.now - start <= 0.005
+
+
+@pytest.mark.parametrize(("weight", "most"), [(1.0, 251), (16.0, 17)])
+def test_client_that_sends_little_waits_for_a_slice_of_each_other_at_most(weight: float, most: int) -> None:
+    machine = Machine()
+    machine.join("good", 0.0002)
+    machine.shares["good"].weight = weight
+    machine.send("good", 1)
+    names = [f"bad{number}" for number in range(250)]
+    for name in names:
+        machine.join(name, 0.001)
+        machine.send(name, 100_000)
+    for _ in range(200):
+        machine.iterate()
+
+    waits = []
+    for _ in range(50):
+        machine.send("good", 1)
+        before = len(machine.done)
+        while "good" not in machine.done[before:]:
+            machine.iterate()
+        waits.append(machine.done[before:].index("good"))
+        for _ in range(100):
+            machine.iterate()
+    assert max(waits) <= most
+
+
+def test_client_that_sends_little_does_not_wait_for_the_first_long_message_of_each_other() -> None:
+    machine = Machine()
+    machine.join("good", 0.0002)
+    for _ in range(20):
+        machine.send("good", 1)
+        machine.now += 0.05
+    names = [f"bad{number}" for number in range(250)]
+    for name in names:
+        machine.join(name, 0.014)
+        machine.send(name, 100_000)
+    for _ in range(50):
+        machine.send("good", 1)
+        before = len(machine.done)
+        while "good" not in machine.done[before:]:
+            machine.iterate()
+        assert machine.done[before:].index("good") <= 12
+        for _ in range(3):
+            machine.iterate()
+
+
+def test_new_client_is_not_preferred_to_one_that_has_been_idle() -> None:
+    machine = Machine()
+    machine.join("good", 0.0001)
+    machine.join("busy", 0.001)
+    machine.send("good", 1)
+    machine.send("busy", 10_000)
+    for _ in range(10):
+        machine.iterate()
+    for number in range(100):
+        machine.join(f"new{number}", 0.001)
+        machine.send(f"new{number}", 10)
+    machine.send("good", 1)
+    assert machine.iterate()[0] == "good"
+
+
+def test_clients_that_send_much_get_equal_parts() -> None:
+    machine = Machine()
+    machine.join("short", 0.0002)
+    machine.join("long", 0.003)
+    machine.send("short", 100_000)
+    machine.send("long", 100_000)
+    for _ in range(2000):
+        machine.iterate()
+    short, long = (machine.done.count(name) * seconds for name, seconds in (("short", 2), ("long", 30)))
+    assert abs(short - long) <= 60
+
+
+def test_client_that_has_left_is_not_called_again() -> None:
+    machine = Machine()
+    for name in ("a", "b"):
+        machine.join(name, 0.01)
+    assert machine.send("a", 3)
+    assert machine.send("b", 3)
+    machine.turns.leave(machine.shares["b"])
+    assert len(machine.turns) == 1
+    for _ in range(5):
+        machine.iterate()
+    assert machine.done == ["a", "a", "a"]
+    assert not machine.send("b", 1)
+    assert not machine.soon
+
+
+def test_fault_of_one_client_leaves_the_others_their_turns(caplog: pytest.LogCaptureFixture) -> None:
+    machine = Machine()
+    machine.join("good", 0.01)
+
+    def fail(_: float) -> bool:
+        raise ValueError("a fault")
+
+    bad = machine.turns.join(fail)
+    machine.send("good", 3)
+    assert machine.turns.start(bad)
+    for _ in range(6):
+        machine.iterate()
+    assert machine.done == ["good"] * 3
+    assert "a fault" in caplog.text
+
+
+def test_client_does_not_pay_while_other_processes_have_the_processor() -> None:
+    now, used = 100.0, 0.0
+    soon: list[Callable[[], None]] = []
+    done: list[str] = []
+    turns = FairTurns(soon.append, lambda: now, meter=lambda: used, turn=0.004, slice_=0.001)
+
+    def join(name: str, cpu: float, wall: float) -> Share:
+        def work(_: float) -> bool:
+            nonlocal now, used
+            done.append(name)
+            now, used = now + wall, used + cpu
+            return True
+
+        return turns.join(work)
+
+    unlucky, greedy = join("unlucky", 0.001, 0.5), join("greedy", 0.003, 0.003)
+    turns.start(unlucky)
+    turns.start(greedy)
+    while len(done) < 101:
+        soon.pop(0)()
+    assert done.count("unlucky") > 2 * done.count("greedy")
