@@ -27,7 +27,7 @@ ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
 
 _PAGE = re.compile(r"minirospy/web/dashboard/page/(?!vendor/).*\.(js|css)")
-_MODULE = re.compile(r"minirospy/(?!overlay/|ros_packages/).*\.py")
+_MODULE = re.compile(r"minirospy/(?!overlay/).*\.py")
 _COMMENT = re.compile(r"//.*|/\*((?!\*/).)*\*/")
 _CODE_AND_COMMENT = re.compile(r"(.*[;,{}(\[>)])\s+// [^`]*")
 

@@ -47,7 +47,7 @@ _SETTLE_SECONDS = 0.5
 
 def program(stack: str, verb: str) -> list[str]:
     """Return the command of a recorder or player."""
-    code = f"import sys; from minirospy.cli.ros.rosbag_{verb} import main; sys.exit(main())"
+    code = f"import sys; from minirospy.ros.rosbag.commands.rosbag_{verb} import main; sys.exit(main())"
     return [sys.executable, "-c", code] if stack == "minirospy" else [str(CPP / verb)]
 
 

@@ -30,7 +30,7 @@ import psutil
 
 from minirospy.runtime.rpc.client import RpcClient
 
-OURS = [sys.executable, "-m", "minirospy.cli.ros.master", "-q"]
+OURS = [sys.executable, "-m", "minirospy.ros.rosmaster.commands.master", "-q"]
 STACKS = {
     "ours": OURS,
     "ours without journal": [*OURS, "--no-journal"],

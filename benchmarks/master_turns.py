@@ -14,7 +14,7 @@ import time
 from asyncio import events
 from typing import Any
 
-from minirospy.cli.ros.master import main
+from minirospy.ros.rosmaster.commands.master import main
 
 LONG = 0.002
 """Seconds; shorter turns are not written."""

@@ -139,7 +139,7 @@ def measure(name: str, seconds: float) -> Row:
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         _, master = stack.enter_context(
-            started_master(folder, [sys.executable, "-m", "minirospy.cli.ros.master"])
+            started_master(folder, [sys.executable, "-m", "minirospy.ros.rosmaster.commands.master"])
         )
         turns, thread = Path(folder) / "turns", Path(folder) / "thread"
         node = Watch("node", str(turns), str(thread), program=__file__, environ=environ_of(folder, master))

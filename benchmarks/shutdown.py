@@ -146,7 +146,7 @@ def round_of_launch(
     master: MasterProxy, nodes: int, file: Path, environ: dict[str, str], *, kill: bool
 ) -> tuple[float, int]:
     """Launch the nodes and end them; seconds that it took, and the exit status of roslaunch."""
-    command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "--wait", str(file)]
+    command = [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch", "--wait", str(file)]
     launch = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
     try:
         wait_until(lambda: ready(master) >= nodes, START_SECONDS, f"{nodes} nodes have not started")
@@ -169,7 +169,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
     from minirospy.base.environment import split_uri
 
     port = str(split_uri(environ["ROS_MASTER_URI"], "http")[1])
-    command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", port]
+    command = [sys.executable, "-m", "minirospy.ros.rosmaster.commands.master", "-q", "-p", port]
     if is_real:
         environ = {name: value for name, value in environ.items() if name != "PYTHONPATH"}
         command = [shutil.which("rosmaster", path="/usr/bin") or "rosmaster", "--core", "-p", port]

@@ -180,7 +180,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         environ = {k: v for k, v in os.environ.items() if not k.startswith("ROS_")}
         environ |= {"ROS_HOME": folder, "ROS_LOG_DIR": folder, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
-        command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", str(port)]
+        command = [sys.executable, "-m", "minirospy.ros.rosmaster.commands.master", "-q", "-p", str(port)]
         master = subprocess.Popen(command, env=environ | {"ROS_IP": "127.0.0.1"})
 
         try:

@@ -24,19 +24,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from minirospy.aio import Node as Node
     from minirospy.client import *  # noqa: F403 - the names that __getattr__ finds, for mypy and editors
-    from minirospy.compat.rospy.core import get_ros_root as get_ros_root
-    from minirospy.compat.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
-    from minirospy.compat.rospy.msproxy import MasterProxy as MasterProxy
-    from minirospy.compat.rospy.msproxy import get_master as get_master
+    from minirospy.ros.rospy.rospy.core import get_ros_root as get_ros_root
+    from minirospy.ros.rospy.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
+    from minirospy.ros.rospy.rospy.msproxy import MasterProxy as MasterProxy
+    from minirospy.ros.rospy.rospy.msproxy import get_master as get_master
 
 __version__ = "0.1.0"
 
 _ELSEWHERE = {
     "Node": "minirospy.aio",
-    "MasterProxy": "minirospy.compat.rospy.msproxy",
-    "get_master": "minirospy.compat.rospy.msproxy",
-    "get_ros_root": "minirospy.compat.rospy.core",
-    "parse_rosrpc_uri": "minirospy.compat.rospy.core",
+    "MasterProxy": "minirospy.ros.rospy.rospy.msproxy",
+    "get_master": "minirospy.ros.rospy.rospy.msproxy",
+    "get_ros_root": "minirospy.ros.rospy.rospy.core",
+    "parse_rosrpc_uri": "minirospy.ros.rospy.rospy.core",
 }
 """Public names that are not of `minirospy.client`."""
 

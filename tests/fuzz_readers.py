@@ -185,14 +185,14 @@ def xml_readers() -> dict[str, Reader]:
     from minirospy.base.environment import Environment
     from minirospy.base.errors import LaunchError, ManifestError, UrdfError
     from minirospy.base.xml_text import XmlError, parse_xml
-    from minirospy.compat.roslib.manifest import ManifestException
-    from minirospy.compat.roslib.manifest import parse as parse_old
-    from minirospy.compat.urdf_parser_py.urdf import URDF
-    from minirospy.compat.urdf_parser_py.xml_reflection import core
     from minirospy.core.urdf.describe import dot_graph, tree_lines
     from minirospy.core.urdf.read import parse_robot
-    from minirospy.launch.load import load_text
-    from minirospy.testing import junit
+    from minirospy.ros.roslaunch.launcher.load import load_text
+    from minirospy.ros.roslib.roslib.manifest import ManifestException
+    from minirospy.ros.roslib.roslib.manifest import parse as parse_old
+    from minirospy.ros.rostest.runner import junit
+    from minirospy.ros.urdfdom_py.urdf_parser_py.urdf import URDF
+    from minirospy.ros.urdfdom_py.urdf_parser_py.xml_reflection import core
     from minirospy.workspace.manifest import parse_manifest
     from minirospy.workspace.packages import Packages
 
@@ -273,7 +273,6 @@ def yaml_readers() -> dict[str, Reader]:
 
     from minirospy.base.errors import BridgeError, MinirospyError, RvizFileError, ValueTextError
     from minirospy.base.yaml_text import safe_load
-    from minirospy.compat.camera_calibration_parsers.texts import CalibrationError, parse_yaml
     from minirospy.introspect.configurations import parameter_values
     from minirospy.introspect.values import (
         check_parameter,
@@ -282,8 +281,12 @@ def yaml_readers() -> dict[str, Reader]:
         parse_documents,
         parse_value,
     )
-    from minirospy.launch.substitution import convert
-    from minirospy.maps.grid import MapError, read_settings
+    from minirospy.ros.camera_calibration_parsers.camera_calibration_parsers.texts import (
+        CalibrationError,
+        parse_yaml,
+    )
+    from minirospy.ros.map_server.grid import MapError, read_settings
+    from minirospy.ros.roslaunch.launcher.substitution import convert
     from minirospy.ros2.rules import parse_rules
     from minirospy.web.dashboard.rviz_file import format_rviz, parse_rviz
 

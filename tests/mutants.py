@@ -56,7 +56,7 @@ ROOMS = {
             "tests/core/graph",
             "tests/runtime/master/test_master.py",
             "tests/runtime/master/test_master_journal.py",
-            "tests/actionlib/test_statuses.py",
+            "tests/ros/actionlib/test_statuses.py",
         ],
         ["two_hundred_nodes", "double_start"],
     ),

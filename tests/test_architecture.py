@@ -38,7 +38,7 @@ def test_named_file_exists(path: str) -> None:
 def test_contributing_names_files_that_exist() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(re.findall(r"(?:minirospy|tests|docs|benchmarks)/[\w/]+\.\w+", text))
-    made_up = {"minirospy/cli/ros/rosmine.py", "tests/cli/test_rosmine.py"}
+    made_up = {"minirospy/ros/rosmine/commands/rosmine.py", "tests/cli/test_rosmine.py"}
     assert len(named) > 15
     assert not [path for path in named - made_up if not (ROOT / path).exists()]
     (example,) = re.findall(r"pytest (tests/[\w/]+\.py)::(\w+)", text)
@@ -46,7 +46,7 @@ def test_contributing_names_files_that_exist() -> None:
 
 
 def test_named_functions_exist() -> None:
-    """`_hz` in `cli/ros/rostopic_rates.py`, `Node.close` in `runtime/node/node.py`."""
+    """`_hz` in `ros/rostopic/commands/rostopic_rates.py`, `Node.close` in `runtime/node/node.py`."""
     named = re.findall(r"`([\w.]+)` in `([\w/]+/\w+\.py)`", TEXT)
     assert len(named) >= 5
     for name, path in named:

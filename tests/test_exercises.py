@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.errors import MinirospyError
-from minirospy.cli.catkin.make import catkin_make
-from minirospy.launch.files import find_files
-from minirospy.launch.load import load_files
+from minirospy.ros.catkin.commands.make import catkin_make
+from minirospy.ros.roslaunch.launcher.files import find_files
+from minirospy.ros.roslaunch.launcher.load import load_files
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import read_plan
 
@@ -22,7 +22,7 @@ EXERCISES = sorted({path.stem for path in (ROOT / "launch").glob("*.launch")} - 
 
 @pytest.mark.parametrize("file", TESTS)
 def test_solution_works_on_the_virtual_board(file: str) -> None:
-    command = [sys.executable, "-m", "minirospy.cli.ros.rostest", "rpi_feros", file]
+    command = [sys.executable, "-m", "minirospy.ros.rostest.commands.rostest", "rpi_feros", file]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
     assert done.returncode == 0, done.stdout + done.stderr
     assert " * TESTS: 1\n" in done.stdout

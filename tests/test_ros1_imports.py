@@ -71,8 +71,8 @@ def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) 
 @pytest.mark.parametrize(
     "program",
     [
-        "import minirospy.frames, geometry_msgs.msg as m; print(m.Twist._type)",
-        "import minirospy.frames.tools.static_publisher as m; print(m.Header._type)",
+        "import minirospy.ros.tf2_ros.tf2_ros, geometry_msgs.msg as m; print(m.Twist._type)",
+        "import minirospy.ros.tf2_ros.tools.static_publisher as m; print(m.Header._type)",
     ],
 )
 def test_a_program_of_ours_is_imported_beside_ros2(sourced: dict[str, str], program: str) -> None:

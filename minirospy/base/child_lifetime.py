@@ -1,6 +1,6 @@
 """Children that do not outlive a process that is ended by force: on Windows by a job object, which the system closes.
 
-Elsewhere a launcher's guardian process ends them (`launch/guardian.py`), and nothing is done here.
+Elsewhere a launcher's guardian process ends them (`ros/roslaunch/launcher/guardian.py`), and nothing is done here.
 Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
 """
 

@@ -474,4 +474,4 @@ WINDOWS = {
         _window("smach_viewer", "smach", "Shows state machines"),
     )
 }
-"""The commands of rqt, and rviz, by name. Each has a line in the registry and pyproject.toml, and a package in ros_packages/."""
+"""The commands of rqt, and rviz, by name. Each has a line in the registry and pyproject.toml, and a package in ros/."""

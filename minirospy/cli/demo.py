@@ -116,7 +116,13 @@ def _free_port() -> int:
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Run roslaunch with the workshop's launch file; end it by Ctrl-C's signal, which ends all its nodes."""
-    command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
+    command = [
+        sys.executable,
+        "-m",
+        "minirospy.ros.roslaunch.commands.roslaunch",
+        "rpi_feros_bringup",
+        "rpi_led.launch",
+    ]
     windows = sys.platform == "win32"
     flags = subprocess.CREATE_NEW_PROCESS_GROUP if windows else 0  # type: ignore[attr-defined,unused-ignore]
 

@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if "--terminal" in words or not (_uses_page(words) and _has_libraries()):
-        from minirospy.robots.joint_publisher_gui import main as in_terminal
+        from minirospy.ros.robot_state_publisher.joint_publisher_gui import main as in_terminal
 
         return in_terminal()
     return _main(JOINT_STATE_PUBLISHER_GUI, words)

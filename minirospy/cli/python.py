@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.base.environment import export_local
-from minirospy.cli.ros.rosrun import become
 from minirospy.command.command import run
+from minirospy.ros.rosbash.commands.rosrun import become
 
 __all__ = ["main"]
 

@@ -8,7 +8,7 @@ from types import TracebackType
 
 from minirospy.aio.node import Node
 from minirospy.aio.tasks import Faults, keep_running
-from minirospy.recording.player import Player
+from minirospy.ros.rosbag.recording.player import Player
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.web.addresses import links
 from minirospy.web.bridge import Bridge, BridgeOptions

@@ -227,7 +227,7 @@ class _Builder:
         ours = Path(__file__).parents[1]
         compiler = [
             *(ours / "core" / "idl").glob("*.py"),
-            *(ours / "compat" / "dynamic_reconfigure").glob("*.py"),
+            *(ours / "ros" / "dynamic_reconfigure" / "dynamic_reconfigure").glob("*.py"),
         ]
         made_of = [
             path for plan in plans for path in (*plan.definitions, *_option_files(plan), plan.cmake_lists)

@@ -196,7 +196,7 @@ def built_in_roots() -> tuple[Path, ...]:
     """Return the folders of minirospy's own packages: next to the package in a checkout, in its ``share`` when installed."""
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
-    return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros_packages")
+    return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros")
 
 
 def crawl(root: Path) -> Iterator[Path]:
@@ -240,11 +240,22 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield the files of a package: its own folder first, then where its programs are put when it is built or installed."""
+    """Yield the files of a package: its own folder first, then where its programs are put when it is built or installed.
+
+    The Python modules in minirospy's own packages are not files of the package: `rosrun` does not run them.
+    """
+    is_ours = folder.parent == _OURS / "ros"
     for path, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if not name.startswith(".") and name != "__pycache__")
+        folders[:] = sorted(
+            name
+            for name in folders
+            if not name.startswith(".")
+            and name != "__pycache__"
+            and not (is_ours and Path(path, name, "__init__.py").is_file())
+        )
         for name in sorted(names):
-            yield Path(path, name)
+            if not (is_ours and name.endswith(".py") and not _has_interpreter(Path(path, name))):
+                yield Path(path, name)
     prefixes = [
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
@@ -255,6 +266,11 @@ def _files(folder: Path) -> Iterator[Path]:
         programs = prefix / "lib" / (package_name(folder) or folder.name)
         if programs.is_dir():
             yield from (path for path in sorted(programs.iterdir()) if path.is_file())
+
+
+def _has_interpreter(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(2) == b"#!"
 
 
 def _is_program(path: Path) -> bool:

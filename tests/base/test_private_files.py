@@ -16,11 +16,11 @@ import pytest
 
 from minirospy.base import private_files
 from minirospy.board.place import Place
-from minirospy.launch.output import Output
-from minirospy.launch.process import start_process
+from minirospy.ros.roslaunch.launcher.output import Output
+from minirospy.ros.roslaunch.launcher.process import start_process
+from minirospy.ros.rostest.runner.junit import Result
 from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.master.log_file import LogFile, LogFileHandler
-from minirospy.testing.junit import Result
 from tests.conftest import free_port
 
 BIN = Path(sys.executable).parent

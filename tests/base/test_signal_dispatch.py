@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import pytest
 
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.cli.ros import master
 from minirospy.command.command import run
-from minirospy.testing.bare import interrupt_noted
+from minirospy.ros.rosmaster.commands import master
+from minirospy.ros.rostest.runner.bare import interrupt_noted
 
 
 @pytest.fixture

@@ -12,12 +12,12 @@ import pytest
 
 from minirospy.base.errors import LaunchError, ManifestError, UrdfError
 from minirospy.base.xml_text import XmlError, XmlSyntaxError, check_xml, parse_xml
-from minirospy.cli.catkin.test_results import read_counts
-from minirospy.compat.roslib import manifest as old_manifest
-from minirospy.compat.urdf_parser_py.urdf import URDF
 from minirospy.core.urdf.read import parse_robot
-from minirospy.launch.document import parse_document
-from minirospy.testing import junit
+from minirospy.ros.catkin.commands.test_results import read_counts
+from minirospy.ros.roslaunch.launcher.document import parse_document
+from minirospy.ros.roslib.roslib import manifest as old_manifest
+from minirospy.ros.rostest.runner import junit
+from minirospy.ros.urdfdom_py.urdf_parser_py.urdf import URDF
 from minirospy.workspace.manifest import parse_manifest
 
 LAUGHS = (
@@ -106,7 +106,7 @@ def test_xacro_refuses_what_unfolds(tmp_path: Path, included: bool) -> None:
     main.write_text(
         '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:include filename="bad.xacro"/></robot>'
     )
-    program = "import minirospy.cli.ros.xacro as x; raise SystemExit(x.main())"
+    program = "import minirospy.ros.xacro.commands.xacro as x; raise SystemExit(x.main())"
     done = subprocess.run(
         [sys.executable, "-c", program, main if included else bad],
         capture_output=True,

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import ServiceException
+from minirospy.cli.registry import find_script, find_verb
 from minirospy.core.wire.framing import serialize_frame
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node
@@ -129,12 +129,12 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
     """Run a command in this process: ``command("rostopic", "list", "-v")``."""
 
     def run(name: str, *argv: str) -> Result:
-        room = "" if name == "doctor" else "ros."
-        module = import_module(f"minirospy.cli.{room}{'rosmsg' if name == 'rossrv' else name}")
+        entry = find_script(name) or find_script(name.replace("_", "-")) or find_verb(name)
+        assert entry, name
+        main = entry.load_main()
         capsys.readouterr()
-        main = module.main_srv if name == "rossrv" else module.main
         try:
-            status = main(list(argv))
+            status: Any = main(list(argv))
         except SystemExit as ended:  # argparse ends `-h` so
             status = ended.code
         out, err = capsys.readouterr()

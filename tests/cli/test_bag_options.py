@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros import rostopic
+from minirospy.ros.rostopic.commands import rostopic
 from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command

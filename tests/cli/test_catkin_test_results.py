@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.catkin.test_results import Counts, main, read_counts
+from minirospy.ros.catkin.commands.test_results import Counts, main, read_counts
 
 BAD = '<testsuite tests="3" errors="1" failures="0"/>'
 GOOD = '<testsuite tests="2" errors="0" failures="0"/>'

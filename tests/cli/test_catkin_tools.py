@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.catkin.find import catkin_find, catkin_find_pkg, catkin_topological_order
+from minirospy.ros.catkin.commands.find import catkin_find, catkin_find_pkg, catkin_topological_order
 
 Capture = pytest.CaptureFixture[str]
 

@@ -14,7 +14,7 @@ import pytest
 
 from minirospy.base.environment import Environment, wrong_address
 from minirospy.base.errors import LaunchError, NotFoundError
-from minirospy.launch.load import load_text
+from minirospy.ros.roslaunch.launcher.load import load_text
 from minirospy.workspace.packages import Packages
 
 NODE = """

@@ -97,7 +97,7 @@ def test_options_of_a_verb() -> None:
 
 
 def test_asking_a_command_leaves_it_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
-    from minirospy.cli.ros import rostopic
+    from minirospy.ros.rostopic.commands import rostopic
 
     tab("rostopic pub -")
     assert rostopic.main(["-h"]) == 64
@@ -358,7 +358,7 @@ def test_variables_and_home(workspace: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_nothing_in_a_text_is_history(robot: Robot) -> None:
     """bash and zsh at a terminal put the last command in place of !! even within double quotes."""
-    from minirospy.cli.ros import rosparam
+    from minirospy.ros.rosparam.commands import rosparam
 
     assert rosparam.main(["set", "/greeting", "it's you!"]) == 0
     (text,) = tab("rosparam set /greeting ")
@@ -439,7 +439,7 @@ def test_services_and_a_request(robot: Robot) -> None:
 
 
 def test_parameters(robot: Robot, command: object) -> None:
-    from minirospy.cli.ros import rosparam
+    from minirospy.ros.rosparam.commands import rosparam
 
     assert rosparam.main(["set", "/robot/speed", "3"]) == 0
     assert tab("rosparam get /robot/") == ["/robot/speed"]
@@ -448,7 +448,7 @@ def test_parameters(robot: Robot, command: object) -> None:
 
 
 def test_the_value_that_a_parameter_has(robot: Robot) -> None:
-    from minirospy.cli.ros import rosparam
+    from minirospy.ros.rosparam.commands import rosparam
 
     assert rosparam.main(["set", "/speed", "3.5"]) == 0
     assert rosparam.main(["set", "/gains", "{p: 1, i: [2, 3]}"]) == 0

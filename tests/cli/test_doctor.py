@@ -14,8 +14,8 @@ import pytest
 from std_msgs.msg import Bool, String
 
 from minirospy.base.environment import Environment
-from minirospy.cli import doctor
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.ros.roswtf.commands import doctor
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread

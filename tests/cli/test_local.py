@@ -15,8 +15,8 @@ import psutil
 import pytest
 
 from minirospy.base.environment import Environment
-from minirospy.launch.command import node_environment
-from minirospy.launch.spec import NodeSpec
+from minirospy.ros.roslaunch.launcher.command import node_environment
+from minirospy.ros.roslaunch.launcher.spec import NodeSpec
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port

@@ -1,4 +1,4 @@
-"""cli/rosbag: what its verbs print and write, and which exit status they have."""
+"""The command rosbag: what its verbs print and write, and which exit status they have."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros import rosbag
 from minirospy.core.bag.reader import open_bag
 from minirospy.core.bag.writer import BagWriter
+from minirospy.ros.rosbag.commands import rosbag
 from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command

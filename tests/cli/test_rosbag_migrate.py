@@ -1,4 +1,4 @@
-"""cli/rosbag check and fix: what they print and write. That is compared with the real command's by hand: docs/commands.md."""
+"""The command rosbag check and fix: what they print and write (compared with the real command's by hand: docs/commands.md)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros import rosbag
 from minirospy.core.bag.reader import open_bag
 from minirospy.core.idl.load import class_from_text, message_class
+from minirospy.ros.rosbag.commands import rosbag
 from tests.core.bag.bags import Given, connection, make_bag
 
 from .conftest import Command

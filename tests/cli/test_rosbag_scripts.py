@@ -1,4 +1,4 @@
-"""cli/rosbag_scripts: the programs of ROS's package rosbag, by `rosrun rosbag NAME`."""
+"""The command rosbag_scripts: the programs of ROS's package rosbag, by `rosrun rosbag NAME`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros.rosbag_scripts import SCRIPTS, main
 from minirospy.core.bag.reader import open_bag
 from minirospy.core.bag.records import Connection
 from minirospy.core.idl.load import class_from_text
+from minirospy.ros.rosbag.commands.rosbag_scripts import SCRIPTS, main
 from tests.core.bag.bags import STRING_MD5, Given, connection, make_bag
 
 GIVEN = [[Given(0, 5, b"\x01\0\0\0a"), Given(1, 6, b"\x01\0\0\0b")], [Given(0, 1, b"\x01\0\0\0c")]]
-FOLDER = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "rosbag" / "scripts"
+FOLDER = Path(__file__).parents[2] / "minirospy" / "ros" / "rosbag" / "scripts"
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""cli/rosclean: sizes as du shows them; what purge removes, and its confirmation."""
+"""The command rosclean: sizes as du shows them; what purge removes, and its confirmation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros import rosclean
+from minirospy.ros.rosclean.commands import rosclean
 
 from .conftest import Command
 

@@ -1,4 +1,4 @@
-"""cli/rosconsole beside a node with loggers."""
+"""The command rosconsole beside a node with loggers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 
-from minirospy.cli.ros.rosconsole import _shown
+from minirospy.ros.rosconsole.commands.rosconsole import _shown
 
 from .conftest import Command, Robot
 

@@ -18,10 +18,10 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import MasterUnreachableError
-from minirospy.cli.ros import master as commands
-from minirospy.cli.ros.master import main, roscore
-from minirospy.cli.ros.rostopic import main as rostopic
 from minirospy.command.command import warn
+from minirospy.ros.rosmaster.commands import master as commands
+from minirospy.ros.rosmaster.commands.master import main, roscore
+from minirospy.ros.rostopic.commands.rostopic import main as rostopic
 from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
@@ -157,7 +157,7 @@ def test_folders_that_cannot_be_created_are_reported(
     assert f"setting /run_id to {run_id}\n" in core.said
 
     # The /rosout node receives what is logged, and runs without its file.
-    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.2)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
 
@@ -327,7 +327,7 @@ def test_rosout_node_lists_and_sets_the_loggers_of_the_master(
     start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As /rosout of real ROS, a node of roscpp: its root logger is `ros`."""
-    from minirospy.cli.ros.rosservice import main as rosservice
+    from minirospy.ros.rosservice.commands.rosservice import main as rosservice
 
     start()
     assert rosservice(["list"]) == 0

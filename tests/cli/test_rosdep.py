@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.installation import install_command
-from minirospy.cli.ros.rosdep import main
+from minirospy.ros.rosdep.commands.rosdep import main
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""cli/rosgraph; and rosmaster, whose graph is empty."""
+"""The command rosgraph; and rosmaster, whose graph is empty."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def test_ping(robot: Any, command: Any, program: Start, monkeypatch: pytest.Monk
     status, out, err = command("rosnode", "ping", "-c", "1", "robot")
     assert "average" not in out
 
-    monkeypatch.setattr("minirospy.cli.ros.rosnode.time.sleep", lambda _: None)
+    monkeypatch.setattr("minirospy.ros.rosnode.commands.rosnode.time.sleep", lambda _: None)
     status, out, err = command("rosnode", "ping", "-c", "2", "robot")
     assert (status, err) == (0, "")
     assert re.fullmatch(

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.cli.ros.rospack import main, rosstack
+from minirospy.ros.rospack.commands.rospack import main, rosstack
 
 DEPENDENCIES = {
     "a": "<depend>b</depend><depend>c</depend>",
@@ -186,7 +186,7 @@ def test_profile(command: Any, tree: Path) -> None:
 def test_finding_imports_little(tree: Path) -> None:
     """`rospack find` is called in loops: what it does not need, it does not import."""
     code = (
-        "import sys; from minirospy.cli.ros.rospack import main; main(['find', 'a']); "
+        "import sys; from minirospy.ros.rospack.commands.rospack import main; main(['find', 'a']); "
         "print({'asyncio', 'pyexpat', 'yaml', 'numpy', 'subprocess'} & set(sys.modules))"
     )
     out = subprocess.run(

@@ -153,7 +153,7 @@ def test_help_and_no_master(command: Any) -> None:
 def test_get_of_a_simple_value_imports_no_yaml(master: str, command: Any) -> None:
     command("rosparam", "set", "/a", "hello")
     code = (
-        "import sys; from minirospy.cli.ros.rosparam import main; assert main(['get', '/a']) == 0; "
+        "import sys; from minirospy.ros.rosparam.commands.rosparam import main; assert main(['get', '/a']) == 0; "
         "print(*sorted({'asyncio', 'yaml', 'numpy', 'logging', 'genpy', 'xmlrpc'} & set(sys.modules)))"
     )
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""cli/rosrun: which program of a package is run, in which way, and what is said where none can be."""
+"""The command rosrun: which program of a package is run, in which way, and what is said where none can be."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.ros import rosrun
+from minirospy.ros.rosbash.commands import rosrun
 from tests.cli.conftest import own_lines
 from tests.conftest import write_files
 

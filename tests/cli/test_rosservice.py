@@ -17,8 +17,8 @@ import pytest
 from gazebo_msgs.srv import SetLightProperties
 from mavros_msgs.srv import CommandVtolTransition
 
-from minirospy.cli.ros.rosservice import main
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.ros.rosservice.commands.rosservice import main
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import own_lines
@@ -49,7 +49,7 @@ def test_what_a_service_is(robot: Any, command: Any) -> None:
 
 def test_a_call_imports_little(robot: Any) -> None:
     code = (
-        "import sys; from minirospy.cli.ros.rosservice import main; assert main(['type', '/fail']) == 0; "
+        "import sys; from minirospy.ros.rosservice.commands.rosservice import main; assert main(['type', '/fail']) == 0; "
         "assert main(['call', '/set_led_state', 'True']) == 0; "
         "print(*sorted({'asyncio', 'numpy', 'logging', 'xmlrpc'} & set(sys.modules)))"
     )

@@ -1,4 +1,4 @@
-"""cli/rosversion."""
+"""The command rosversion."""
 
 from __future__ import annotations
 

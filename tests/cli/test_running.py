@@ -18,7 +18,8 @@ import pytest
 
 from minirospy.base.errors import MasterUnreachableError
 from minirospy.cli import main as umbrella
-from minirospy.cli.ros import roslaunch, rosrun
+from minirospy.ros.rosbash.commands import rosrun
+from minirospy.ros.roslaunch.commands import roslaunch
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
@@ -152,7 +153,7 @@ def test_roscore_on_a_port_of_somebody_else() -> None:
 
 @pytest.mark.parametrize("words", [["--nonsense"], ["-p", "x"], ["-p", "70000"]])
 def test_roscore_typed_wrong(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    from minirospy.cli.ros.master import roscore
+    from minirospy.ros.rosmaster.commands.master import roscore
 
     assert roscore(words) == 2
     assert len(own_lines(capsys.readouterr().err)) == 1
@@ -380,8 +381,8 @@ def test_the_line_of_a_node_where_no_master_is_named(
 
 def test_roslaunch_does_not_start_a_master_elsewhere(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from minirospy.base.environment import Environment
-    from minirospy.launch.runner import Launcher
-    from minirospy.launch.spec import LaunchSpec
+    from minirospy.ros.roslaunch.launcher.runner import Launcher
+    from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
     from minirospy.workspace.packages import Packages
 
     environment = Environment.read(

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from minirospy.cli.ros import urdf
+from minirospy.ros.urdf.commands import urdf
 
 ARM = Path(__file__).parents[1] / "core" / "urdf" / "arm.urdf"
 GRAPH = ARM.with_suffix(".gv").read_text(encoding="utf-8")

@@ -6,12 +6,21 @@ The texts are ROS's; tests/interop compares them with what the real commands pri
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from minirospy.cli.registry import find_script
+
 USAGE = "Usage: rostopic list [/namespace]\n\n"
+
+
+def main_of(script: str) -> Callable[[Sequence[str] | None], int]:
+    entry = find_script(script)
+    assert entry
+    return entry.load_main()
 
 
 @pytest.mark.usefixtures("master")
@@ -64,7 +73,7 @@ def test_error_begins_with_ros_words(
     line: str, status: int, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name, *words = line.split()
-    assert import_module(f"minirospy.cli.ros.{name}").main(words) == status
+    assert main_of(name)(words) == status
     ros, own = capsys.readouterr().err.partition(f"{name}: ERROR: ")[::2]
 
     assert ros == text
@@ -85,7 +94,7 @@ def test_error_begins_with_ros_words(
 )
 def test_no_master_in_ros_words(line: str, status: int, capsys: pytest.CaptureFixture[str]) -> None:
     name, *words = line.split()
-    assert import_module(f"minirospy.cli.ros.{name}").main(words) == status
+    assert main_of(name)(words) == status
     first, second = capsys.readouterr().err.splitlines()
     assert first == "ERROR: Unable to communicate with master!"
     assert second.startswith(f"{name}: ERROR: no ROS master answers at ")
@@ -94,7 +103,7 @@ def test_no_master_in_ros_words(line: str, status: int, capsys: pytest.CaptureFi
 def test_help_begins_with_that_of_ros(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from minirospy.cli.ros.rosnode import main
+    from minirospy.ros.rosnode.commands.rosnode import main
 
     monkeypatch.setenv("COLUMNS", "80")
     with pytest.raises(SystemExit):
@@ -123,7 +132,7 @@ def test_help_begins_with_that_of_ros(
 def test_exit_status_of_help_is_that_of_ros(
     name: str, statuses: tuple[int, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main = import_module(f"minirospy.cli.ros.{name}").main
+    main = main_of(name)
     assert tuple(main(words) for words in ([], ["-h"], ["--help"], ["nope"])) == statuses
     assert f"Commands:\n\t{name} " in capsys.readouterr().out
 
@@ -132,7 +141,7 @@ def test_exit_status_of_help_is_that_of_ros(
 def test_unknown_package_of_a_type_lists_where_it_was_searched(
     command: str, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main = getattr(import_module("minirospy.cli.ros.rosmsg"), command)
+    main = getattr(import_module("minirospy.ros.rosmsg.commands.rosmsg"), command)
     assert main(["show", "nope/Nope"]) == 1
     text, _, searched = capsys.readouterr().err.splitlines()[0].partition(" on search path ")
     assert text.endswith("Cannot locate message [Nope]: unknown package [nope]")

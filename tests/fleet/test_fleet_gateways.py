@@ -15,10 +15,10 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
-from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.base.errors import ServiceException
 from minirospy.core.idl.load import class_from_text
 from minirospy.fleet.rules import GatewayRules
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
 from tests.fleet.fleet import SECONDS, Fleet, Place
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")

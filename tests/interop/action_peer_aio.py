@@ -1,4 +1,4 @@
-"""action_peer.py for asyncio programs: the same words, by minirospy.actionlib.aio."""
+"""action_peer.py for asyncio programs: the same words, by minirospy.ros.actionlib.actionlib.aio."""
 
 import asyncio
 import itertools
@@ -8,8 +8,8 @@ from actionlib.msg import TestAction, TestGoal, TestResult
 from actionlib_msgs.msg import GoalID
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.core.graph.goals import GoalState
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
 
 SECONDS = 200.0
 

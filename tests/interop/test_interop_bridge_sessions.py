@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer
 from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import Peer, modules

@@ -17,12 +17,7 @@ from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
 CONVERT = "/usr/lib/camera_calibration_parsers/convert"
 OUR_CONVERT = (
-    Path(__file__).parents[2]
-    / "minirospy"
-    / "ros_packages"
-    / "camera_calibration_parsers"
-    / "nodes"
-    / "convert"
+    Path(__file__).parents[2] / "minirospy" / "ros" / "camera_calibration_parsers" / "nodes" / "convert"
 )
 QUERY = """
 import json, sys

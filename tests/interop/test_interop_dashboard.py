@@ -28,7 +28,7 @@ from minirospy.web.dashboard.views import VIEWS
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_foreign import FOREIGN
-from tests.robots.conftest import start
+from tests.ros.robot_state_publisher.conftest import start
 from tests.web.dashboard.conftest import TOKEN, Served, serve
 
 __all__ = ["serve", "start"]

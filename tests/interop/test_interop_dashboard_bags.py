@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from minirospy.recording.sources import Bags
+from minirospy.ros.rosbag.recording.sources import Bags
 from minirospy.web.dashboard.files import FOLDER
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import (

@@ -18,7 +18,7 @@ from tests.interop.conftest import PATIENCE
 from tests.interop.page_modules import run_script
 from tests.interop.test_interop_dashboard import needs_node
 from tests.interop.test_interop_foreign import FOREIGN
-from tests.robots.conftest import ARM
+from tests.ros.robot_state_publisher.conftest import ARM
 
 pytestmark = needs_node
 SECOND = 1_000_000_000

@@ -17,7 +17,7 @@ import pytest
 from tests.conftest import free_port
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import browse, needs_chromium
-from tests.robots.conftest import end
+from tests.ros.robot_state_publisher.conftest import end
 
 __all__ = ["browse"]
 

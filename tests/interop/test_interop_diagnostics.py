@@ -1,4 +1,4 @@
-"""diagnostic_aggregator: Debian's programs publish what is recorded in tests/compat/aggregator; bonds with both."""
+"""diagnostic_aggregator: Debian's programs publish what is recorded in tests/ros/packages/aggregator; bonds with both."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
-HERE = Path(__file__).parents[1] / "compat" / "aggregator"
-OURS = HERE.parents[2] / "minirospy" / "ros_packages" / "diagnostic_aggregator" / "nodes"
+HERE = Path(__file__).parents[1] / "ros" / "packages" / "aggregator"
+OURS = HERE.parents[3] / "minirospy" / "ros" / "diagnostic_aggregator" / "nodes"
 REAL = Path("/usr/lib/diagnostic_aggregator")
 
 

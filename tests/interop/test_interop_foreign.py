@@ -24,8 +24,8 @@ from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.base.times import Time
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer
 from tests.interop.conftest import PATIENCE
 
 FOREIGN = Path(__file__).parent / "foreign"

@@ -10,7 +10,7 @@ import pytest
 
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment, start, stop
 
-OURS = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "image_transport" / "nodes" / "republish"
+OURS = Path(__file__).parents[2] / "minirospy" / "ros" / "image_transport" / "nodes" / "republish"
 REAL = "/usr/lib/image_transport/republish"
 USER = """
 import hashlib, rospy

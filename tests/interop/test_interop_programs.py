@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, start, stop
 
-PROGRAMS = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "map_server" / "nodes"
+PROGRAMS = Path(__file__).parents[2] / "minirospy" / "ros" / "map_server" / "nodes"
 READER = """
 import sys
 import rospy

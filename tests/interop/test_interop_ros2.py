@@ -27,13 +27,13 @@ from rosbags.typesys import Stores, get_typestore
 from rosgraph_msgs.msg import Log
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import RawService, call_raw, raw_class
 from minirospy.base.errors import ServiceException
 from minirospy.core.graph.goals import TERMINAL, GoalState
 from minirospy.core.idl.load import message_class, service_class
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.runtime.transport.loop import LoopThread
 from tests.interop.conftest import OUR_BIN, running_master
 from tests.interop.install_ros2 import PYTHON, STAMP

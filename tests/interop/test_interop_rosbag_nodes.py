@@ -17,7 +17,7 @@ from rosbags.rosbag1 import Reader
 from minirospy.core.bag.writer import BagWriter
 from minirospy.core.wire.tcpros import InterfaceType
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
-from tests.recording.conftest import STRING, Talker, connected, said, say
+from tests.ros.rosbag.conftest import STRING, Talker, connected, said, say
 from tests.waiting import wait_until
 
 CPP = Path("/usr/lib/rosbag")
@@ -75,7 +75,7 @@ def run(master: str, tmp_path: Path) -> Iterator[Run]:
     started: list[subprocess.Popen[str]] = []
 
     def run(stack: str, verb: str, *words: str) -> subprocess.Popen[str]:
-        code = f"import sys; from minirospy.cli.ros.rosbag_{verb} import main; sys.exit(main())"
+        code = f"import sys; from minirospy.ros.rosbag.commands.rosbag_{verb} import main; sys.exit(main())"
         command = [sys.executable, "-c", code] if stack == "ours" else [str(CPP / verb)]
         process = subprocess.Popen(
             [*command, *words],
@@ -313,7 +313,7 @@ def test_the_service_answers_as_ros(stack: str, run: Run, tmp_path: Path, master
 
 @pytest.mark.parametrize("verb", ["record", "play"])
 def test_help_is_that_of_ros(verb: str) -> None:
-    code = f"import sys; from minirospy.cli.ros.rosbag_{verb} import main; sys.exit(main(['-h']))"
+    code = f"import sys; from minirospy.ros.rosbag.commands.rosbag_{verb} import main; sys.exit(main(['-h']))"
     ours = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     theirs = subprocess.run(
         [shutil.which("rosbag", path="/usr/bin") or "rosbag", verb, "-h"],

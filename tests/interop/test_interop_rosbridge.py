@@ -25,8 +25,8 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.base.errors import ServiceException
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer
 from minirospy.web.bridge import Bridge, BridgeOptions
 from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving

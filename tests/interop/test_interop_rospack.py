@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 REAL_PYTHON = "/usr/bin/python3"
-OUR_RUN = "import sys; from minirospy.cli.ros.{module} import {function}; sys.exit({function}())"
+OUR_RUN = "import sys; from minirospy.ros.{module} import {function}; sys.exit({function}())"
 
 TREE = {
     "a": "<depend>b</depend><depend>c</depend>",
@@ -142,7 +142,13 @@ def real(line: str, cwd: Path | None = None, tool: str = "rospack") -> tuple[int
 
 def ours(line: str, cwd: Path | None = None, function: str = "main") -> tuple[int, str, str]:
     return run(
-        [sys.executable, "-c", OUR_RUN.format(module="rospack", function=function), *line.split()], cwd
+        [
+            sys.executable,
+            "-c",
+            OUR_RUN.format(module="rospack.commands.rospack", function=function),
+            *line.split(),
+        ],
+        cwd,
     )
 
 
@@ -295,5 +301,12 @@ def test_rospkg(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     ],
 )
 def test_rosmsg_proto(line: str) -> None:
-    ours = run([sys.executable, "-c", OUR_RUN.format(module="rosmsg_proto", function="main"), *line.split()])
+    ours = run(
+        [
+            sys.executable,
+            "-c",
+            OUR_RUN.format(module="rosmsg.commands.rosmsg_proto", function="main"),
+            *line.split(),
+        ]
+    )
     assert ours == run(["/usr/bin/rosmsg-proto", *line.split()])

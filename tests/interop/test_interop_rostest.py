@@ -15,7 +15,7 @@ import pytest
 from tests.interop.conftest import PATIENCE
 
 ROOT = Path(__file__).parents[2]
-TESTED = ROOT / "tests" / "testing"
+TESTED = ROOT / "tests" / "ros" / "rostest"
 OUR_BIN = Path(sys.executable).parent
 FILES = ("all.test", "nodes.test", "graph.test")
 Case = tuple[str, str, tuple[str, ...]]
@@ -140,7 +140,7 @@ def test_catkin_test_results(tmp_path: Path) -> None:
 
 def test_rospack_depends_of_the_packages_of_ros(tmp_path: Path) -> None:
     """As far as they are here: ours name no package of C++."""
-    known = {path.name for path in (ROOT / "minirospy" / "ros_packages").iterdir()}
+    known = {path.name for path in (ROOT / "minirospy" / "ros").iterdir()}
     known |= {path.name for path in (ROOT / "msgs").iterdir()}
     names = ("actionlib", "rosmsg", "rospy", "rostest")
     for runs in [both(tmp_path / name, "rospack", "depends1", name) for name in names]:

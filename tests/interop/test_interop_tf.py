@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.compat.tf import transformations
+from minirospy.ros.tf.tf import transformations
 from tests.core.tf2.conversation import difference, edge_cases, query_real, questions, shortened
 from tests.core.tf2.ours import our_answers
-from tests.frames import transformations_calls
 from tests.interop.conftest import HERE, PATIENCE, REAL_PYTHON, compiled, start, stop
+from tests.ros.tf2_ros import transformations_calls
 
 RECORDED = HERE.parent / "core" / "tf2" / "recorded.json"
 

@@ -1,4 +1,4 @@
-"""topic_tools: what the real programs pass on is what ours pass on (tests/topic_tools/drive.txt)."""
+"""topic_tools: what the real programs pass on is what ours pass on (tests/ros/topic_tools/drive.txt)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 
-DRIVE = Path(__file__).parents[1] / "topic_tools" / "drive.py"
+DRIVE = Path(__file__).parents[1] / "ros" / "topic_tools" / "drive.py"
 
 
 def test_real_programs_pass_on_what_is_recorded(real_master: str) -> None:

@@ -13,7 +13,7 @@ from minirospy.introspect.doctor import Status
 from minirospy.introspect.doctor.frames import Observation, frame_findings
 from minirospy.introspect.doctor.frames import check_frames as check
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from tests.robots.conftest import Start, start
+from tests.ros.robot_state_publisher.conftest import Start, start
 
 __all__ = ["start"]
 

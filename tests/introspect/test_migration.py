@@ -1,4 +1,4 @@
-"""introspect/migration: paths of rules from old types to those that are installed, and what they make of messages."""
+"""ros/rosbag/migration/rules_files: paths of rules from old types to those that are installed, and what they make of messages."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from minirospy.core.idl.load import class_from_text, message_class
-from minirospy.introspect.bag_migration import check_classes
-from minirospy.introspect.migration import MessageMigrator
-from minirospy.introspect.migration_rules import (
+from minirospy.ros.rosbag.migration.bags import check_classes
+from minirospy.ros.rosbag.migration.rules import (
     BagMigrationException,
     clean_name,
     constants_from_def,
@@ -18,6 +17,7 @@ from minirospy.introspect.migration_rules import (
     migration_default_value,
     qualified_name,
 )
+from minirospy.ros.rosbag.migration.rules_files import MessageMigrator
 
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 POINT = "float64 x\nfloat64 y\nfloat64 z\n"

@@ -19,10 +19,10 @@ from actionlib_msgs.msg import GoalStatusArray
 from actionlib_tutorials.msg import FibonacciAction, FibonacciActionGoal, FibonacciActionResult, FibonacciGoal
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.base.errors import BridgeError, DeserializationError
 from minirospy.core.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.ros2.action_links import ActionLink, action_links
 from minirospy.ros2.action_messages import (
     GoalId,

@@ -18,11 +18,11 @@ from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.aio.raw import call_raw
 from minirospy.base.errors import ServiceException
 from minirospy.core.graph.goals import GoalState
 from minirospy.core.idl.load import service_class
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.ros2.definitions import Definitions
 from minirospy.ros2.links import BRIDGE_PREFIX

@@ -1,3 +1,3 @@
-from tests.robots.conftest import start
+from tests.ros.robot_state_publisher.conftest import start
 
 __all__ = ["start"]

@@ -12,8 +12,8 @@ from rospy_tutorials.srv import AddTwoInts
 from std_msgs.msg import String
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient
-from tests.robots.conftest import SECONDS, Start
+from minirospy.ros.actionlib.actionlib.aio import ActionClient
+from tests.ros.robot_state_publisher.conftest import SECONDS, Start
 
 
 @pytest.mark.parametrize("name", ["talker", "talker.py"])

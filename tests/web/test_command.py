@@ -24,7 +24,7 @@ from minirospy.web.tokens import kept_tokens, read_tokens
 from tests.conftest import free_port
 from tests.web.conftest import Client
 
-PACKAGES = Path(command.__file__).parents[1] / "ros_packages"
+PACKAGES = Path(command.__file__).parents[1] / "ros"
 Start = Callable[..., "Process"]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.recording.test_play import make_bag
+from tests.ros.rosbag.test_play import make_bag
 from tests.web.conftest import Client
 from tests.web.test_foxglove_sessions import text_of
 

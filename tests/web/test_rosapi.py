@@ -17,10 +17,10 @@ from tf2_msgs.msg import TFMessage
 from tf2_web_republisher.msg import TFSubscriptionAction, TFSubscriptionGoal
 from tf2_web_republisher.srv import RepublishTFsRequest
 
-from minirospy.actionlib.aio import ActionClient, GoalError
 from minirospy.base.name_filter import NameFilter
 from minirospy.base.times import Duration
 from minirospy.core.idl.load import message_class
+from minirospy.ros.actionlib.actionlib.aio import ActionClient, GoalError
 from minirospy.web.graph import Filters
 from minirospy.web.rosapi.typedefs import describe
 from minirospy.web.tf_republisher.pairs import FramePair

@@ -11,7 +11,6 @@ import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionClient
 from minirospy.aio.tasks import Faults, keep_running
 from minirospy.core.graph.goals import GoalState
 from minirospy.fleet.contents import Robot
@@ -21,6 +20,7 @@ from minirospy.fleet.importer import Importer
 from minirospy.fleet.keys import Claim
 from minirospy.fleet.network import QueryFailed
 from minirospy.fleet.rules import GatewayRules
+from minirospy.ros.actionlib.actionlib.aio import ActionClient
 from minirospy.ros2.bridge import Ros2Bridge
 from minirospy.ros2.links import Ros2Topic
 from minirospy.web.graph import SharedGraph

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from minirospy.base.errors import BuildError, DefinitionError, ManifestError, SourceError
-from minirospy.cli.catkin.make import catkin_make, catkin_make_isolated
-from minirospy.cli.catkin.tool import catkin
 from minirospy.core.idl import load
 from minirospy.core.idl.load import read_definition
+from minirospy.ros.catkin.commands.make import catkin_make, catkin_make_isolated
+from minirospy.ros.catkin.commands.tool import catkin
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
 from minirospy.workspace.packages import Packages, built_in_roots
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.cli.catkin.create import catkin_create_pkg, catkin_init_workspace
-from minirospy.cli.catkin.tool import catkin
+from minirospy.ros.catkin.commands.create import catkin_create_pkg, catkin_init_workspace
+from minirospy.ros.catkin.commands.tool import catkin
 from minirospy.workspace.manifest import Kind, read_manifest
 from minirospy.workspace.plan import read_plan
 

@@ -54,7 +54,7 @@ def test_each_imported_module_of_the_table_is_in_the_overlay() -> None:
     refusing = {
         path.parent.name
         for path in OVERLAY.glob("*/__init__.py")
-        if "minirospy.compat.elsewhere" in path.read_text(encoding="utf-8")
+        if "minirospy.ros.elsewhere" in path.read_text(encoding="utf-8")
     }
     assert refusing == IMPORTED
 
@@ -94,7 +94,14 @@ def test_module_that_is_installed_comes_first(tmp_path: Path) -> None:
 
 
 def test_rosrun_prints_the_line_of_ros_and_then_the_advice() -> None:
-    command = [sys.executable, "-m", "minirospy.cli.ros.rosrun", "gazebo_ros", "spawn_model", "-urdf"]
+    command = [
+        sys.executable,
+        "-m",
+        "minirospy.ros.rosbash.commands.rosrun",
+        "gazebo_ros",
+        "spawn_model",
+        "-urdf",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     first, second = done.stderr.splitlines()

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from minirospy.cli.ros.rospack import main as rospack
+from minirospy.ros.rospack.commands.rospack import main as rospack
 from minirospy.workspace.manifest import read_manifest
+from minirospy.workspace.packages import Packages
 
 ROOT = Path(__file__).parents[2] / "minirospy"
-FOLDERS = sorted(path.parent for path in (ROOT / "ros_packages").glob("*/package.xml"))
+FOLDERS = sorted(path.parent for path in (ROOT / "ros").glob("*/package.xml"))
 # Packages of Python alone, not of ROS; camera_info_manager is a module of the package camera_info_manager_py.
 NO_PACKAGES = {"PyKDL", "RPi", "ament_index_python", "camera_info_manager", "rospkg"}
 
@@ -29,14 +30,14 @@ def test_importable_packages_are_found() -> None:
         path.parent.name
         for path in (ROOT / "overlay").glob("*/__init__.py")
         # The import of these raises an error that names what to do.
-        if "minirospy.compat.elsewhere" not in path.read_text(encoding="utf-8")
+        if "minirospy.ros.elsewhere" not in path.read_text(encoding="utf-8")
     }
     assert overlay - NO_PACKAGES <= known
 
 
 def test_rospack(capsys: pytest.CaptureFixture[str]) -> None:
     assert rospack(["find", "rospy"]) == 0
-    assert capsys.readouterr().out == f"{ROOT / 'ros_packages' / 'rospy'}\n"
+    assert capsys.readouterr().out == f"{ROOT / 'ros' / 'rospy'}\n"
     assert rospack(["depends1", "rospy"]) == 0
     assert capsys.readouterr().out.split() == [
         "genpy",
@@ -58,6 +59,14 @@ def test_rospack(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_rospkg() -> None:
     packages = rospkg.RosPack()
-    assert packages.get_path("rosgraph") == str(ROOT / "ros_packages" / "rosgraph")
+    assert packages.get_path("rosgraph") == str(ROOT / "ros" / "rosgraph")
     assert "rospy" in packages.get_depends("rostest")
     assert packages.get_manifest("rosmaster").name == "rosmaster"
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_modules_of_a_package_are_not_its_programs(folder: Path) -> None:
+    """`rosrun rosserial_python serial_node.py` is the program, not the module that it runs."""
+    for name in Packages.below(ROOT / "ros").executables(folder.name):
+        (found,) = Packages.below(ROOT / "ros").find_executables(folder.name, name)
+        assert Path(found[-1]).read_text(encoding="utf-8").startswith("#!")

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from minirospy.base.installation import install_command
-from minirospy.cli.catkin.make import catkin_make
-from minirospy.cli.catkin.test_results import main as catkin_test_results
-from minirospy.cli.catkin.tool import catkin
+from minirospy.ros.catkin.commands.make import catkin_make
+from minirospy.ros.catkin.commands.test_results import main as catkin_test_results
+from minirospy.ros.catkin.commands.tool import catkin
 from minirospy.workspace.plan import Test as PlannedTest
 from minirospy.workspace.plan import read_plan
 from tests.waiting import wait_until
@@ -167,9 +167,7 @@ def test_slow():
         pathlib.Path({str(ended)!r}).touch()
 """
     scene.package("p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": text})
-    code = (
-        "import sys; from minirospy.cli.catkin.make import catkin_make; sys.exit(catkin_make(['run_tests']))"
-    )
+    code = "import sys; from minirospy.ros.catkin.commands.make import catkin_make; sys.exit(catkin_make(['run_tests']))"
     popen = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=scene.root,
@@ -196,7 +194,7 @@ def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
     scene.package(
         "p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": "import time\ntime.sleep(60)\n"}
     )
-    monkeypatch.setattr("minirospy.cli.catkin.run_tests._END_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.catkin.commands.run_tests._END_SECONDS", 0.1)
     assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
     assert capsys.readouterr().err.endswith("interrupted: the tests that were left have not run\n")
     assert [each.returncode is None for each in interrupted_processes] == [False]

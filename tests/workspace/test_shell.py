@@ -93,7 +93,8 @@ def make_workspace(root: Path) -> None:
         for name, function in (("rospack", "main"), ("rosstack", "rosstack")):
             stand_in = root / "bin" / name
             stand_in.write_text(
-                f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.ros.rospack import {function}\nsys.exit({function}())\n"
+                f"#!{sys.executable}\nimport sys\n"
+                f"from minirospy.ros.rospack.commands.rospack import {function}\nsys.exit({function}())\n"
             )
             stand_in.chmod(0o755)
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 if TYPE_CHECKING:
     from roscpp.srv import GetLoggersResponse
 
-    from minirospy.cli.ros.rospack import _Verb as PackVerb
     from minirospy.core.idl.load import Catalogue
     from minirospy.core.idl.spec import MessageSpec
     from minirospy.introspect.graph import Graph
+    from minirospy.ros.rospack.commands.rospack import _Verb as PackVerb
     from minirospy.workspace.packages import Packages
 
 __all__ = [
@@ -194,20 +194,20 @@ def rosrun_words(cursor: Cursor) -> Iterable[str]:
 
 def rospack_words(cursor: Cursor) -> Iterable[str]:
     """Return a verb of rospack, its options, a package."""
-    from minirospy.cli.ros.rospack import _VERBS
+    from minirospy.ros.rospack.commands.rospack import _VERBS
 
     return _pack_words(cursor, _VERBS)
 
 
 def rosstack_words(cursor: Cursor) -> Iterable[str]:
     """Return a verb of rosstack, its options, a stack."""
-    from minirospy.cli.ros.rospack import _STACK_VERBS
+    from minirospy.ros.rospack.commands.rospack import _STACK_VERBS
 
     return _pack_words(cursor, _STACK_VERBS)
 
 
 def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
-    from minirospy.cli.ros.rospack import _FLAGS
+    from minirospy.ros.rospack.commands.rospack import _FLAGS
 
     words = [word for word in cursor.given if not word.startswith("-")]
     verb = verbs.get(words[0]) if words else None
@@ -250,7 +250,7 @@ def _launch_file(cursor: Cursor) -> str:
 
 
 def _launch_args(cursor: Cursor) -> Iterator[str]:
-    from minirospy.launch.arg_docs import describe_args
+    from minirospy.ros.roslaunch.launcher.arg_docs import describe_args
 
     name, assigned, _ = cursor.word.partition(":=")
     for arg in describe_args(_launch_file(cursor)):
@@ -263,8 +263,8 @@ def _launch_args(cursor: Cursor) -> Iterator[str]:
 
 def launch_nodes(cursor: Cursor) -> Iterable[str]:
     """Return the nodes of the launch file, for `roslaunch PACKAGE FILE --args NODE`."""
-    from minirospy.launch.arg_docs import describe_args
-    from minirospy.launch.load import LaunchSource, load_sources
+    from minirospy.ros.roslaunch.launcher.arg_docs import describe_args
+    from minirospy.ros.roslaunch.launcher.load import LaunchSource, load_sources
 
     if not cursor.given:
         return []

@@ -3,7 +3,7 @@
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import Header
 
-from minirospy.actionlib import (
+from minirospy.ros.actionlib.actionlib import (
     INVALID_TRANSITION,
     NO_TRANSITION,
     ActionClient,

@@ -2,7 +2,7 @@
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
-from minirospy.actionlib import (
+from minirospy.ros.actionlib.actionlib import (
     ActionException,
     ActionServer,
     GoalIDGenerator,

@@ -1,5 +1,5 @@
 """actionlib.exceptions, provided by minirospy."""
 
-from minirospy.actionlib import ActionException
+from minirospy.ros.actionlib.actionlib import ActionException
 
 __all__ = ["ActionException"]

@@ -1,5 +1,5 @@
 """actionlib.goal_id_generator, provided by minirospy."""
 
-from minirospy.actionlib import GoalIDGenerator
+from minirospy.ros.actionlib.actionlib import GoalIDGenerator
 
 __all__ = ["GoalIDGenerator"]

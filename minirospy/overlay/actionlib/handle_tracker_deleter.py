@@ -1,5 +1,5 @@
 """actionlib.handle_tracker_deleter, provided by minirospy."""
 
-from minirospy.actionlib import HandleTrackerDeleter
+from minirospy.ros.actionlib.actionlib import HandleTrackerDeleter
 
 __all__ = ["HandleTrackerDeleter"]

@@ -1,5 +1,5 @@
 """actionlib.server_goal_handle, provided by minirospy."""
 
-from minirospy.actionlib import ServerGoalHandle
+from minirospy.ros.actionlib.actionlib import ServerGoalHandle
 
 __all__ = ["ServerGoalHandle"]

@@ -2,7 +2,7 @@
 
 from actionlib_msgs.msg import GoalStatus
 
-from minirospy.actionlib import (
+from minirospy.ros.actionlib.actionlib import (
     ActionClient,
     CommState,
     SimpleActionClient,

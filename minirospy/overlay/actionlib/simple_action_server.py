@@ -2,6 +2,6 @@
 
 from actionlib_msgs.msg import GoalStatus
 
-from minirospy.actionlib import ActionServer, ServerGoalHandle, SimpleActionServer, nop_cb
+from minirospy.ros.actionlib.actionlib import ActionServer, ServerGoalHandle, SimpleActionServer, nop_cb
 
 __all__ = ["ActionServer", "GoalStatus", "ServerGoalHandle", "SimpleActionServer", "nop_cb"]

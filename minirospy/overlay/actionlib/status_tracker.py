@@ -1,5 +1,5 @@
 """actionlib.status_tracker, provided by minirospy."""
 
-from minirospy.actionlib import StatusTracker
+from minirospy.ros.actionlib.actionlib import StatusTracker
 
 __all__ = ["StatusTracker"]

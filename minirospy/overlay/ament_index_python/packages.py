@@ -1,6 +1,6 @@
 """ament_index_python.packages, provided by minirospy where there is no ROS 2."""
 
-from minirospy.compat.ament_index_python.packages import (
+from minirospy.ros.ament_index_python.ament_index_python.packages import (
     PackageNotFoundError,
     get_package_prefix,
     get_package_share_directory,

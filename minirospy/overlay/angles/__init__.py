@@ -2,7 +2,7 @@
 
 from math import fabs, fmod, pi
 
-from minirospy.compat.angles import (
+from minirospy.ros.angles.angles import (
     _find_min_max_delta,
     normalize_angle,
     normalize_angle_positive,

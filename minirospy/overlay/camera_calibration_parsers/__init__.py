@@ -1,5 +1,9 @@
 """camera_calibration_parsers, provided by minirospy. Source: http://wiki.ros.org/camera_calibration_parsers."""
 
-from minirospy.compat.camera_calibration_parsers import CameraInfo, readCalibration, writeCalibration
+from minirospy.ros.camera_calibration_parsers.camera_calibration_parsers import (
+    CameraInfo,
+    readCalibration,
+    writeCalibration,
+)
 
 __all__ = ["CameraInfo", "readCalibration", "writeCalibration"]

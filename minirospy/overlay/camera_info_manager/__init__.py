@@ -2,7 +2,7 @@
 
 from camera_info_manager import camera_info_manager as camera_info_manager
 from camera_info_manager import zoom_camera_info_manager as zoom_camera_info_manager
-from minirospy.compat.camera_info_manager.camera_info_manager import (
+from minirospy.ros.camera_info_manager_py.camera_info_manager.camera_info_manager import (
     CameraInfoError,
     CameraInfoManager,
     CameraInfoMissingError,
@@ -14,7 +14,7 @@ from minirospy.compat.camera_info_manager.camera_info_manager import (
     saveCalibration,
     saveCalibrationFile,
 )
-from minirospy.compat.camera_info_manager.zoom_camera_info_manager import (
+from minirospy.ros.camera_info_manager_py.camera_info_manager.zoom_camera_info_manager import (
     ApproximateZoomCameraInfoManager,
     InterpolatingZoomCameraInfoManager,
     ZoomCameraInfoManager,

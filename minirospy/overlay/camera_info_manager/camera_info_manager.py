@@ -1,6 +1,6 @@
 """camera_info_manager.camera_info_manager, provided by minirospy. Source: http://wiki.ros.org/camera_info_manager_py."""
 
-from minirospy.compat.camera_info_manager.camera_info_manager import (
+from minirospy.ros.camera_info_manager_py.camera_info_manager.camera_info_manager import (
     CameraInfoError,
     CameraInfoManager,
     CameraInfoMissingError,

@@ -1,6 +1,6 @@
 """catkin.terminal_color, provided by minirospy: texts with colors."""
 
-from minirospy.compat.catkin.terminal_color import (
+from minirospy.ros.catkin.catkin.terminal_color import (
     ColorTemplate,
     ansi,
     disable_ANSI_colors,

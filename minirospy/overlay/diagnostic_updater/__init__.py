@@ -5,25 +5,25 @@ import threading
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from minirospy.compat.diagnostic_updater._diagnostic_status_wrapper import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._diagnostic_status_wrapper import (
     ERROR,
     OK,
     WARN,
     DiagnosticStatusWrapper,
 )
-from minirospy.compat.diagnostic_updater._diagnostic_updater import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._diagnostic_updater import (
     CompositeDiagnosticTask,
     DiagnosticTask,
     DiagnosticTaskVector,
     FunctionDiagnosticTask,
     Updater,
 )
-from minirospy.compat.diagnostic_updater._publisher import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._publisher import (
     DiagnosedPublisher,
     HeaderlessTopicDiagnostic,
     TopicDiagnostic,
 )
-from minirospy.compat.diagnostic_updater._update_functions import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._update_functions import (
     FrequencyStatus,
     FrequencyStatusParam,
     Heartbeat,

@@ -1,6 +1,6 @@
 """diagnostic_updater._diagnostic_status_wrapper, provided by minirospy. Source: http://wiki.ros.org/diagnostic_updater."""
 
-from minirospy.compat.diagnostic_updater._diagnostic_status_wrapper import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._diagnostic_status_wrapper import (
     ERROR,
     OK,
     WARN,

@@ -1,6 +1,6 @@
 """diagnostic_updater._diagnostic_updater, provided by minirospy. Source: http://wiki.ros.org/diagnostic_updater."""
 
-from minirospy.compat.diagnostic_updater._diagnostic_updater import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._diagnostic_updater import (
     CompositeDiagnosticTask,
     DiagnosticTask,
     DiagnosticTaskVector,

@@ -1,6 +1,6 @@
 """diagnostic_updater._publisher, provided by minirospy. Source: http://wiki.ros.org/diagnostic_updater."""
 
-from minirospy.compat.diagnostic_updater._publisher import (
+from minirospy.ros.diagnostic_updater.diagnostic_updater._publisher import (
     DiagnosedPublisher,
     HeaderlessTopicDiagnostic,
     TopicDiagnostic,

@@ -1,6 +1,6 @@
 """dynamic_reconfigure, provided by minirospy: parameters that change while a node runs. Source: http://wiki.ros.org/dynamic_reconfigure."""
 
-from minirospy.compat.dynamic_reconfigure import (
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureException,
     DynamicReconfigureParameterException,

@@ -3,9 +3,7 @@
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
 from dynamic_reconfigure.srv import Reconfigure as ReconfigureSrv
-from minirospy.compat.dynamic_reconfigure.client import (
-    Client,
-)
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.client import Client
 
 __all__ = [
     "Client",

@@ -11,7 +11,7 @@ from dynamic_reconfigure.msg import (
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
 from dynamic_reconfigure.msg import Group as GroupMsg
-from minirospy.compat.dynamic_reconfigure.encoding import (
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import (
     Config,
     decode_config,
     decode_description,

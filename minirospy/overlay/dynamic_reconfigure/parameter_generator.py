@@ -7,7 +7,7 @@ import sys
 import textwrap
 from string import Template
 
-from minirospy.compat.dynamic_reconfigure.parameter_generator_catkin import (
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import (
     ParameterGenerator,
     bool_t,
     check_description,

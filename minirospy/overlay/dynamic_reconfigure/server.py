@@ -3,9 +3,7 @@
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
 from dynamic_reconfigure.srv import Reconfigure as ReconfigureSrv
-from minirospy.compat.dynamic_reconfigure.server import (
-    Server,
-)
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
 
 __all__ = [
     "ConfigDescrMsg",

@@ -1,3 +1,3 @@
 """gazebo_ros, which is not here: the import raises ImportError with what to do."""
 
-from minirospy.compat.elsewhere import gazebo_ros as gazebo_ros
+from minirospy.ros.elsewhere import gazebo_ros as gazebo_ros

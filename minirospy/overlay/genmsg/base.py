@@ -1,6 +1,6 @@
 """genmsg.base, provided by minirospy."""
 
-from minirospy.compat.genmsg.base import (
+from minirospy.ros.genmsg.genmsg.base import (
     COMMENTCHAR,
     CONSTCHAR,
     EXT_MSG,
@@ -11,7 +11,7 @@ from minirospy.compat.genmsg.base import (
     SRV_DIR,
     InvalidMsgSpec,
 )
-from minirospy.compat.genmsg.msg_loader import MsgGenerationException
+from minirospy.ros.genmsg.genmsg.msg_loader import MsgGenerationException
 
 __all__ = [
     "COMMENTCHAR", "CONSTCHAR", "EXT_MSG", "EXT_SRV", "IODELIM", "MSG_DIR", "SEP", "SRV_DIR", "InvalidMsgSpec",

@@ -1,6 +1,6 @@
 """genmsg.deps, provided by minirospy: the files that a definition needs."""
 
-from minirospy.compat.genmsg.deps import (
+from minirospy.ros.genmsg.genmsg.deps import (
     find_msg_dependencies,
     find_msg_dependencies_with_type,
     find_srv_dependencies,

@@ -10,7 +10,7 @@ from genmsg.msgs import (
     TIME_MSG,
     is_valid_msg_field_name,
 )
-from minirospy.compat.genmsg.msg_loader import (
+from minirospy.ros.genmsg.genmsg.msg_loader import (
     MsgContext,
     MsgNotFound,
     get_msg_file,

@@ -1,7 +1,7 @@
 """genmsg.msgs, provided by minirospy: types, fields and constants of messages."""
 
 from genmsg.base import EXT_MSG, MSG_DIR, SEP, InvalidMsgSpec
-from minirospy.compat.genmsg.msgs import (
+from minirospy.ros.genmsg.genmsg.msgs import (
     BUILTIN_TYPES,
     DURATION,
     DURATION_MSG,

@@ -1,5 +1,5 @@
 """genmsg.srvs, provided by minirospy: the spec of a service."""
 
-from minirospy.compat.genmsg.srvs import SrvSpec
+from minirospy.ros.genmsg.genmsg.srvs import SrvSpec
 
 __all__ = ["SrvSpec"]

@@ -1,6 +1,6 @@
 """genpy.dynamic, provided by minirospy: message classes from a full text."""
 
-from minirospy.compat.genpy.base import MsgGenerationException
-from minirospy.compat.genpy.dynamic import generate_dynamic
+from minirospy.ros.genpy.genpy.base import MsgGenerationException
+from minirospy.ros.genpy.genpy.dynamic import generate_dynamic
 
 __all__ = ["MsgGenerationException", "generate_dynamic"]

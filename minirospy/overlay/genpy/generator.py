@@ -1,6 +1,6 @@
 """genpy.generator, provided by minirospy: Python modules of definitions, written by its own compiler."""
 
-from minirospy.compat.genpy.generator import (
+from minirospy.ros.genpy.genpy.generator import (
     Generator,
     MsgGenerator,
     SrvGenerator,

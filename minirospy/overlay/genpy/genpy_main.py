@@ -1,5 +1,5 @@
 """genpy.genpy_main, provided by minirospy: the command line of message generators."""
 
-from minirospy.compat.genpy.genpy_main import genmain, usage
+from minirospy.ros.genpy.genpy.genpy_main import genmain, usage
 
 __all__ = ["genmain", "usage"]

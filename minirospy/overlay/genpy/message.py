@@ -1,14 +1,6 @@
 """genpy.message, provided by minirospy."""
 
 from minirospy.base.times import Duration, Time, TVal
-from minirospy.compat.genpy.base import is_simple
-from minirospy.compat.genpy.message import (
-    RosMsgUnicodeErrors,
-    get_message_class,
-    get_service_class,
-    isstring,
-    struct_I,
-)
 from minirospy.core.idl.message import (
     DeserializationError,
     Message,
@@ -18,6 +10,14 @@ from minirospy.core.idl.message import (
     fill_message_args,
     get_printable_message_args,
     strify_message,
+)
+from minirospy.ros.genpy.genpy.base import is_simple
+from minirospy.ros.genpy.genpy.message import (
+    RosMsgUnicodeErrors,
+    get_message_class,
+    get_service_class,
+    isstring,
+    struct_I,
 )
 
 __all__ = [
@@ -39,4 +39,4 @@ __all__ = [
     "strify_message",
     "struct_I",
 ]
-from minirospy.compat.genpy.message import _get_message_or_service_class as _get_message_or_service_class
+from minirospy.ros.genpy.genpy.message import _get_message_or_service_class as _get_message_or_service_class

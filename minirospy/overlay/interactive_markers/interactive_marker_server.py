@@ -2,7 +2,7 @@
 
 from std_msgs.msg import Header
 
-from minirospy.compat.interactive_markers.interactive_marker_server import (
+from minirospy.ros.interactive_markers.interactive_markers.interactive_marker_server import (
     InteractiveMarkerServer,
     MarkerContext,
     UpdateContext,

@@ -1,6 +1,6 @@
 """message_filters, provided by minirospy: messages that belong together. Source: http://wiki.ros.org/message_filters."""
 
-from minirospy.compat.message_filters import (
+from minirospy.ros.message_filters.message_filters import (
     ApproximateTimeSynchronizer,
     Cache,
     SimpleFilter,

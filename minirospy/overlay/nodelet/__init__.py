@@ -1,3 +1,3 @@
 """nodelet, which is not here: the import raises ImportError with what to do."""
 
-from minirospy.compat.elsewhere import nodelet as nodelet
+from minirospy.ros.elsewhere import nodelet as nodelet

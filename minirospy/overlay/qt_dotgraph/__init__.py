@@ -1,3 +1,3 @@
 """qt_dotgraph, which is not here: the import raises ImportError with what to do."""
 
-from minirospy.compat.elsewhere import qt_dotgraph as qt_dotgraph
+from minirospy.ros.elsewhere import qt_dotgraph as qt_dotgraph

@@ -1,3 +1,3 @@
 """qt_gui, which is not here: the import raises ImportError with what to do."""
 
-from minirospy.compat.elsewhere import qt_gui as qt_gui
+from minirospy.ros.elsewhere import qt_gui as qt_gui

@@ -2,7 +2,7 @@
 
 from rospy.numpy_msg import numpy_msg
 
-from minirospy.compat.ros_numpy.registry import converts_from_numpy, converts_to_numpy, msgify, numpify
+from minirospy.ros.ros_numpy.ros_numpy.registry import converts_from_numpy, converts_to_numpy, msgify, numpify
 from ros_numpy import geometry as geometry
 from ros_numpy import image as image
 from ros_numpy import occupancy_grid as occupancy_grid

@@ -1,6 +1,6 @@
 """ros_numpy.geometry, provided by minirospy. Source: http://wiki.ros.org/ros_numpy."""
 
-from minirospy.compat.ros_numpy.geometry import (
+from minirospy.ros.ros_numpy.ros_numpy.geometry import (
     numpy_to_point,
     numpy_to_pose,
     numpy_to_quat,

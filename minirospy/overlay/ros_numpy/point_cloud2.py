@@ -1,6 +1,6 @@
 """ros_numpy.point_cloud2, provided by minirospy. Source: http://wiki.ros.org/ros_numpy."""
 
-from minirospy.compat.ros_numpy.point_cloud2 import (
+from minirospy.ros.ros_numpy.ros_numpy.point_cloud2 import (
     array_to_pointcloud2,
     dtype_to_fields,
     fields_to_dtype,

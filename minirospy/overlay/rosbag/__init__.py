@@ -1,6 +1,6 @@
 """rosbag, provided by minirospy: bags, read and written. Source: http://wiki.ros.org/rosbag/Code%20API."""
 
-from minirospy.compat.rosbag import (
+from minirospy.ros.rosbag.rosbag import (
     Bag,
     Compression,
     ROSBagException,
@@ -8,7 +8,7 @@ from minirospy.compat.rosbag import (
     ROSBagUnindexedException,
     rosbagmain,
 )
-from minirospy.compat.rosbag import __getattr__ as __getattr__
+from minirospy.ros.rosbag.rosbag import __getattr__ as __getattr__
 
 __all__ = [
     "Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException", "rosbagmain",

@@ -1,6 +1,6 @@
 """rosbag.migration, provided by minirospy: messages of types that have changed."""
 
-from minirospy.compat.rosbag.migration import (
+from minirospy.ros.rosbag.rosbag.migration import (
     BagMigrationException,
     MessageMigrator,
     MessageUpdateRule,

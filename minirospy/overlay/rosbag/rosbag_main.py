@@ -1,6 +1,6 @@
 """rosbag.rosbag_main, provided by minirospy: the verbs of the command as functions."""
 
-from minirospy.compat.rosbag.rosbag_main import (
+from minirospy.ros.rosbag.rosbag.rosbag_main import (
     check_cmd,
     compress_cmd,
     decompress_cmd,

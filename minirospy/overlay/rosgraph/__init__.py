@@ -1,7 +1,7 @@
 """rosgraph, provided by minirospy: the Master API, names and the environment for Python code."""
 
-from minirospy.compat.rosgraph import __getattr__ as __getattr__
-from minirospy.compat.rosgraph import myargv
+from minirospy.ros.rosgraph.rosgraph import __getattr__ as __getattr__
+from minirospy.ros.rosgraph.rosgraph import myargv
 from rosgraph import masterapi as masterapi
 from rosgraph import names as names
 from rosgraph import network as network

@@ -1,6 +1,6 @@
 """rosgraph.masterapi, provided by minirospy."""
 
-from minirospy.compat.rosgraph.masterapi import (
+from minirospy.ros.rosgraph.rosgraph.masterapi import (
     Error,
     Failure,
     Master,
@@ -10,8 +10,8 @@ from minirospy.compat.rosgraph.masterapi import (
     ROSMasterException,
     is_online,
 )
-from minirospy.compat.rosgraph.names import make_caller_id as make_caller_id
-from minirospy.compat.rosgraph.network import parse_http_host_and_port as parse_http_host_and_port
+from minirospy.ros.rosgraph.rosgraph.names import make_caller_id as make_caller_id
+from minirospy.ros.rosgraph.rosgraph.network import parse_http_host_and_port as parse_http_host_and_port
 from rosgraph.rosenv import get_master_uri
 
 __all__ = [

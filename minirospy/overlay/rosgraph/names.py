@@ -1,6 +1,6 @@
 """rosgraph.names, provided by minirospy."""
 
-from minirospy.compat.ros_names import (
+from minirospy.ros.ros_names import (
     GLOBALNS,
     PRIV_NAME,
     REMAP,
@@ -15,7 +15,7 @@ from minirospy.compat.ros_names import (
     namespace,
     ns_join,
 )
-from minirospy.compat.rosgraph.names import (
+from minirospy.ros.rosgraph.rosgraph.names import (
     ANYTYPE,
     BASE_NAME_LEGAL_CHARS_P,
     MSG_EXT,

@@ -1,6 +1,6 @@
 """rosgraph.network, provided by minirospy."""
 
-from minirospy.compat.rosgraph.network import (
+from minirospy.ros.rosgraph.rosgraph.network import (
     ROSHandshakeException,
     create_local_xmlrpc_uri,
     decode_ros_handshake_header,

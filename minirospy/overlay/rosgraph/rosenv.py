@@ -1,7 +1,7 @@
 """rosgraph.rosenv, provided by minirospy."""
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
-from minirospy.compat.rosgraph.rosenv import (
+from minirospy.ros.rosgraph.rosgraph.rosenv import (
     DEFAULT_MASTER_URI,
     ROS_HOSTNAME,
     ROS_IP,

@@ -1,8 +1,6 @@
 """rosgraph.rosgraph_main, provided by minirospy: the command."""
 
-from minirospy.compat.rosgraph.rosgraph_main import (
-    rosgraph_main,
-)
+from minirospy.ros.rosgraph.rosgraph.rosgraph_main import rosgraph_main
 
 __all__ = [
     "rosgraph_main",

@@ -3,8 +3,8 @@
 from xmlrpc.server import SimpleXMLRPCRequestHandler as SimpleXMLRPCRequestHandler
 from xmlrpc.server import SimpleXMLRPCServer as SimpleXMLRPCServer
 
-from minirospy.compat.ros_names import isstring
-from minirospy.compat.rosgraph.xmlrpc import (
+from minirospy.ros.ros_names import isstring
+from minirospy.ros.rosgraph.rosgraph.xmlrpc import (
     SilenceableXMLRPCRequestHandler,
     ThreadingXMLRPCServer,
     XmlRpcHandler,

@@ -1,13 +1,13 @@
 """roslaunch, provided by minirospy."""
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
-from minirospy.compat.roslaunch import NAME, configure_logging, main, write_pid_file
-from minirospy.compat.roslaunch.config import ROSLaunchConfig
-from minirospy.compat.roslaunch.core import Master, Node, RLException, Test
-from minirospy.compat.roslaunch.launch import ROSLaunchRunner
-from minirospy.compat.roslaunch.pmon import Process
-from minirospy.compat.roslaunch.scriptapi import ROSLaunch
-from minirospy.compat.roslaunch.xmlloader import XmlLoader, XmlParseException
+from minirospy.ros.roslaunch.roslaunch import NAME, configure_logging, main, write_pid_file
+from minirospy.ros.roslaunch.roslaunch.config import ROSLaunchConfig
+from minirospy.ros.roslaunch.roslaunch.core import Master, Node, RLException, Test
+from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner
+from minirospy.ros.roslaunch.roslaunch.pmon import Process
+from minirospy.ros.roslaunch.roslaunch.scriptapi import ROSLaunch
+from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader, XmlParseException
 from roslaunch import arg_dump as arg_dump
 from roslaunch import config as config
 from roslaunch import core as core

@@ -1,3 +1,3 @@
 """roslaunch.child, which is not here: the import raises ImportError with what to use."""
 
-from minirospy.compat.elsewhere import roslaunch_child as child
+from minirospy.ros.elsewhere import roslaunch_child as child

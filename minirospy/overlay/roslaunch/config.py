@@ -1,13 +1,13 @@
 """roslaunch.config, provided by minirospy."""
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
-from minirospy.compat.roslaunch.config import (
+from minirospy.ros.roslaunch.roslaunch.config import (
     ROSLaunchConfig,
     get_roscore_filename,
     load_config_default,
     namespaces_of,
 )
-from minirospy.compat.roslaunch.core import Master, RLException, is_machine_local, local_machine
+from minirospy.ros.roslaunch.roslaunch.core import Master, RLException, is_machine_local, local_machine
 
 __all__ = [
     "DEFAULT_MASTER_PORT",

@@ -1,6 +1,6 @@
 """roslaunch.core, provided by minirospy: nodes, parameters and machines, and the output of roslaunch."""
 
-from minirospy.compat.roslaunch.core import (
+from minirospy.ros.roslaunch.roslaunch.core import (
     PHASE_RUN,
     PHASE_SETUP,
     PHASE_TEARDOWN,

@@ -1,10 +1,10 @@
 """roslaunch.launch, provided by minirospy: run a configuration that the program has made."""
 
-from minirospy.compat.roslaunch.core import Machine, Master, Node, Param, RLException, Test
-from minirospy.compat.roslaunch.launch import RLTestTimeoutException, ROSLaunchRunner
-from minirospy.compat.roslaunch.launch import unify_clear_params as _unify_clear_params
-from minirospy.compat.roslaunch.pmon import ProcessListener, start_process_monitor
-from minirospy.compat.roslaunch.pmon import ProcessListener as ROSLaunchListener
+from minirospy.ros.roslaunch.roslaunch.core import Machine, Master, Node, Param, RLException, Test
+from minirospy.ros.roslaunch.roslaunch.launch import RLTestTimeoutException, ROSLaunchRunner
+from minirospy.ros.roslaunch.roslaunch.launch import unify_clear_params as _unify_clear_params
+from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener, start_process_monitor
+from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener as ROSLaunchListener
 
 __all__ = [
     "Machine",

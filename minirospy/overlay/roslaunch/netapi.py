@@ -1,3 +1,3 @@
 """roslaunch.netapi, which is not here: the import raises ImportError with what to use."""
 
-from minirospy.compat.elsewhere import roslaunch_netapi as netapi
+from minirospy.ros.elsewhere import roslaunch_netapi as netapi

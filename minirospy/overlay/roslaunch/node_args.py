@@ -1,7 +1,7 @@
 """roslaunch.node_args, provided by minirospy."""
 
-from minirospy.compat.roslaunch.config import load_config_default as load_config_default
-from minirospy.compat.roslaunch.node_args import (
+from minirospy.ros.roslaunch.roslaunch.config import load_config_default as load_config_default
+from minirospy.ros.roslaunch.roslaunch.node_args import (
     NodeParamsException,
     create_local_process_args,
     get_node_args,

@@ -1,9 +1,9 @@
 """roslaunch.nodeprocess, provided by minirospy."""
 
-from minirospy.compat.roslaunch.core import Machine, Master, Node, RLException
-from minirospy.compat.roslaunch.nodeprocess import DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM
-from minirospy.compat.roslaunch.pmon import Process, create_node_process
-from minirospy.compat.roslaunch.pmon import Process as LocalProcess
+from minirospy.ros.roslaunch.roslaunch.core import Machine, Master, Node, RLException
+from minirospy.ros.roslaunch.roslaunch.nodeprocess import DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM
+from minirospy.ros.roslaunch.roslaunch.pmon import Process, create_node_process
+from minirospy.ros.roslaunch.roslaunch.pmon import Process as LocalProcess
 
 __all__ = [
     "DEFAULT_TIMEOUT_SIGINT",

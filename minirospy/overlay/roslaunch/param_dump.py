@@ -2,6 +2,6 @@
 
 import yaml as yaml
 
-from minirospy.compat.roslaunch.param_dump import dump_params
+from minirospy.ros.roslaunch.roslaunch.param_dump import dump_params
 
 __all__ = ["dump_params"]

@@ -1,7 +1,7 @@
 """roslaunch.pmon, provided by minirospy."""
 
-from minirospy.compat.roslaunch.core import RLException
-from minirospy.compat.roslaunch.pmon import (
+from minirospy.ros.roslaunch.roslaunch.core import RLException
+from minirospy.ros.roslaunch.roslaunch.pmon import (
     Process,
     ProcessListener,
     ProcessMonitor,
@@ -10,7 +10,7 @@ from minirospy.compat.roslaunch.pmon import (
     shutdown_process_monitor,
     start_process_monitor,
 )
-from minirospy.compat.roslaunch.pmon import init_signal_handlers as _init_signal_handlers
+from minirospy.ros.roslaunch.roslaunch.pmon import init_signal_handlers as _init_signal_handlers
 
 __all__ = [
     "Process",

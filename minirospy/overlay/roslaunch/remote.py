@@ -1,5 +1,5 @@
 """roslaunch.remote, provided by minirospy: programs import it, though ROSLaunchParent alone starts other machines' nodes."""
 
-from minirospy.compat.roslaunch.core import RLException, is_machine_local
+from minirospy.ros.roslaunch.roslaunch.core import RLException, is_machine_local
 
 __all__ = ["RLException", "is_machine_local"]

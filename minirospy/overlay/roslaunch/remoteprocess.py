@@ -1,3 +1,3 @@
 """roslaunch.remoteprocess, which is not here: the import raises ImportError with what to use."""
 
-from minirospy.compat.elsewhere import roslaunch_remoteprocess as remoteprocess
+from minirospy.ros.elsewhere import roslaunch_remoteprocess as remoteprocess

@@ -1,6 +1,6 @@
 """roslaunch.rlutil, provided by minirospy."""
 
-from minirospy.compat.roslaunch.rlutil import (
+from minirospy.ros.roslaunch.roslaunch.rlutil import (
     change_terminal_name,
     check_log_disk_usage,
     check_roslaunch,
@@ -19,4 +19,4 @@ __all__ = [
     "resolve_launch_arguments",
     "update_terminal_name",
 ]
-from minirospy.compat.roslaunch.rlutil import _wait_for_master as _wait_for_master
+from minirospy.ros.roslaunch.roslaunch.rlutil import _wait_for_master as _wait_for_master

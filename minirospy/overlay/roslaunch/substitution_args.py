@@ -1,7 +1,7 @@
 """roslaunch.substitution_args, provided by minirospy: `$(find ...)` and the other substitution arguments."""
 
-from minirospy.compat.roslaunch.loader import convert_value
-from minirospy.compat.roslaunch.substitution_args import (
+from minirospy.ros.roslaunch.roslaunch.loader import convert_value
+from minirospy.ros.roslaunch.roslaunch.substitution_args import (
     ArgException,
     SubstitutionException,
     _anon,

@@ -1,5 +1,5 @@
 """roslib.exceptions, provided by minirospy."""
 
-from minirospy.compat.roslib.exceptions import ROSLibException
+from minirospy.ros.roslib.roslib.exceptions import ROSLibException
 
 __all__ = ["ROSLibException"]

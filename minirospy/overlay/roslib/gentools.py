@@ -1,6 +1,6 @@
 """roslib.gentools, provided by minirospy: md5sums and full texts."""
 
-from minirospy.compat.roslib.gentools import (
+from minirospy.ros.roslib.roslib.gentools import (
     MsgSpecException,
     compute_full_text,
     compute_md5,

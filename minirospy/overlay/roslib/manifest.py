@@ -1,6 +1,6 @@
 """roslib.manifest, provided by minirospy: the manifest.xml of rosbuild."""
 
-from minirospy.compat.roslib.manifest import (
+from minirospy.ros.roslib.roslib.manifest import (
     Depend,
     Export,
     Manifest,
@@ -12,9 +12,7 @@ from minirospy.compat.roslib.manifest import (
     parse,
     parse_file,
 )
-from minirospy.compat.rospkg.common import (
-    MANIFEST_FILE,
-)
+from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE
 
 __all__ = [
     "MANIFEST_FILE",

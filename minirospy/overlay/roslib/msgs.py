@@ -15,7 +15,7 @@ from genmsg.msgs import (
 )
 from genmsg.msgs import bare_msg_type as base_msg_type
 
-from minirospy.compat.roslib.msgs import EXT, SEP, MsgSpecException, list_msg_types
+from minirospy.ros.roslib.roslib.msgs import EXT, SEP, MsgSpecException, list_msg_types
 
 __all__ = [
     "BUILTIN_TYPES",

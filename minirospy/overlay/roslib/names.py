@@ -21,7 +21,7 @@ from rosgraph.names import (
     resolve_name,
 )
 
-from minirospy.compat.roslib.names import (
+from minirospy.ros.roslib.roslib.names import (
     PRN_SEPARATOR,
     TYPE_SEPARATOR,
     is_legal_resource_base_name,

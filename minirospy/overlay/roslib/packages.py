@@ -1,6 +1,6 @@
 """roslib.packages, provided by minirospy."""
 
-from minirospy.compat.roslib.packages import (
+from minirospy.ros.roslib.roslib.packages import (
     ROS_PACKAGE_PATH,
     ROS_ROOT,
     SRC_DIR,
@@ -17,7 +17,7 @@ from minirospy.compat.roslib.packages import (
     list_pkgs_by_path,
     resource_file,
 )
-from minirospy.compat.rospkg.common import MANIFEST_FILE, PACKAGE_FILE
+from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE, PACKAGE_FILE
 
 __all__ = [
     "MANIFEST_FILE",

@@ -2,7 +2,7 @@
 
 from rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
 
-from minirospy.compat.roslib.rosenv import (
+from minirospy.ros.roslib.roslib.rosenv import (
     ROS_HOME,
     ROS_LOG_DIR,
     ROS_PACKAGE_PATH,

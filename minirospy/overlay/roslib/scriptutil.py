@@ -2,6 +2,6 @@
 
 from rosgraph.names import script_resolve_name
 
-from minirospy.compat.roslib.scriptutil import get_master, get_param_server
+from minirospy.ros.roslib.roslib.scriptutil import get_master, get_param_server
 
 __all__ = ["get_master", "get_param_server", "script_resolve_name"]

@@ -1,6 +1,6 @@
 """roslib.srvs, provided by minirospy: the service types of packages."""
 
-from minirospy.compat.roslib.srvs import (
+from minirospy.ros.roslib.roslib.srvs import (
     COMMENTCHAR,
     EXT,
     IODELIM,

@@ -1,10 +1,7 @@
 """roslib.stacks, provided by minirospy: the stacks of rosbuild."""
 
-from minirospy.compat.roslib.packages import (
-    ROS_PACKAGE_PATH,
-    ROS_ROOT,
-)
-from minirospy.compat.roslib.stacks import (
+from minirospy.ros.roslib.roslib.packages import ROS_PACKAGE_PATH, ROS_ROOT
+from minirospy.ros.roslib.roslib.stacks import (
     ROS_STACK,
     InvalidROSStackException,
     ROSStackException,
@@ -15,9 +12,7 @@ from minirospy.compat.roslib.stacks import (
     list_stacks_by_path,
     stack_of,
 )
-from minirospy.compat.rospkg.common import (
-    STACK_FILE,
-)
+from minirospy.ros.rospkg.rospkg.common import STACK_FILE
 
 __all__ = [
     "ROS_PACKAGE_PATH",

@@ -1,7 +1,7 @@
 """rosmaster, provided by minirospy: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
 
-from minirospy.compat.rosmaster import __getattr__ as __getattr__
-from minirospy.compat.rosmaster import rosmaster_main
+from minirospy.ros.rosmaster.rosmaster import __getattr__ as __getattr__
+from minirospy.ros.rosmaster.rosmaster import rosmaster_main
 from rosmaster import master as master
 from rosmaster.master import DEFAULT_MASTER_PORT
 

@@ -1,8 +1,6 @@
 """rosmaster.exceptions, provided by minirospy: its errors."""
 
-from minirospy.compat.rosmaster.exceptions import (
-    InternalException,
-)
+from minirospy.ros.rosmaster.rosmaster.exceptions import InternalException
 
 __all__ = [
     "InternalException",

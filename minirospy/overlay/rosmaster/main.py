@@ -1,5 +1,5 @@
 """rosmaster.main, provided by minirospy: the command."""
 
-from minirospy.compat.rosmaster import rosmaster_main
+from minirospy.ros.rosmaster.rosmaster import rosmaster_main
 
 __all__ = ["rosmaster_main"]

@@ -1,6 +1,6 @@
 """rosmaster.master_api, provided by minirospy: the Master API as an object."""
 
-from minirospy.compat.rosmaster.master_api import (
+from minirospy.ros.rosmaster.rosmaster.master_api import (
     LOG_API,
     MSG,
     NUM_WORKERS,

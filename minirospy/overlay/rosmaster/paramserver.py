@@ -1,10 +1,6 @@
 """rosmaster.paramserver, provided by minirospy: the tree of parameters."""
 
-from minirospy.compat.rosmaster.paramserver import (
-    GLOBALNS,
-    SEP,
-    ParamDictionary,
-)
+from minirospy.ros.rosmaster.rosmaster.paramserver import GLOBALNS, SEP, ParamDictionary
 
 __all__ = [
     "GLOBALNS",

@@ -1,6 +1,6 @@
 """rosmaster.registrations, provided by minirospy: tables of what nodes have registered."""
 
-from minirospy.compat.rosmaster.registrations import (
+from minirospy.ros.rosmaster.rosmaster.registrations import (
     NodeRef,
     RegistrationManager,
     Registrations,

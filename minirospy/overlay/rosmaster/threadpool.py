@@ -1,5 +1,5 @@
 """rosmaster.threadpool, provided by minirospy: threads for calls to nodes."""
 
-from minirospy.compat.rosmaster.threadpool import MarkedThreadPool
+from minirospy.ros.rosmaster.rosmaster.threadpool import MarkedThreadPool
 
 __all__ = ["MarkedThreadPool"]

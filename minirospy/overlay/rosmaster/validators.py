@@ -1,6 +1,6 @@
 """rosmaster.validators, provided by minirospy: what calls require of their arguments."""
 
-from minirospy.compat.rosmaster.validators import (
+from minirospy.ros.rosmaster.rosmaster.validators import (
     ANYTYPE,
     ROSRPC,
     TYPE_SEPARATOR,

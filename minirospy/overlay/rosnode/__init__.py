@@ -2,7 +2,7 @@
 
 import rosgraph as rosgraph
 
-from minirospy.compat.rosnode import (
+from minirospy.ros.rosnode.rosnode import (
     ID,
     NAME,
     ROSNodeException,
@@ -23,8 +23,8 @@ from minirospy.compat.rosnode import (
     rosnode_ping_all,
     rosnodemain,
 )
-from minirospy.compat.rosnode import _sub_rosnode_listnodes as _sub_rosnode_listnodes
-from minirospy.compat.rosnode import _succeed as _succeed
+from minirospy.ros.rosnode.rosnode import _sub_rosnode_listnodes as _sub_rosnode_listnodes
+from minirospy.ros.rosnode.rosnode import _succeed as _succeed
 
 __all__ = [
     "ID", "NAME", "ROSNodeException", "ROSNodeIOException", "cleanup_master_blacklist", "cleanup_master_whitelist",
@@ -32,10 +32,10 @@ __all__ = [
     "get_node_names", "get_nodes_by_machine", "kill_nodes", "rosnode_cleanup", "rosnode_info", "rosnode_listnodes",
     "rosnode_ping", "rosnode_ping_all", "rosnodemain",
 ]  # fmt: skip
-from minirospy.compat.rosnode import _fullusage as _fullusage
-from minirospy.compat.rosnode import _rosnode_cmd_cleanup as _rosnode_cmd_cleanup
-from minirospy.compat.rosnode import _rosnode_cmd_info as _rosnode_cmd_info
-from minirospy.compat.rosnode import _rosnode_cmd_kill as _rosnode_cmd_kill
-from minirospy.compat.rosnode import _rosnode_cmd_list as _rosnode_cmd_list
-from minirospy.compat.rosnode import _rosnode_cmd_machine as _rosnode_cmd_machine
-from minirospy.compat.rosnode import _rosnode_cmd_ping as _rosnode_cmd_ping
+from minirospy.ros.rosnode.rosnode import _fullusage as _fullusage
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_cleanup as _rosnode_cmd_cleanup
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_info as _rosnode_cmd_info
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_kill as _rosnode_cmd_kill
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_list as _rosnode_cmd_list
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_machine as _rosnode_cmd_machine
+from minirospy.ros.rosnode.rosnode import _rosnode_cmd_ping as _rosnode_cmd_ping

@@ -10,7 +10,7 @@ from rosgraph.names import (
     script_resolve_name,
 )
 
-from minirospy.compat.rosparam import (
+from minirospy.ros.rosparam.rosparam import (
     NAME,
     NS,
     RosParamException,
@@ -34,8 +34,8 @@ __all__ = [
     "get_param_server", "get_ros_namespace", "list_params", "load_file", "load_str", "make_caller_id", "make_global_ns",
     "ns_join", "print_params", "script_resolve_name", "set_param", "set_param_raw", "upload_params", "yamlmain",
 ]  # fmt: skip
-from minirospy.compat.rosparam import _fullusage as _fullusage
-from minirospy.compat.rosparam import _rosparam_cmd_delete as _rosparam_cmd_delete
-from minirospy.compat.rosparam import _rosparam_cmd_get_dump as _rosparam_cmd_get_dump
-from minirospy.compat.rosparam import _rosparam_cmd_list as _rosparam_cmd_list
-from minirospy.compat.rosparam import _rosparam_cmd_set_load as _rosparam_cmd_set_load
+from minirospy.ros.rosparam.rosparam import _fullusage as _fullusage
+from minirospy.ros.rosparam.rosparam import _rosparam_cmd_delete as _rosparam_cmd_delete
+from minirospy.ros.rosparam.rosparam import _rosparam_cmd_get_dump as _rosparam_cmd_get_dump
+from minirospy.ros.rosparam.rosparam import _rosparam_cmd_list as _rosparam_cmd_list
+from minirospy.ros.rosparam.rosparam import _rosparam_cmd_set_load as _rosparam_cmd_set_load

@@ -1,6 +1,6 @@
 """rospkg.common, provided by minirospy: file names, and the error of a name that is not found."""
 
-from minirospy.compat.rospkg.common import (
+from minirospy.ros.rospkg.rospkg.common import (
     MANIFEST_FILE,
     PACKAGE_FILE,
     ROS_STACK,

@@ -1,6 +1,6 @@
 """rospkg.environment, provided by minirospy: the names of variables, and what they are set to."""
 
-from minirospy.compat.rospkg.environment import (
+from minirospy.ros.rospkg.rospkg.environment import (
     ROS_ETC_DIR,
     ROS_HOME,
     ROS_LOG_DIR,

@@ -1,6 +1,6 @@
 """rospkg.manifest, provided by minirospy: a package.xml as rospkg shows it."""
 
-from minirospy.compat.rospkg.manifest import (
+from minirospy.ros.rospkg.rospkg.manifest import (
     Depend,
     Export,
     InvalidManifest,

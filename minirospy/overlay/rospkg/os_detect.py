@@ -1,6 +1,6 @@
 """rospkg.os_detect, provided by minirospy: which operating system this is."""
 
-from minirospy.compat.rospkg.os_detect import (
+from minirospy.ros.rospkg.rospkg.os_detect import (
     OS_ALMALINUX,
     OS_ALPINE,
     OS_AMAZON,

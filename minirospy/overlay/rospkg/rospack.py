@@ -1,6 +1,6 @@
 """rospkg.rospack, provided by minirospy."""
 
-from minirospy.compat.rospkg.rospack import (
+from minirospy.ros.rospkg.rospkg.rospack import (
     ManifestManager,
     RosPack,
     RosStack,

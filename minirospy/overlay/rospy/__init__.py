@@ -73,11 +73,11 @@ from minirospy.client import wait_for_service as wait_for_service
 from minirospy.client.lifecycle import ROSInterruptException as ROSInterruptException
 from minirospy.client.messages import Header as Header
 from minirospy.client.time import ROSTimeMovedBackwardsException as ROSTimeMovedBackwardsException
-from minirospy.compat.rospy import live as _live  # after the modules that it completes
-from minirospy.compat.rospy.core import get_ros_root as get_ros_root
-from minirospy.compat.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
-from minirospy.compat.rospy.msproxy import MasterProxy as MasterProxy
-from minirospy.compat.rospy.msproxy import get_master as get_master
+from minirospy.ros.rospy.rospy import live as _live  # after the modules that it completes
+from minirospy.ros.rospy.rospy.core import get_ros_root as get_ros_root
+from minirospy.ros.rospy.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
+from minirospy.ros.rospy.rospy.msproxy import MasterProxy as MasterProxy
+from minirospy.ros.rospy.rospy.msproxy import get_master as get_master
 from rospy import client as client
 from rospy import core as core
 from rospy import exceptions as exceptions

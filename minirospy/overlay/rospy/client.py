@@ -32,7 +32,7 @@ from minirospy.client import (
 )
 from minirospy.client.params import UNSPECIFIED as _unspecified
 from minirospy.client.params import Unspecified as _Unspecified  # programs hand it on as the default
-from minirospy.compat.rospy.msproxy import get_master
+from minirospy.ros.rospy.rospy.msproxy import get_master
 
 __all__ = [
     "DEBUG", "ERROR", "FATAL", "INFO", "WARN", "GetLoggers", "GetLoggersResponse", "Log", "Logger", "Service",

@@ -3,6 +3,9 @@
 import rosservice as rosservice
 
 import rospy as rospy
-from minirospy.compat.rospy.logger_level_service_caller import LoggerLevelServiceCaller, ROSConsoleException
+from minirospy.ros.rospy.rospy.logger_level_service_caller import (
+    LoggerLevelServiceCaller,
+    ROSConsoleException,
+)
 
 __all__ = ["LoggerLevelServiceCaller", "ROSConsoleException"]

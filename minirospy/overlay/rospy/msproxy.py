@@ -1,5 +1,5 @@
 """rospy.msproxy, provided by minirospy."""
 
-from minirospy.compat.rospy.msproxy import MasterProxy
+from minirospy.ros.rospy.rospy.msproxy import MasterProxy
 
 __all__ = ["MasterProxy"]

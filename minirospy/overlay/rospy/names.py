@@ -2,7 +2,7 @@
 
 from minirospy.base.errors import ROSException, ROSInitException
 from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
-from minirospy.compat.ros_names import (
+from minirospy.ros.ros_names import (
     GLOBALNS,
     REMAP,
     SEP,
@@ -16,7 +16,7 @@ from minirospy.compat.ros_names import (
     namespace,
     ns_join,
 )
-from minirospy.compat.rospy.names import (
+from minirospy.ros.rospy.rospy.names import (
     ANYTYPE,
     SERVICE_ANYTYPE,
     TOPIC_ANYTYPE,
@@ -32,9 +32,7 @@ from minirospy.compat.rospy.names import (
     valid_name_validator_resolved,
     valid_name_validator_unresolved,
 )
-from minirospy.compat.rospy.names import (
-    _set_caller_id as _set_caller_id,
-)
+from minirospy.ros.rospy.rospy.names import _set_caller_id as _set_caller_id
 
 __all__ = [
     "ANYTYPE", "GLOBALNS", "REMAP", "SEP", "SERVICE_ANYTYPE", "TOPIC_ANYTYPE", "ParameterInvalid", "ROSException",

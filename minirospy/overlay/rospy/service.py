@@ -3,10 +3,10 @@
 from minirospy.base.errors import ServiceException as ServiceException
 from minirospy.client.services import Service as Service
 from minirospy.client.services import ServiceProxy as ServiceProxy
-from minirospy.compat.rospy.core import service_logger as logger
-from minirospy.compat.rospy.impl.registration import ServiceManager as ServiceManager
-from minirospy.compat.rospy.passing import service_dir as __dir__
-from minirospy.compat.rospy.passing import service_getattr as __getattr__
+from minirospy.ros.rospy.rospy.core import service_logger as logger
+from minirospy.ros.rospy.rospy.impl.registration import ServiceManager as ServiceManager
+from minirospy.ros.rospy.rospy.passing import service_dir as __dir__
+from minirospy.ros.rospy.rospy.passing import service_getattr as __getattr__
 from rospy.impl.registration import Registration as Registration
 from rospy.impl.transport import BIDIRECTIONAL as BIDIRECTIONAL
 from rospy.impl.transport import INBOUND as INBOUND

@@ -1,5 +1,5 @@
 """rostest.rostest_main, provided by minirospy: the command."""
 
-from minirospy.compat.rostest import rostestmain
+from minirospy.ros.rostest.rostest import rostestmain
 
 __all__ = ["rostestmain"]

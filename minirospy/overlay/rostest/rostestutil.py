@@ -1,6 +1,6 @@
 """rostest.rostestutil, provided by minirospy: names, files and summaries of tests."""
 
-from minirospy.compat.rostest.rostestutil import (
+from minirospy.ros.rostest.rostest.rostestutil import (
     createXMLRunner,
     printlog,
     printlogerr,
@@ -8,9 +8,9 @@ from minirospy.compat.rostest.rostestutil import (
     printSummary,
     xmlResultsFile,
 )
-from minirospy.testing.junit import failure_junit_xml as test_failure_junit_xml
-from minirospy.testing.junit import success_junit_xml as test_success_junit_xml
-from minirospy.testing.unit import rostest_name_from_path
+from minirospy.ros.rostest.runner.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.ros.rostest.runner.junit import success_junit_xml as test_success_junit_xml
+from minirospy.ros.rostest.runner.unit import rostest_name_from_path
 
 __all__ = [
     "createXMLRunner",

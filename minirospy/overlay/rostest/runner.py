@@ -1,8 +1,8 @@
 """rostest.runner, provided by minirospy: the tests of a launch file as a class for unittest."""
 
-from minirospy.compat.rostest.rostest_parent import ROSTestLaunchParent
-from minirospy.compat.rostest.rostestutil import printlog, printlogerr, printRostestSummary
-from minirospy.compat.rostest.runner import (
+from minirospy.ros.rostest.rostest.rostest_parent import ROSTestLaunchParent
+from minirospy.ros.rostest.rostest.rostestutil import printlog, printlogerr, printRostestSummary
+from minirospy.ros.rostest.rostest.runner import (
     _DEFAULT_TEST_PORT,
     createUnitTest,
     failDuplicateRunner,

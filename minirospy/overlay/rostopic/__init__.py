@@ -2,7 +2,7 @@
 
 import rosgraph as rosgraph
 
-from minirospy.compat.rostopic import (
+from minirospy.ros.rostopic.rostopic import (
     NAME,
     ROSTopicException,
     ROSTopicIOException,
@@ -17,16 +17,16 @@ from minirospy.compat.rostopic import (
     publish_message,
     rostopicmain,
 )
-from minirospy.compat.rostopic import _check_master as _check_master
-from minirospy.compat.rostopic import _get_topic_type as _get_topic_type
-from minirospy.compat.rostopic import _master_get_topic_types as _master_get_topic_types
-from minirospy.compat.rostopic import _rostopic_echo as _rostopic_echo
-from minirospy.compat.rostopic import _rostopic_info as _rostopic_info
-from minirospy.compat.rostopic import _rostopic_list as _rostopic_list
-from minirospy.compat.rostopic import _rostopic_type as _rostopic_type
-from minirospy.compat.rostopic import _sleep as _sleep
-from minirospy.compat.rostopic.echo import CallbackEcho, create_field_filter, create_value_transform
-from minirospy.compat.rostopic.rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
+from minirospy.ros.rostopic.rostopic import _check_master as _check_master
+from minirospy.ros.rostopic.rostopic import _get_topic_type as _get_topic_type
+from minirospy.ros.rostopic.rostopic import _master_get_topic_types as _master_get_topic_types
+from minirospy.ros.rostopic.rostopic import _rostopic_echo as _rostopic_echo
+from minirospy.ros.rostopic.rostopic import _rostopic_info as _rostopic_info
+from minirospy.ros.rostopic.rostopic import _rostopic_list as _rostopic_list
+from minirospy.ros.rostopic.rostopic import _rostopic_type as _rostopic_type
+from minirospy.ros.rostopic.rostopic import _sleep as _sleep
+from minirospy.ros.rostopic.rostopic.echo import CallbackEcho, create_field_filter, create_value_transform
+from minirospy.ros.rostopic.rostopic.rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
 
 __all__ = [
     "NAME", "CallbackEcho", "ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicException", "ROSTopicHz",
@@ -34,14 +34,14 @@ __all__ = [
     "get_api", "get_info_text", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "publish_message",
     "rostopicmain",
 ]  # fmt: skip
-from minirospy.compat.rostopic import _fullusage as _fullusage
-from minirospy.compat.rostopic import _rostopic_cmd_bw as _rostopic_cmd_bw
-from minirospy.compat.rostopic import _rostopic_cmd_delay as _rostopic_cmd_delay
-from minirospy.compat.rostopic import _rostopic_cmd_echo as _rostopic_cmd_echo
-from minirospy.compat.rostopic import _rostopic_cmd_find as _rostopic_cmd_find
-from minirospy.compat.rostopic import _rostopic_cmd_hz as _rostopic_cmd_hz
-from minirospy.compat.rostopic import _rostopic_cmd_info as _rostopic_cmd_info
-from minirospy.compat.rostopic import _rostopic_cmd_list as _rostopic_cmd_list
-from minirospy.compat.rostopic import _rostopic_cmd_pub as _rostopic_cmd_pub
-from minirospy.compat.rostopic import _rostopic_cmd_type as _rostopic_cmd_type
-from minirospy.compat.rostopic import _rostopic_list_group_by_host as _rostopic_list_group_by_host
+from minirospy.ros.rostopic.rostopic import _fullusage as _fullusage
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_bw as _rostopic_cmd_bw
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_delay as _rostopic_cmd_delay
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_echo as _rostopic_cmd_echo
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_find as _rostopic_cmd_find
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_hz as _rostopic_cmd_hz
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_info as _rostopic_cmd_info
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_list as _rostopic_cmd_list
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_pub as _rostopic_cmd_pub
+from minirospy.ros.rostopic.rostopic import _rostopic_cmd_type as _rostopic_cmd_type
+from minirospy.ros.rostopic.rostopic import _rostopic_list_group_by_host as _rostopic_list_group_by_host

@@ -1,8 +1,6 @@
 """rosunit, provided by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
 
-from minirospy.compat.rosunit import __getattr__ as __getattr__
-from minirospy.compat.rosunit import __version__ as __version__
-from minirospy.testing.unit import (
+from minirospy.ros.rostest.runner.unit import (
     XML_OUTPUT_FLAG,
     create_xml_runner,
     print_runner_summary,
@@ -11,6 +9,8 @@ from minirospy.testing.unit import (
     unitrun,
     xml_results_file,
 )
+from minirospy.ros.rosunit.rosunit import __getattr__ as __getattr__
+from minirospy.ros.rosunit.rosunit import __version__ as __version__
 from rosunit import baretest as baretest
 from rosunit import core as core
 from rosunit import junitxml

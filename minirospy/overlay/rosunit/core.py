@@ -1,6 +1,6 @@
 """rosunit.core, provided by minirospy."""
 
-from minirospy.testing.unit import (
+from minirospy.ros.rostest.runner.unit import (
     XML_OUTPUT_FLAG,
     XMLTestRunner,
     create_xml_runner,

@@ -1,6 +1,6 @@
 """rosunit.junitxml, provided by minirospy: files of test results."""
 
-from minirospy.testing.junit import (
+from minirospy.ros.rostest.runner.junit import (
     Result,
     TestCaseResult,
     TestError,
@@ -11,8 +11,8 @@ from minirospy.testing.junit import (
     read,
     read_all,
 )
-from minirospy.testing.junit import failure_junit_xml as test_failure_junit_xml
-from minirospy.testing.junit import success_junit_xml as test_success_junit_xml
+from minirospy.ros.rostest.runner.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.ros.rostest.runner.junit import success_junit_xml as test_success_junit_xml
 
 __all__ = [
     "Result", "TestCaseResult", "TestError", "TestFailure", "TestInfo", "filter_nonprintable_text", "print_summary",

@@ -1,6 +1,6 @@
 """rosunit.pmon, provided by minirospy: processes that are watched, as roslaunch.pmon has them."""
 
-from minirospy.compat.roslaunch.pmon import (
+from minirospy.ros.roslaunch.roslaunch.pmon import (
     Process,
     ProcessListener,
     ProcessMonitor,

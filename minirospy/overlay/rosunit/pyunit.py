@@ -1,5 +1,10 @@
 """rosunit.pyunit, provided by minirospy."""
 
-from minirospy.testing.unit import XML_OUTPUT_FLAG, create_xml_runner, print_unittest_summary, unitrun
+from minirospy.ros.rostest.runner.unit import (
+    XML_OUTPUT_FLAG,
+    create_xml_runner,
+    print_unittest_summary,
+    unitrun,
+)
 
 __all__ = ["XML_OUTPUT_FLAG", "create_xml_runner", "print_unittest_summary", "unitrun"]

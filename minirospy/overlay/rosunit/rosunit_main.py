@@ -1,5 +1,5 @@
 """rosunit.rosunit_main, provided by minirospy: the command."""
 
-from minirospy.compat.rosunit import rosunitmain
+from minirospy.ros.rosunit.rosunit import rosunitmain
 
 __all__ = ["rosunitmain"]

@@ -1,5 +1,5 @@
 """rosunit.xmlrunner, provided by minirospy."""
 
-from minirospy.testing.unit import XMLTestRunner
+from minirospy.ros.rostest.runner.unit import XMLTestRunner
 
 __all__ = ["XMLTestRunner"]

@@ -1,3 +1,3 @@
 """roswtf.context, which is not here: the import raises ImportError with what to use."""
 
-from minirospy.compat.elsewhere import roswtf_context as context
+from minirospy.ros.elsewhere import roswtf_context as context

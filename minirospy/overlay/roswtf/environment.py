@@ -1,10 +1,6 @@
 """roswtf.environment, provided by minirospy: checks of paths and addresses."""
 
-from minirospy.compat.roswtf.environment import (
-    invalid_url,
-    is_executable,
-    paths,
-)
+from minirospy.ros.roswtf.roswtf.environment import invalid_url, is_executable, paths
 
 __all__ = [
     "invalid_url",

@@ -1,9 +1,6 @@
 """roswtf.model, provided by minirospy: what a check found."""
 
-from minirospy.compat.roswtf.model import (
-    WtfError,
-    WtfWarning,
-)
+from minirospy.ros.roswtf.roswtf.model import WtfError, WtfWarning
 
 __all__ = [
     "WtfError",

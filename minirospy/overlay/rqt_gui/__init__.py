@@ -1,3 +1,3 @@
 """rqt_gui, which is not here: the import raises ImportError with what to do."""
 
-from minirospy.compat.elsewhere import rqt_gui as rqt_gui
+from minirospy.ros.elsewhere import rqt_gui as rqt_gui

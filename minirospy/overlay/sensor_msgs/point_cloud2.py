@@ -1,6 +1,6 @@
 """sensor_msgs.point_cloud2, provided by minirospy: the points of clouds. Source: http://wiki.ros.org/sensor_msgs."""
 
-from minirospy.compat.sensor_msgs.point_cloud2 import (
+from minirospy.ros.sensor_msgs.sensor_msgs.point_cloud2 import (
     _DATATYPES,
     _get_struct_fmt,
     create_cloud,

@@ -1,21 +1,21 @@
 """smach, provided by minirospy: hierarchical state machines. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.concurrence import Concurrence
-from minirospy.compat.smach.container import Container
-from minirospy.compat.smach.exceptions import (
+from minirospy.ros.smach.smach.concurrence import Concurrence
+from minirospy.ros.smach.smach.container import Container
+from minirospy.ros.smach.smach.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
     InvalidUserCodeError,
     SmachError,
 )
-from minirospy.compat.smach.iterator import Iterator
-from minirospy.compat.smach.log import logdebug, logerr, loginfo, logwarn, set_loggers
-from minirospy.compat.smach.sequence import Sequence
-from minirospy.compat.smach.state import CBState, State
-from minirospy.compat.smach.state_machine import StateMachine
-from minirospy.compat.smach.user_data import Remapper, UserData
-from minirospy.compat.smach.util import (
+from minirospy.ros.smach.smach.iterator import Iterator
+from minirospy.ros.smach.smach.log import logdebug, logerr, loginfo, logwarn, set_loggers
+from minirospy.ros.smach.smach.sequence import Sequence
+from minirospy.ros.smach.smach.state import CBState, State
+from minirospy.ros.smach.smach.state_machine import StateMachine
+from minirospy.ros.smach.smach.user_data import Remapper, UserData
+from minirospy.ros.smach.smach.util import (
     CBInterface,
     cb_interface,
     has_smach_interface,

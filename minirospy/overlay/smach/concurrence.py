@@ -1,8 +1,6 @@
 """smach.concurrence, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.concurrence import (
-    Concurrence,
-)
+from minirospy.ros.smach.smach.concurrence import Concurrence
 
 __all__ = [
     "Concurrence",

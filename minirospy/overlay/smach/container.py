@@ -1,8 +1,6 @@
 """smach.container, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.container import (
-    Container,
-)
+from minirospy.ros.smach.smach.container import Container
 
 __all__ = [
     "Container",

@@ -1,6 +1,6 @@
 """smach.exceptions, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.exceptions import (
+from minirospy.ros.smach.smach.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,

@@ -1,12 +1,6 @@
 """smach.log, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.log import (
-    logdebug,
-    logerr,
-    loginfo,
-    logwarn,
-    set_loggers,
-)
+from minirospy.ros.smach.smach.log import logdebug, logerr, loginfo, logwarn, set_loggers
 
 __all__ = [
     "logdebug",

@@ -1,9 +1,6 @@
 """smach.state, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.state import (
-    CBState,
-    State,
-)
+from minirospy.ros.smach.smach.state import CBState, State
 
 __all__ = [
     "CBState",

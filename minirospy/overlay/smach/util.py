@@ -1,6 +1,6 @@
 """smach.util, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach.util import (
+from minirospy.ros.smach.smach.util import (
     CBInterface,
     cb_interface,
     has_smach_interface,

@@ -1,8 +1,6 @@
 """smach_ros.action_server_wrapper, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach_ros.action_server_wrapper import (
-    ActionServerWrapper,
-)
+from minirospy.ros.smach_ros.smach_ros.action_server_wrapper import ActionServerWrapper
 
 __all__ = [
     "ActionServerWrapper",

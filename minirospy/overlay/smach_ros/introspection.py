@@ -1,6 +1,6 @@
 """smach_ros.introspection, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach_ros.introspection import (
+from minirospy.ros.smach_ros.smach_ros.introspection import (
     INIT_TOPIC,
     STATUS_TOPIC,
     STRUCTURE_TOPIC,

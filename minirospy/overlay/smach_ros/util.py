@@ -1,8 +1,6 @@
 """smach_ros.util, provided by minirospy. Source: http://wiki.ros.org/smach."""
 
-from minirospy.compat.smach_ros.util import (
-    set_preempt_handler,
-)
+from minirospy.ros.smach_ros.smach_ros.util import set_preempt_handler
 
 __all__ = [
     "set_preempt_handler",

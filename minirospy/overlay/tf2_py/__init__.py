@@ -6,4 +6,4 @@ from minirospy.base.errors import InvalidArgumentException as InvalidArgumentExc
 from minirospy.base.errors import LookupException as LookupException
 from minirospy.base.errors import TimeoutException as TimeoutException
 from minirospy.base.errors import TransformException as TransformException
-from minirospy.frames.core import BufferCore as BufferCore
+from minirospy.ros.tf2_ros.tf2_ros.core import BufferCore as BufferCore

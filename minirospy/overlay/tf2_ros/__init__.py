@@ -15,21 +15,25 @@ from minirospy.base.errors import InvalidArgumentException as InvalidArgumentExc
 from minirospy.base.errors import LookupException as LookupException
 from minirospy.base.errors import TimeoutException as TimeoutException
 from minirospy.base.errors import TransformException as TransformException
-from minirospy.frames.broadcasters import StaticTransformBroadcaster as StaticTransformBroadcaster
-from minirospy.frames.broadcasters import TransformBroadcaster as TransformBroadcaster
-from minirospy.frames.buffer import DEFAULT_CAN_TRANSFORM_POLLING_SCALE as DEFAULT_CAN_TRANSFORM_POLLING_SCALE
-from minirospy.frames.buffer import Buffer as Buffer
-from minirospy.frames.client import BufferClient as BufferClient
-from minirospy.frames.core import BufferCore as BufferCore
-from minirospy.frames.interface import BufferInterface as BufferInterface
-from minirospy.frames.interface import ConvertRegistration as ConvertRegistration
-from minirospy.frames.interface import NotImplementedException as NotImplementedException
-from minirospy.frames.interface import Stamped as Stamped
-from minirospy.frames.interface import TransformRegistration as TransformRegistration
-from minirospy.frames.interface import TypeException as TypeException
-from minirospy.frames.interface import convert as convert
-from minirospy.frames.listener import TransformListener as TransformListener
-from minirospy.frames.server import BufferServer as BufferServer
+from minirospy.ros.tf2_ros.tf2_ros.broadcasters import (
+    StaticTransformBroadcaster as StaticTransformBroadcaster,
+)
+from minirospy.ros.tf2_ros.tf2_ros.broadcasters import TransformBroadcaster as TransformBroadcaster
+from minirospy.ros.tf2_ros.tf2_ros.buffer import (
+    DEFAULT_CAN_TRANSFORM_POLLING_SCALE as DEFAULT_CAN_TRANSFORM_POLLING_SCALE,
+)
+from minirospy.ros.tf2_ros.tf2_ros.buffer import Buffer as Buffer
+from minirospy.ros.tf2_ros.tf2_ros.client import BufferClient as BufferClient
+from minirospy.ros.tf2_ros.tf2_ros.core import BufferCore as BufferCore
+from minirospy.ros.tf2_ros.tf2_ros.interface import BufferInterface as BufferInterface
+from minirospy.ros.tf2_ros.tf2_ros.interface import ConvertRegistration as ConvertRegistration
+from minirospy.ros.tf2_ros.tf2_ros.interface import NotImplementedException as NotImplementedException
+from minirospy.ros.tf2_ros.tf2_ros.interface import Stamped as Stamped
+from minirospy.ros.tf2_ros.tf2_ros.interface import TransformRegistration as TransformRegistration
+from minirospy.ros.tf2_ros.tf2_ros.interface import TypeException as TypeException
+from minirospy.ros.tf2_ros.tf2_ros.interface import convert as convert
+from minirospy.ros.tf2_ros.tf2_ros.listener import TransformListener as TransformListener
+from minirospy.ros.tf2_ros.tf2_ros.server import BufferServer as BufferServer
 from tf2_ros import buffer as buffer
 from tf2_ros import buffer_client as buffer_client
 from tf2_ros import buffer_interface as buffer_interface

@@ -3,5 +3,7 @@
 from tf2_msgs.srv import FrameGraph as FrameGraph
 from tf2_msgs.srv import FrameGraphResponse as FrameGraphResponse
 
-from minirospy.frames.buffer import DEFAULT_CAN_TRANSFORM_POLLING_SCALE as DEFAULT_CAN_TRANSFORM_POLLING_SCALE
-from minirospy.frames.buffer import Buffer as Buffer
+from minirospy.ros.tf2_ros.tf2_ros.buffer import (
+    DEFAULT_CAN_TRANSFORM_POLLING_SCALE as DEFAULT_CAN_TRANSFORM_POLLING_SCALE,
+)
+from minirospy.ros.tf2_ros.tf2_ros.buffer import Buffer as Buffer

@@ -4,4 +4,4 @@ from actionlib_msgs.msg import GoalStatus as GoalStatus
 from tf2_msgs.msg import LookupTransformAction as LookupTransformAction
 from tf2_msgs.msg import LookupTransformGoal as LookupTransformGoal
 
-from minirospy.frames.client import BufferClient as BufferClient
+from minirospy.ros.tf2_ros.tf2_ros.client import BufferClient as BufferClient

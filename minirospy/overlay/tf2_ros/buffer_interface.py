@@ -2,10 +2,10 @@
 
 from std_msgs.msg import Header as Header
 
-from minirospy.frames.interface import BufferInterface as BufferInterface
-from minirospy.frames.interface import ConvertRegistration as ConvertRegistration
-from minirospy.frames.interface import NotImplementedException as NotImplementedException
-from minirospy.frames.interface import Stamped as Stamped
-from minirospy.frames.interface import TransformRegistration as TransformRegistration
-from minirospy.frames.interface import TypeException as TypeException
-from minirospy.frames.interface import convert as convert
+from minirospy.ros.tf2_ros.tf2_ros.interface import BufferInterface as BufferInterface
+from minirospy.ros.tf2_ros.tf2_ros.interface import ConvertRegistration as ConvertRegistration
+from minirospy.ros.tf2_ros.tf2_ros.interface import NotImplementedException as NotImplementedException
+from minirospy.ros.tf2_ros.tf2_ros.interface import Stamped as Stamped
+from minirospy.ros.tf2_ros.tf2_ros.interface import TransformRegistration as TransformRegistration
+from minirospy.ros.tf2_ros.tf2_ros.interface import TypeException as TypeException
+from minirospy.ros.tf2_ros.tf2_ros.interface import convert as convert

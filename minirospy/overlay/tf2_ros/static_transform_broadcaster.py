@@ -3,4 +3,6 @@
 from geometry_msgs.msg import TransformStamped as TransformStamped
 from tf2_msgs.msg import TFMessage as TFMessage
 
-from minirospy.frames.broadcasters import StaticTransformBroadcaster as StaticTransformBroadcaster
+from minirospy.ros.tf2_ros.tf2_ros.broadcasters import (
+    StaticTransformBroadcaster as StaticTransformBroadcaster,
+)

@@ -3,4 +3,4 @@
 from geometry_msgs.msg import TransformStamped as TransformStamped
 from tf2_msgs.msg import TFMessage as TFMessage
 
-from minirospy.frames.broadcasters import TransformBroadcaster as TransformBroadcaster
+from minirospy.ros.tf2_ros.tf2_ros.broadcasters import TransformBroadcaster as TransformBroadcaster

@@ -2,4 +2,4 @@
 
 from tf2_msgs.msg import TFMessage as TFMessage
 
-from minirospy.frames.listener import TransformListener as TransformListener
+from minirospy.ros.tf2_ros.tf2_ros.listener import TransformListener as TransformListener

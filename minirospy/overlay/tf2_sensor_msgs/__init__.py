@@ -2,8 +2,10 @@
 
 from sensor_msgs.msg import PointCloud2 as PointCloud2
 
-from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import do_transform_cloud as do_transform_cloud
-from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import from_msg_msg as from_msg_msg
-from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import to_msg_msg as to_msg_msg
-from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import transform_to_kdl as transform_to_kdl
+from minirospy.ros.tf2_sensor_msgs.tf2_sensor_msgs.tf2_sensor_msgs import (
+    do_transform_cloud as do_transform_cloud,
+)
+from minirospy.ros.tf2_sensor_msgs.tf2_sensor_msgs.tf2_sensor_msgs import from_msg_msg as from_msg_msg
+from minirospy.ros.tf2_sensor_msgs.tf2_sensor_msgs.tf2_sensor_msgs import to_msg_msg as to_msg_msg
+from minirospy.ros.tf2_sensor_msgs.tf2_sensor_msgs.tf2_sensor_msgs import transform_to_kdl as transform_to_kdl
 from tf2_sensor_msgs import tf2_sensor_msgs as tf2_sensor_msgs

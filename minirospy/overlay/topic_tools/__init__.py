@@ -1,5 +1,5 @@
 """topic_tools, provided by minirospy: lazy nodes; its services. Source: http://wiki.ros.org/topic_tools."""
 
-from minirospy.compat.topic_tools import LazyTransport, MetaLazyTransport
+from minirospy.ros.topic_tools.topic_tools import LazyTransport, MetaLazyTransport
 
 __all__ = ["LazyTransport", "MetaLazyTransport"]

@@ -15,10 +15,10 @@ from minirospy.core.bag.base import StoredMessage
 from minirospy.core.bag.records import Connection
 from minirospy.core.bag.timeline import Timeline
 from minirospy.core.wire.tcpros import InterfaceType
-from minirospy.recording.player import Player, PlayerState
-from minirospy.recording.schedule import PlayOptions
-from minirospy.recording.sources import Bags, open_reader
-from minirospy.recording.stage import CLOCK, Controls
+from minirospy.ros.rosbag.recording.player import Player, PlayerState
+from minirospy.ros.rosbag.recording.schedule import PlayOptions
+from minirospy.ros.rosbag.recording.sources import Bags, open_reader
+from minirospy.ros.rosbag.recording.stage import CLOCK, Controls
 
 if TYPE_CHECKING:
     from minirospy.web.graph import Publication, SharedGraph

@@ -2,7 +2,8 @@
 
 A client sends ``{"op": NAME, ...}``: set {positions: {joint: number}}, center, randomize, publish {on}, reload. The server sends
 ``{"writes"}``, ``{"joints": {"robot", "rows", "rate", ...} or null, "why"}``, ``{"state": {"positions", "publishing",
-"others"}}`` and ``{"error"}``. All clients set the same joints. Parameters and zeros: see minirospy/robots/joint_parameters.py.
+"others"}}`` and ``{"error"}``. All clients set the same joints. Parameters and zeros: see
+minirospy/ros/robot_state_publisher/joint_parameters.py.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from minirospy.aio.tasks import Faults, keep_running
 from minirospy.base.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.core.urdf.elements import parse_xml
 from minirospy.introspect.graph import why_illegal
-from minirospy.robots.joint_parameters import NAMES, JointParameters, read_parameters
-from minirospy.robots.joints import FreeJoint, JointError, JointStates, read_joints
+from minirospy.ros.robot_state_publisher.joint_parameters import NAMES, JointParameters, read_parameters
+from minirospy.ros.robot_state_publisher.joints import FreeJoint, JointError, JointStates, read_joints
 from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, UsageError
-from minirospy.launch.arg_docs import resolved_arg_docs
+from minirospy.ros.roslaunch.launcher.arg_docs import resolved_arg_docs
 from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession
 from minirospy.web.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.web.dashboard.launch_run import LaunchRun
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SUBPROTOCOL", "LaunchDoor", "LaunchSession"]
 
-SUBPROTOCOL = "minirospy.launch.v1"
+SUBPROTOCOL = "minirospy.ros.roslaunch.launcher.v1"
 
 _LOG_SECONDS = 0.2
 """A file that grows reports nothing: it is looked at so often while a page shows it."""

@@ -12,12 +12,12 @@ from typing import ClassVar, NamedTuple
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, UsageError
-from minirospy.launch.load import LaunchSource, load_sources
-from minirospy.launch.options import RunOptions
-from minirospy.launch.output import Output
-from minirospy.launch.process import Process
-from minirospy.launch.runner import Launcher
-from minirospy.launch.spec import LaunchSpec, NodeSpec
+from minirospy.ros.roslaunch.launcher.load import LaunchSource, load_sources
+from minirospy.ros.roslaunch.launcher.options import RunOptions
+from minirospy.ros.roslaunch.launcher.output import Output
+from minirospy.ros.roslaunch.launcher.process import Process
+from minirospy.ros.roslaunch.launcher.runner import Launcher
+from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
 from minirospy.workspace.packages import Packages
 
 __all__ = ["LaunchRun", "NodeState", "RunState"]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import minirospy
 from minirospy.base.errors import UsageError
 from minirospy.base.names import is_legal_name
-from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
+from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts, end_processes, start_process
 
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 

@@ -16,12 +16,12 @@ from tf2_web_republisher.msg import (
 )
 from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
-from minirospy.actionlib.aio import ActionServer, GoalError, ServerGoal
 from minirospy.aio.node import Node
 from minirospy.aio.tasks import Faults
 from minirospy.aio.topics import Publisher
 from minirospy.base.errors import BridgeError, ServiceException, TransformException
-from minirospy.frames.aio import Buffer
+from minirospy.ros.actionlib.actionlib.aio import ActionServer, GoalError, ServerGoal
+from minirospy.ros.tf2_ros.tf2_ros.aio import Buffer
 from minirospy.web.tf_republisher.pairs import FramePair, pairs_of
 
 __all__ = ["NAME", "Republisher"]

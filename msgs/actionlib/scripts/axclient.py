@@ -3,7 +3,7 @@
 
 import sys
 
-from minirospy.cli.ros.axclient import main
+from minirospy.ros.actionlib.commands.axclient import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.compat.sound_play.programs import is_speaking
+from minirospy.ros.sound_play.sound_play.programs import is_speaking
 
 sys.exit(is_speaking())

@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.compat.sound_play.programs import play
+from minirospy.ros.sound_play.sound_play.programs import play
 
 sys.exit(play())

@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.compat.sound_play.programs import playbuiltin
+from minirospy.ros.sound_play.sound_play.programs import playbuiltin
 
 sys.exit(playbuiltin())

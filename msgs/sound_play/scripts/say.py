@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.compat.sound_play.programs import say
+from minirospy.ros.sound_play.sound_play.programs import say
 
 sys.exit(say())

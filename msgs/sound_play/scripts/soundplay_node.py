@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.compat.sound_play.node import main
+from minirospy.ros.sound_play.sound_play.node import main
 
 sys.exit(main())

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from minirospy.core.bag.timeline import Timeline
-from minirospy.recording.sources import open_reader
+from minirospy.ros.rosbag.recording.sources import open_reader
 from tests.web.dashboard.bags import SECOND, START, make_bag, text_body
 
 

@@ -21,8 +21,8 @@ from websockets.typing import Subprotocol
 
 from minirospy.base.errors import BagFormatError
 from minirospy.core.bag.timeline import Timeline
-from minirospy.launch.process import Process, Timeouts, start_process
-from minirospy.recording.sources import Bags
+from minirospy.ros.rosbag.recording.sources import Bags
+from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, start_process
 from minirospy.web.access import Access
 from minirospy.web.dashboard import bag_door, recording
 from minirospy.web.dashboard.bag_door import SUBPROTOCOL, BagSession
@@ -151,7 +151,7 @@ def test_mcap_is_shown_like_a_bag(client: Callable[..., Client], folder: Path, k
     path = make_bag(folder / "a.bag", 3)
     if kind == ".mcap":
         pytest.importorskip("mcap")
-        from minirospy.cli.ros.rosbag import main
+        from minirospy.ros.rosbag.commands.rosbag import main
 
         assert main(["convert", str(path), str(folder / "b.mcap")]) == 0
     page = client()

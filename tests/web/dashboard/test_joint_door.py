@@ -18,7 +18,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.base.name_filter import NameFilter
 from minirospy.introspect.snapshot import fetch
-from minirospy.robots.joints import read_joints
+from minirospy.ros.robot_state_publisher.joints import read_joints
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.web.access import Access
 from minirospy.web.dashboard.joint_door import SUBPROTOCOL, JointDoor

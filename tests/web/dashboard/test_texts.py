@@ -6,7 +6,7 @@ import ast
 import inspect
 import re
 
-from minirospy.robots import joint_parameters
+from minirospy.ros.robot_state_publisher import joint_parameters
 from minirospy.web.dashboard.files import FOLDER
 
 JS = FOLDER / "js"

@@ -1,5 +1,6 @@
 """RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
 
+from minirospy.board import rpi as _rpi  # warns where a Raspberry Pi lacks its library
 from minirospy.board.rpigpio import BCM as BCM
 from minirospy.board.rpigpio import BOARD as BOARD
 from minirospy.board.rpigpio import BOTH as BOTH
@@ -35,4 +36,3 @@ from minirospy.board.rpigpio import setmode as setmode
 from minirospy.board.rpigpio import setup as setup
 from minirospy.board.rpigpio import setwarnings as setwarnings
 from minirospy.board.rpigpio import wait_for_edge as wait_for_edge
-from minirospy.compat import rpi as _rpi  # warns where a Raspberry Pi lacks its library

@@ -1,6 +1,6 @@
 """rosgraph.impl.graph, provided by minirospy: the graph as edges between nodes and topics."""
 
-from minirospy.compat.rosgraph.impl.graph import (
+from minirospy.ros.rosgraph.rosgraph.impl.graph import (
     BadNode,
     Edge,
     EdgeList,

@@ -1,3 +1,3 @@
 """rospy.impl, provided by minirospy."""
 
-from minirospy.compat.rospy.impl import __getattr__ as __getattr__
+from minirospy.ros.rospy.rospy.impl import __getattr__ as __getattr__

@@ -1,5 +1,5 @@
 """rospy.impl.simtime, provided by minirospy."""
 
-from minirospy.compat.rospy.impl.simtime import init_simtime
+from minirospy.ros.rospy.rospy.impl.simtime import init_simtime
 
 __all__ = ["init_simtime"]

@@ -1,5 +1,5 @@
 """rospy.impl.validators, provided by minirospy."""
 
-from minirospy.compat.rospy.names import ParameterInvalid
+from minirospy.ros.rospy.rospy.names import ParameterInvalid
 
 __all__ = ["ParameterInvalid"]

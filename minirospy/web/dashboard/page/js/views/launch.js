@@ -4,7 +4,7 @@ import { fill, h, refill, setText } from "../dom.js";
 import { Door } from "../door.js";
 import { t } from "../texts.js";
 
-const PROTOCOL = "minirospy.launch.v1";
+const PROTOCOL = "minirospy.ros.roslaunch.launcher.v1";
 const MOST_LOG = 400_000; // characters
 const GOOD = "d0";
 const LEVELS = { "running": GOOD, "starting": "d1", "ending": "d1", "stopping": "d1", "stopped": "d3", "ended": "d3", "failed": "d2" };

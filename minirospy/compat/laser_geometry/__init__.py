@@ -1,5 +1,0 @@
-"""laser_geometry: clouds of points from laser scans. Source: http://wiki.ros.org/laser_geometry."""
-
-from minirospy.compat.laser_geometry.laser_geometry import LaserProjection
-
-__all__ = ["LaserProjection"]

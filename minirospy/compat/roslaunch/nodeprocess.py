@@ -1,7 +1,0 @@
-"""roslaunch.nodeprocess."""
-
-from minirospy.launch.process import Timeouts
-
-__all__ = ["DEFAULT_TIMEOUT_SIGINT", "DEFAULT_TIMEOUT_SIGTERM"]
-
-DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM = Timeouts.interrupt, Timeouts.terminate

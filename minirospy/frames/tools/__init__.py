@@ -1,6 +1,0 @@
-"""The programs of tf, tf2_ros and tf2_tools, on the buffer and the public node API.
-
-Each has a ``main(words)``: the words behind the program's name, remappings taken out, in; an exit status out. Texts,
-usage errors and statuses are those of ROS's programs. Source: http://wiki.ros.org/tf/Debugging%20tools,
-http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2_tools.
-"""

@@ -1,0 +1,50 @@
+"""Actions: goals that take a while, with feedback on the way, a result at the end, and a way to stop them.
+
+The way of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
+`internal_goal_callback` -> simple_server, the user's function -> handle `set_succeeded` -> topic result ==>
+machine `update_result` -> simple_client `_handle_transition`, the user's function. Which state follows which
+is in `minirospy.core.graph.goals`. What `import actionlib` re-exports. Source: http://wiki.ros.org/actionlib.
+"""
+
+from __future__ import annotations
+
+from minirospy.ros.actionlib.actionlib.client import ActionClient
+from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
+from minirospy.ros.actionlib.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
+from minirospy.ros.actionlib.actionlib.machine import ClientGoalHandle, CommStateMachine, GoalManager
+from minirospy.ros.actionlib.actionlib.server import ActionServer, nop_cb
+from minirospy.ros.actionlib.actionlib.simple_client import SimpleActionClient
+from minirospy.ros.actionlib.actionlib.simple_server import SimpleActionServer
+from minirospy.ros.actionlib.actionlib.spec import ActionException
+from minirospy.ros.actionlib.actionlib.states import (
+    INVALID_TRANSITION,
+    NO_TRANSITION,
+    CommState,
+    SimpleGoalState,
+    TerminalState,
+    g_goal_id,
+    get_name_of_constant,
+)
+
+__all__ = [
+    "INVALID_TRANSITION",
+    "NO_TRANSITION",
+    "ActionClient",
+    "ActionException",
+    "ActionServer",
+    "ClientGoalHandle",
+    "CommState",
+    "CommStateMachine",
+    "GoalIDGenerator",
+    "GoalManager",
+    "HandleTrackerDeleter",
+    "ServerGoalHandle",
+    "SimpleActionClient",
+    "SimpleActionServer",
+    "SimpleGoalState",
+    "StatusTracker",
+    "TerminalState",
+    "g_goal_id",
+    "get_name_of_constant",
+    "nop_cb",
+]

@@ -1,0 +1,231 @@
+"""ActionClient of asyncio programs, and the goals that it sends."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Generator
+from typing import Generic, TypeVar, cast
+
+from actionlib_msgs.msg import GoalID, GoalStatus
+
+from minirospy import Node
+from minirospy.aio import Publisher, Subscription
+from minirospy.base.errors import ROSException, ROSInterruptException
+from minirospy.core.graph.goals import TERMINAL, GoalState
+from minirospy.core.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.ros.actionlib.actionlib.aio.common import WAITING, ActionClass, ActionEnd, GoalError
+from minirospy.ros.actionlib.actionlib.spec import TAKES_FAST_ANSWERS
+from minirospy.ros.actionlib.actionlib.statuses import StatusList, find_status
+
+__all__ = ["ActionClient", "ClientGoal"]
+
+_G = TypeVar("_G")
+_R = TypeVar("_R")
+_F = TypeVar("_F")
+_M = TypeVar("_M", bound=Message)
+
+
+class ClientGoal(Generic[_R, _F]):
+    """A goal on its way; made by :meth:`ActionClient.send`.
+
+    ``async for`` over it gives the feedback until the goal has ended. ``await goal`` gives its result; it raises
+    GoalError where the goal was not reached, ROSInterruptException where the client or node ended before.
+    ``async with goal:`` cancels it where the block is left before its end.
+    """
+
+    def __init__(self, id: str, cancel: Callable[[ClientGoal[_R, _F]], None]) -> None:
+        self.id = id
+        self.state = GoalState.PENDING
+        """The last status that the server published."""
+        self.text = ""
+        """The server's text on that."""
+        self._cancel = cancel
+        self._feedback: deque[_F] = deque(maxlen=WAITING)
+        self._news = asyncio.Event()
+        self._is_sent = False
+        self._is_known = False
+        self._ended: asyncio.Future[_R | None] = asyncio.get_running_loop().create_future()
+
+    @property
+    def done(self) -> bool:
+        """Return whether the goal has ended."""
+        return self._ended.done()
+
+    def cancel(self) -> None:
+        """Ask the server to cancel the goal; how it ends is up to the server. Of no effect once it has ended."""
+        if not self.done:
+            self._cancel(self)
+
+    def __await__(self) -> Generator[object, None, _R]:
+        return self._result().__await__()
+
+    def __aiter__(self) -> AsyncIterator[_F]:
+        return self
+
+    async def __anext__(self) -> _F:
+        while not self._feedback:
+            if self.done:
+                raise StopAsyncIteration
+            self._news.clear()
+            await self._news.wait()
+        return self._feedback.popleft()
+
+    async def __aenter__(self) -> ClientGoal[_R, _F]:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.cancel()
+
+    async def _result(self) -> _R:
+        result = await asyncio.shield(self._ended)
+        if self.state is not GoalState.SUCCEEDED:
+            raise GoalError(self.text, result, self.state)
+        assert result is not None
+        return result
+
+    def _take_feedback(self, feedback: _F) -> None:
+        self._feedback.append(feedback)
+        self._news.set()
+
+    def _take_status(self, status: GoalStatus | None) -> None:
+        """Take the server's list, which names the goal or does not."""
+        if status is not None:
+            self._is_known = True
+            self.state, self.text = GoalState(status.status), status.text
+        elif self._is_known and self.state not in TERMINAL:
+            # The server has forgotten it: it was started again.
+            self._end(GoalState.LOST, "the server does not know the goal any more", None)
+
+    def _end(self, state: GoalState, text: str, result: _R | None) -> None:
+        if not self.done:
+            self.state, self.text = state, text
+            self._ended.set_result(result)
+            self._news.set()
+
+    def _interrupt(self) -> None:
+        if not self.done:
+            self._ended.set_exception(ROSInterruptException("rospy shutdown"))
+            # Whoever awaits the goal gets it; nobody has to.
+            self._ended.exception()
+            self._news.set()
+
+
+class ActionClient(ActionEnd, Generic[_G, _R, _F]):
+    """A client of the action ``name`` of the class ``action``, such as ``runningLedAction``.
+
+    ``async with`` it, or ``await client.close()`` in the end. Raises ActionException on a class that is not an action.
+    """
+
+    _numbers = itertools.count(1)
+
+    def __init__(self, node: Node, name: str, action: type[ActionClass[_G, _R, _F]]) -> None:
+        super().__init__(node, name, action)
+        types = self._types
+        self._goals: dict[str, ClientGoal[_R, _F]] = {}
+        self._goal: Publisher[ActionGoal] = node.advertise(
+            self._topic("goal"), types.action_goal, tcp_nodelay=True, headers=TAKES_FAST_ANSWERS
+        )
+        self._cancel: Publisher[GoalID] = node.advertise(self._topic("cancel"), GoalID, tcp_nodelay=True)
+        self._status = node.subscribe(self._topic("status"), StatusList, queue_size=WAITING)
+        self._result = node.subscribe(self._topic("result"), types.action_result, queue_size=WAITING)
+        self._feedback = node.subscribe(self._topic("feedback"), types.action_feedback, queue_size=WAITING)
+        self._heard = asyncio.Event()
+        self._start(self._read(self._status, self._take_status))
+        self._start(self._read(self._result, self._take_result))
+        self._start(self._read(self._feedback, self._take_feedback))
+        self._registration = asyncio.ensure_future(self._register())
+
+    async def wait_for_server(self, timeout: float | None = None) -> None:
+        """Wait until a server is connected by all five topics. Raise TimeoutError after ``timeout`` seconds."""
+        try:
+            await asyncio.wait_for(self._wait_for_server(), timeout)
+        except asyncio.TimeoutError:
+            raise TimeoutError(f"timeout exceeded while waiting for the action server {self.name}") from None
+
+    def send(self, goal: _G) -> ClientGoal[_R, _F]:
+        """Send a goal, as soon as a server is connected. Raise ROSException once the client is closed."""
+        if self._is_closed or self._node.is_shutdown:
+            raise ROSException(f"send() of a closed action client of {self.name}")
+        now = self._node.now()
+        id = f"{self._node.name}-{next(self._numbers)}-{now.secs}.{now.nsecs}"
+        message = self._types.action_goal(goal_id=GoalID(stamp=now, id=id), goal=goal)
+        message.header.stamp = now
+        sent: ClientGoal[_R, _F] = ClientGoal(id, self._cancel_goal)
+        self._goals[id] = sent
+        self._start(self._send(message, sent))
+        return sent
+
+    def cancel_all(self) -> None:
+        """Ask the server to cancel all its goals, other clients' too."""
+        self._start(self._cancel.publish(GoalID()))
+
+    async def close(self) -> None:
+        """Leave the action's topics; goals go on, without any further notification. Idempotent."""
+        self._is_closed = True
+        for goal in list(self._goals.values()):
+            goal._interrupt()
+        self._goals.clear()
+        await self._end_tasks()
+        for end in (self._goal, self._cancel, self._status, self._result, self._feedback):
+            await end.close()
+
+    async def _register(self) -> None:
+        for end in (self._goal, self._cancel, self._status, self._result, self._feedback):
+            await end
+
+    async def _wait_for_server(self) -> None:
+        await self
+        await self._heard.wait()
+        for publisher in (self._goal, self._cancel):
+            await publisher.wait_for_subscribers()
+        for subscription in (self._result, self._feedback):
+            await subscription.wait_for_publishers()
+
+    async def _send(self, message: ActionGoal, goal: ClientGoal[_R, _F]) -> None:
+        await self._wait_for_server()
+        if not goal.done:
+            goal._is_sent = True
+            await self._goal.publish(message)
+
+    def _cancel_goal(self, goal: ClientGoal[_R, _F]) -> None:
+        if not self._is_closed:
+            self._start(self._send_cancel(goal))
+
+    async def _send_cancel(self, goal: ClientGoal[_R, _F]) -> None:
+        # Who only looks at the goals, as `rostopic echo`, is connected, too.
+        if goal._is_sent and self._goal.num_connections:
+            await self._cancel.publish(GoalID(id=goal.id))
+        else:
+            self._end_goal(goal, GoalState.RECALLED, "cancelled before a server was there", None)
+
+    async def _read(self, subscription: Subscription[_M], take: Callable[[_M], None]) -> None:
+        async for message in subscription:
+            take(message)
+        for goal in list(self._goals.values()):
+            goal._interrupt()
+
+    def _take_status(self, statuses: StatusList) -> None:
+        self._heard.set()
+        for goal in list(self._goals.values()):
+            goal._take_status(find_status(statuses, goal.id))
+            if goal.done:
+                del self._goals[goal.id]
+
+    def _take_result(self, message: ActionResult) -> None:
+        status = message.status
+        goal = self._goals.get(status.goal_id.id)
+        if goal is not None:
+            # Feedback has a separate connection: what has arrived by now is read first.
+            end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
+            asyncio.get_running_loop().call_soon(self._end_goal, *end)
+
+    def _take_feedback(self, message: ActionFeedback) -> None:
+        goal = self._goals.get(message.status.goal_id.id)
+        if goal is not None:
+            goal._take_feedback(cast("_F", message.feedback))
+
+    def _end_goal(self, goal: ClientGoal[_R, _F], state: GoalState, text: str, result: _R | None) -> None:
+        self._goals.pop(goal.id, None)
+        goal._end(state, text, result)

@@ -1,0 +1,173 @@
+"""ActionClient: any number of goals of one action, each with a handle.
+
+Source: http://wiki.ros.org/actionlib/DetailedDescription.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from actionlib_msgs.msg import GoalID, GoalStatusArray
+
+from minirospy import client as rospy
+from minirospy.base import times
+from minirospy.client.connection import Connection
+from minirospy.client.session import current_session
+from minirospy.core.idl.protocols import Action, ActionFeedback, ActionResult, Message
+from minirospy.ros.actionlib.actionlib.machine import (
+    ClientGoalHandle,
+    FeedbackCallback,
+    GoalManager,
+    TransitionCallback,
+)
+from minirospy.ros.actionlib.actionlib.spec import TAKES_FAST_ANSWERS
+from minirospy.ros.actionlib.actionlib.statuses import StatusList
+from minirospy.ros.actionlib.actionlib.waiting import Waiting
+
+__all__ = ["ActionClient"]
+
+_M = TypeVar("_M", bound=Message)
+
+
+class ActionClient:
+    """The client of the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
+
+    The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set the lengths
+    of its queues. Raises ActionException on a class that is not an action.
+    """
+
+    def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
+        self.ns = ns
+        self.last_status_msg: GoalStatusArray | None = None
+        self._news = Waiting()
+        self.manager = GoalManager(ActionSpec)
+        self.ActionSpec = ActionSpec
+        self.ActionGoal = self.manager.ActionGoal
+        self.ActionResult = self.manager.ActionResult
+        self.ActionFeedback = self.manager.ActionFeedback
+
+        listener = _Listener(self._news.notify)
+        self.pub_queue_size: int = rospy.get_param("actionlib_client_pub_queue_size", 10)
+        if self.pub_queue_size < 0:
+            self.pub_queue_size = 10
+
+        # Small messages that somebody waits for: none may wait for the one before to be acknowledged.
+        self.pub_goal = rospy.Publisher(
+            rospy.remap_name(ns) + "/goal",
+            self.ActionGoal,
+            subscriber_listener=listener,
+            tcp_nodelay=True,
+            headers=TAKES_FAST_ANSWERS,
+            queue_size=self.pub_queue_size,
+        )
+        self.pub_cancel = rospy.Publisher(
+            rospy.remap_name(ns) + "/cancel",
+            GoalID,
+            subscriber_listener=listener,
+            tcp_nodelay=True,
+            queue_size=self.pub_queue_size,
+        )
+
+        self.manager.register_send_goal_fn(self.pub_goal.publish)
+        self.manager.register_cancel_fn(self.pub_cancel.publish)
+        self.sub_queue_size: int | None = rospy.get_param("actionlib_client_sub_queue_size", -1)
+        if self.sub_queue_size is not None and self.sub_queue_size < 0:
+            self.sub_queue_size = None
+
+        self.status_sub = self._subscribe("/status", StatusList, self._status_cb)
+        self.result_sub = self._subscribe("/result", self.ActionResult, self._result_cb)
+        self.feedback_sub = self._subscribe("/feedback", self.ActionFeedback, self._feedback_cb)
+
+    def stop(self) -> None:
+        """Leave the action's topics."""
+        for end in (self.pub_goal, self.pub_cancel, self.status_sub, self.result_sub, self.feedback_sub):
+            end.unregister()
+
+    def send_goal(
+        self,
+        goal: Message,
+        transition_cb: TransitionCallback | None = None,
+        feedback_cb: FeedbackCallback | None = None,
+    ) -> ClientGoalHandle:
+        """Send a goal and return its handle, which has to be kept for as long as the goal is of interest.
+
+        ``transition_cb(handle)`` is called on each change, ``feedback_cb(handle, feedback)`` with feedback,
+        both in threads of the library, one after the other.
+        """
+        return self.manager.init_goal(goal, transition_cb, feedback_cb)
+
+    def cancel_all_goals(self) -> None:
+        """Ask the server to cancel all its goals, other clients' too."""
+        self.pub_cancel.publish(GoalID())
+
+    def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
+        """Ask the server to cancel all goals with a stamp up to ``time``, other clients' too."""
+        self.pub_cancel.publish(GoalID(stamp=time))
+
+    def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
+        """Return the older name of :meth:`wait_for_server`."""
+        return self.wait_for_server(timeout)
+
+    def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
+        """Return whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever).
+
+        Raise ROSException in a fork of the node that has not called init_node.
+        """
+        session = current_session()
+        if session.is_fork_without_node:
+            raise rospy.ROSException(session.why_fork_has_no_effect(f"the action client of {self.ns}"))
+        for subscriber in (self.result_sub, self.feedback_sub):
+            subscription = subscriber.impl and subscriber.impl.subscription
+            if subscription and self._news.notify not in subscription.on_connected:
+                subscription.on_connected.append(self._news.notify)
+        return self._news.wait_for(self._is_connected, timeout)
+
+    def _is_connected(self) -> bool:
+        if self.last_status_msg is None:
+            return False
+        server = self.last_status_msg._connection_header["callerid"]
+        return all(
+            end.impl is not None and any(_peer(link) == server for link in end.impl.connections)
+            for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
+        )
+
+    def _subscribe(
+        self, name: str, data_class: type[_M], callback: Callable[[_M], None]
+    ) -> rospy.Subscriber[_M]:
+        return rospy.Subscriber(
+            rospy.remap_name(self.ns) + name,
+            data_class,
+            callback=callback,
+            queue_size=self.sub_queue_size,
+            tcp_nodelay=True,
+        )
+
+    def _status_cb(self, msg: GoalStatusArray) -> None:
+        self.last_status_msg = msg
+        self.manager.update_statuses(msg)
+        self._news.notify()
+
+    def _result_cb(self, msg: ActionResult) -> None:
+        self.manager.update_results(msg)
+
+    def _feedback_cb(self, msg: ActionFeedback) -> None:
+        self.manager.update_feedbacks(msg)
+
+
+class _Listener(rospy.SubscribeListener):
+    """Notifies of new subscribers."""
+
+    def __init__(self, notify: Callable[[], None]) -> None:
+        self._notify = notify
+
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
+    ) -> None:
+        """Notify of a new subscriber."""
+        self._notify()
+
+
+def _peer(connection: Connection) -> str:
+    """Return the name of the node at the other end of a link."""
+    return connection.callerid_pub if connection.direction == "i" else connection.endpoint_id

@@ -1,0 +1,63 @@
+"""camera_calibration_parsers: calibrations of cameras in .yaml and .ini files.
+
+Source: http://wiki.ros.org/camera_calibration_parsers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sensor_msgs.msg import CameraInfo
+
+from minirospy import client as rospy
+from minirospy.ros.camera_calibration_parsers.camera_calibration_parsers.texts import (
+    CalibrationError,
+    ini_of,
+    parse_ini,
+    parse_yaml,
+    yaml_of,
+)
+
+__all__ = ["CameraInfo", "readCalibration", "writeCalibration"]
+
+_PARSERS = {".yaml": parse_yaml, ".yml": parse_yaml, ".ini": parse_ini}
+_WRITERS = {".yaml": yaml_of, ".yml": yaml_of, ".ini": ini_of}
+
+
+def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
+    """Return the camera's name and its parameters from a .yaml, .yml or .ini file.
+
+    None where there is none, or it is not a calibration; the reason is logged.
+    """
+    parse = _PARSERS.get(Path(file_name).suffix)
+    if parse is None:
+        return None
+    try:
+        text = Path(file_name).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        rospy.loginfo("Unable to open camera calibration file [%s]", file_name)
+        return None
+    try:
+        return parse(text)
+    except CalibrationError as error:
+        rospy.logerr("Failed to parse camera calibration from file [%s]: %s", file_name, error)
+        return None
+
+
+def writeCalibration(file_name: str, camera_name: str, cinfo: CameraInfo) -> bool:
+    """Write a calibration as .yaml, .yml or .ini, folders included, with ROS's text; ROS has this in C++ alone.
+
+    Returns False where it cannot be written, or is of another kind; the reason is logged.
+    """
+    write = _WRITERS.get(Path(file_name).suffix)
+    if write is None:
+        rospy.logerr("A camera calibration is a .yaml, .yml or .ini file, not [%s]", file_name)
+        return False
+    try:
+        text = write(camera_name, cinfo)
+        Path(file_name).parent.mkdir(parents=True, exist_ok=True)
+        Path(file_name).write_text(text, encoding="utf-8")
+    except (CalibrationError, OSError) as error:
+        rospy.logerr("Failed to save camera calibration to file [%s]: %s", file_name, error)
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""The ROS package camera_info_manager_py."""

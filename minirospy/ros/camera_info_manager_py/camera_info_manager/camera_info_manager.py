@@ -1,0 +1,205 @@
+"""camera_info_manager.camera_info_manager: CameraInfoManager, and the functions that it is made of.
+
+URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or nothing for the default; ``${NAME}`` is the camera's name and
+``${ROS_HOME}`` the folder of ROS's files. Source: http://wiki.ros.org/camera_info_manager_py (and the C++ package for
+the files' text, which is that of camera_calibration_parsers).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from urllib.request import url2pathname
+
+from sensor_msgs.msg import CameraInfo
+from sensor_msgs.srv import SetCameraInfo, SetCameraInfoRequest, SetCameraInfoResponse
+
+from minirospy import client as rospy
+from minirospy.ros.camera_calibration_parsers.camera_calibration_parsers import (
+    readCalibration,
+    writeCalibration,
+)
+from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
+from minirospy.ros.rospkg.rospkg.environment import get_ros_home
+from minirospy.ros.rospkg.rospkg.rospack import RosPack
+
+__all__ = [
+    "CameraInfoError",
+    "CameraInfoManager",
+    "CameraInfoMissingError",
+    "URL_empty",
+    "URL_file",
+    "URL_invalid",
+    "URL_package",
+    "default_camera_info_url",
+    "filename_of",
+    "genCameraName",
+    "getPackageFileName",
+    "loadCalibrationFile",
+    "parseURL",
+    "resolveURL",
+    "saveCalibration",
+    "saveCalibrationFile",
+]
+
+default_camera_info_url = "file://${ROS_HOME}/camera_info/${NAME}.yaml"
+
+URL_empty = 0
+URL_file = 1
+URL_package = 2
+URL_invalid = 3
+
+_VARIABLE = re.compile(r"\$\{(\w+)\}")
+
+
+class CameraInfoError(Exception):
+    """An error of this module."""
+
+
+class CameraInfoMissingError(CameraInfoError):
+    """A calibration that has not been loaded."""
+
+
+class CameraInfoManager:
+    """Loads a camera's calibration, and saves what the service ``set_camera_info`` gets; create it after ``init_node``."""
+
+    def __init__(self, cname: str = "camera", url: str = "", namespace: str = "") -> None:
+        """Offer the service. ``cname``: the camera's name; ``url``: of its file; ``namespace``: of the service."""
+        self.cname = cname
+        self.url = url
+        self.camera_info: CameraInfo | None = None
+        service = f"{namespace.rstrip('/')}/set_camera_info" if namespace else "set_camera_info"
+        self.svc = rospy.Service(service, SetCameraInfo, self.setCameraInfo)
+
+    def getCameraInfo(self) -> CameraInfo:
+        """Return the calibration; an empty one where the file is missing. Raises CameraInfoMissingError before it is loaded."""
+        if self.camera_info is None:
+            raise CameraInfoMissingError("Calibration missing, loadCameraInfo() needed.")
+        return self.camera_info
+
+    def getCameraName(self) -> str:
+        """Return the camera's name."""
+        return self.cname
+
+    def getURL(self) -> str:
+        """Return the URL of the calibration, as it was set."""
+        return self.url
+
+    def isCalibrated(self) -> bool:
+        """Return whether the camera is calibrated. Raises CameraInfoMissingError before it is loaded."""
+        return bool(self.getCameraInfo().K[0] != 0.0)
+
+    def loadCameraInfo(self) -> None:
+        """Load the calibration; an empty one where the file is missing. What is wrong with it is logged."""
+        filename = filename_of(self.url, self.cname)
+        if filename is not None:
+            self.camera_info = loadCalibrationFile(filename, self.cname)
+
+    def setCameraInfo(self, req: SetCameraInfoRequest) -> SetCameraInfoResponse:
+        """Store a calibration and save it: the handler of the service."""
+        rospy.logdebug("SetCameraInfo received for %s", self.cname)
+        self.camera_info = req.camera_info
+        if saveCalibration(req.camera_info, self.url, self.cname):
+            return SetCameraInfoResponse(success=True)
+        return SetCameraInfoResponse(success=False, status_message="Error storing camera calibration.")
+
+    def setCameraName(self, cname: str) -> bool:
+        """Set the camera's name, of letters, digits and ``_``; return False where it is not one.
+
+        The calibration has to be loaded again, since its file may be another one.
+        """
+        if not re.fullmatch(r"\w+", cname, re.ASCII):
+            return False
+        if self.cname != cname:
+            self.cname, self.camera_info = cname, None
+        return True
+
+    def setURL(self, url: str) -> bool:
+        """Set the URL of the calibration, which has to be loaded again; return False where it is not one."""
+        if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
+            return False
+        if self.url != url:
+            self.url, self.camera_info = url, None
+        return True
+
+
+def genCameraName(from_string: str) -> str:
+    """Return a text as a camera's name: every character but letters, digits and ``_`` becomes ``_``."""
+    return re.sub(r"\W", "_", from_string, flags=re.ASCII)
+
+
+def parseURL(url: str) -> int:
+    """Return the kind of a resolved URL: ``URL_empty``, ``URL_file``, ``URL_package`` or ``URL_invalid``."""
+    if not url:
+        return URL_empty
+    if url[:8].upper() == "FILE:///":
+        return URL_file
+    if url[:10].upper() == "PACKAGE://":
+        package, _, name = url[10:].partition("/")
+        if package and name:
+            return URL_package
+    return URL_invalid
+
+
+def resolveURL(url: str, cname: str) -> str:
+    """Return a URL with the values of its variables; another variable stays, with a warning."""
+
+    def value(match: re.Match[str]) -> str:
+        if match[1] == "NAME":
+            return cname
+        if match[1] == "ROS_HOME":
+            home = Path(get_ros_home()).as_posix()
+            return home if home.startswith("/") else f"/{home}"
+        rospy.logwarn("[%s] invalid URL substitution (not resolved): %s", cname, match[0])
+        return match[0]
+
+    return _VARIABLE.sub(value, url)
+
+
+def getPackageFileName(url: str) -> str:
+    """Return the path of a package:// URL; nothing, with a warning, where the package is not found."""
+    package, _, name = url[len("package://") :].partition("/")
+    try:
+        return f"{RosPack().get_path(package)}/{name}"
+    except ResourceNotFound:
+        rospy.logwarn("unknown package: %s (ignored)", package)
+        return ""
+
+
+def loadCalibrationFile(filename: str, cname: str) -> CameraInfo:
+    """Return the calibration in a file; an empty one where there is none, or the file is not a calibration."""
+    if not Path(filename).exists():
+        return CameraInfo()
+    found = readCalibration(filename)
+    if found is None:
+        return CameraInfo()
+    name, info = found
+    if name != cname:
+        rospy.logwarn("[%s] does not match name %s in file %s", cname, name, filename)
+    return info
+
+
+def saveCalibration(new_info: CameraInfo, url: str, cname: str) -> bool:
+    """Save a calibration where a URL points to; return False, with the reason logged, where it cannot be saved."""
+    filename = filename_of(url, cname)
+    return filename is not None and saveCalibrationFile(new_info, filename, cname)
+
+
+def saveCalibrationFile(ci: CameraInfo, filename: str, cname: str) -> bool:
+    """Save a calibration in a file, folders included; return False, with the reason logged, where it cannot be saved."""
+    rospy.loginfo("writing calibration data to %s", filename)
+    return writeCalibration(filename, cname, ci)
+
+
+def filename_of(url: str, cname: str) -> str | None:
+    """Return the path that a URL points to; None, with the reason logged, where it points to none."""
+    resolved = resolveURL(url or default_camera_info_url, cname)
+    kind = parseURL(resolved)
+    if kind == URL_file:
+        return url2pathname(resolved[len("file://") :])
+    if kind == URL_package:
+        return getPackageFileName(resolved) or None
+    rospy.logerr(
+        "Invalid camera calibration URL: %s (there is file:///FILE and package://PACKAGE/FILE)", resolved
+    )
+    return None

@@ -1,0 +1,165 @@
+"""The tests of a workspace's packages, as `catkin_make run_tests` and `catkin test` run them.
+
+Source: http://wiki.ros.org/catkin/CMakeLists.txt (unit tests), http://wiki.ros.org/rostest (add_rostest).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from minirospy.base.child_lifetime import guard_children
+from minirospy.base.errors import BuildError, MinirospyError, NotFoundError
+from minirospy.base.installation import install_command
+from minirospy.ros.catkin.commands.test_results import Counts, results_below
+from minirospy.ros.rostest.runner.bare import POLL_SECONDS, interrupt_noted
+from minirospy.workspace.build import Workspace
+from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
+
+__all__ = ["run_tests"]
+
+_END_SECONDS = 20.0
+"""As long as roslaunch gives its nodes, and a little."""
+
+
+def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
+    """Run the tests of the chosen packages, or of all; return 1 where one failed.
+
+    Raises BuildError, NotFoundError; MinirospyError at Ctrl-C.
+
+    One test is chosen by catkin's name for it: ``PACKAGE_rostest_test_x.test``. The results are JUnit XML files in
+    ``build/test_results/PACKAGE``.
+    """
+    targets = {name: plan for plan in plans for test in (None, *plan.tests) for name in _targets(plan, test)}
+    wanted = {_flat(name) for name in chosen or [plan.name for plan in plans]}
+    for name in sorted(wanted - targets.keys()):
+        raise NotFoundError("package or test", name, targets, f"the workspace is {workspace.root}")
+
+    worst = 0
+    total = Counts()
+    for plan in plans:
+        if not any(targets[name] is plan for name in wanted):
+            continue
+        results = workspace.build / "test_results" / plan.name
+        if _flat(plan.name) in wanted:
+            # What is there is of tests that may be gone.
+            for file in results.glob("*.xml"):
+                file.unlink()
+        for test in plan.tests:
+            if not wanted & {*_targets(plan, None), *_targets(plan, test)}:
+                continue
+            path = plan.folder / test.path
+            if not path.exists():
+                raise BuildError(str(plan.cmake_lists), test.line, f"test file [{test.path}] does not exist")
+            results.mkdir(parents=True, exist_ok=True)
+            command = _COMMANDS[test.kind](plan, test, results)
+            print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)
+            status = _run(command, _environment(workspace), _folder_of(test, plan, workspace))
+            # 5: pytest found no tests in there.
+            worst |= status not in ((0, 5) if test.kind == "pytest" else (0,))
+        for _, counts in results_below(results):
+            if isinstance(counts, Counts):
+                total = total.plus(counts)
+        if plan.tests:
+            print(f"{plan.name}: results are in {results}")
+
+    print(f"Summary: {total}" + (" (a test could not be run)" if worst and not total.is_bad else ""))
+    return int(worst)
+
+
+def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
+    """Run a test; return its exit status. Raises MinirospyError at Ctrl-C, after the test has ended its nodes."""
+    with (
+        interrupt_noted() as interrupted,
+        guard_children(),
+        subprocess.Popen(command, env=environment, cwd=folder) as popen,
+    ):
+        while (status := popen.poll()) is None and not interrupted.is_set():
+            interrupted.wait(POLL_SECONDS)
+        if status is None:
+            # The terminal's Ctrl-C reached it, too.
+            try:
+                popen.wait(_END_SECONDS)
+            except subprocess.TimeoutExpired:
+                popen.terminate()
+    if interrupted.is_set():
+        raise MinirospyError("interrupted: the tests that were left have not run")
+    assert status is not None
+    return status
+
+
+def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
+    """Return the folder in which a test runs; make it where it is the package's build folder.
+
+    As catkin's: ``nosetests --where=FOLDER`` changes into a folder of tests, other programs run in the build folder.
+    """
+    if test.folder:
+        return Path(test.folder)
+    if test.kind == "pytest" and (plan.folder / test.path).is_dir():
+        return plan.folder / test.path
+    if test.kind == "pytest":
+        build = workspace.build / plan.name
+        build.mkdir(parents=True, exist_ok=True)
+        return build
+    return plan.folder
+
+
+def _targets(plan: Plan, test: Test | None) -> list[str]:
+    """Return what CMake's targets are called that run a package's tests, or one of them, in :func:`_flat`'s form."""
+    if test is None:
+        return [_flat(plan.name)]
+    kinds = {"pytest": ("nosetests", "pytests")}.get(test.kind, (test.kind,))
+    return [_flat(f"{plan.name}_{kind}{rest}") for kind in kinds for rest in ("", f"_{test.path}")]
+
+
+def _flat(name: str) -> str:
+    """Return a name with one sign between its words: CMake's targets have no slashes."""
+    return re.sub(r"\W", "_", name)
+
+
+def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
+    if importlib.util.find_spec("pytest") is None:
+        raise BuildError(str(plan.cmake_lists), test.line, f"tests need pytest: {install_command('pytest')}")
+    path = plan.folder / test.path
+    name = f"pytest-{path.stem}.xml"
+    return [sys.executable, "-m", "pytest", "-q", str(path), f"--junitxml={results / name}"]
+
+
+def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
+    # One file may be run with several sets of arguments.
+    stem = "__".join([os.path.splitext(test.path)[0], *test.arguments])
+    name = re.sub(r"[^\w.-]", "_", stem)
+    options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]
+    file = str(plan.folder / test.path)
+    program = [sys.executable, "-m", "minirospy.ros.rostest.commands.rostest"]
+    return [*program, *options, "--results-base-dir", str(results.parent), file, *test.arguments]
+
+
+def _launch_check(plan: Plan, test: Test, results: Path) -> list[str]:
+    name = re.sub(r"[^\w.-]", "_", test.path)
+    output = str(results / f"roslaunch-check_{name}.xml")
+    program = [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch_check", "-o", output]
+    return [*program, *test.arguments, str(plan.folder / test.path)]
+
+
+_COMMANDS = {"pytest": _pytest, "rostest": _rostest, "roslaunch-check": _launch_check}
+
+
+def _environment(workspace: Workspace) -> dict[str, str]:
+    """Return the environment of the shell, with the workspace as its setup file would put it in front."""
+
+    def before(variable: str, path: Path) -> str:
+        return os.pathsep.join(filter(None, [str(path), os.environ.get(variable, "")]))
+
+    return {
+        **os.environ,
+        "PYTHONPATH": before("PYTHONPATH", workspace.devel / DIST_PACKAGES),
+        "ROS_PACKAGE_PATH": before("ROS_PACKAGE_PATH", workspace.source),
+        "CMAKE_PREFIX_PATH": before("CMAKE_PREFIX_PATH", workspace.devel),
+        "ROS_TEST_RESULTS_DIR": str(workspace.build / "test_results"),
+    }

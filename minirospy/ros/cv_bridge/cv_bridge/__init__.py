@@ -1,0 +1,16 @@
+"""cv_bridge: images of messages as numpy arrays, and back. Source: http://wiki.ros.org/cv_bridge."""
+
+from __future__ import annotations
+
+from minirospy.core.images.encodings import type_of_encoding
+from minirospy.ros.cv_bridge.cv_bridge.core import CvBridge, CvBridgeError
+
+__all__ = ["CvBridge", "CvBridgeError", "getCvType"]
+
+
+def getCvType(encoding: str) -> int:
+    """Return OpenCV's number of an encoding's type, as CV_8UC3 = 16. Raises RuntimeError where it is unknown."""
+    try:
+        return type_of_encoding(encoding)
+    except ValueError as error:
+        raise RuntimeError(str(error)) from error

@@ -1,0 +1,79 @@
+"""Diagnostics of a topic: how often it is published, and how old its stamps are.
+
+Source: http://wiki.ros.org/diagnostic_updater.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy import client as rospy
+from minirospy.base import times
+from minirospy.core.idl.protocols import Stamped
+from minirospy.ros.diagnostic_updater.diagnostic_updater._diagnostic_updater import (
+    CompositeDiagnosticTask,
+    DiagnosticTaskVector,
+)
+from minirospy.ros.diagnostic_updater.diagnostic_updater._update_functions import (
+    FrequencyStatus,
+    FrequencyStatusParam,
+    TimeStampStatus,
+    TimeStampStatusParam,
+)
+
+__all__ = ["DiagnosedPublisher", "HeaderlessTopicDiagnostic", "TopicDiagnostic"]
+
+
+class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
+    """The frequency of a topic, as a task of an updater."""
+
+    def __init__(self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam) -> None:
+        """Add itself to the updater ``diag`` as "<name> topic status"."""
+        super().__init__(f"{name} topic status")
+        self.diag = diag
+        self.freq = FrequencyStatus(freq)
+        self.addTask(self.freq)
+        self.diag.add(self)
+
+    def tick(self, *args: Any) -> None:
+        """Count a message."""
+        self.freq.tick()
+
+    def clear_window(self) -> None:
+        """Start counting again."""
+        self.freq.clear()
+
+
+class TopicDiagnostic(HeaderlessTopicDiagnostic):
+    """The frequency of a topic, and the age of its stamps, as a task of an updater."""
+
+    def __init__(
+        self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam, stamp: TimeStampStatusParam
+    ) -> None:
+        super().__init__(name, diag, freq)
+        self.stamp = TimeStampStatus(stamp)
+        self.addTask(self.stamp)
+
+    def tick(self, stamp: times.Time | float) -> None:
+        """Count a message with its stamp."""
+        self.stamp.tick(stamp)
+        self.freq.tick()
+
+
+class DiagnosedPublisher(TopicDiagnostic):
+    """A publisher of messages with a header, with the diagnostics of its topic."""
+
+    def __init__(
+        self,
+        pub: rospy.Publisher[Stamped],
+        diag: DiagnosticTaskVector,
+        freq: FrequencyStatusParam,
+        stamp: TimeStampStatusParam,
+    ) -> None:
+        super().__init__(pub.name, diag, freq, stamp)
+        self.publisher = pub
+
+    def publish(self, message: Stamped) -> None:
+        """Count a message with its header's stamp, and publish it."""
+        self.tick(message.header.stamp)
+        self.publisher.publish(message)

@@ -1,0 +1,291 @@
+"""dynamic_reconfigure.parameter_generator_catkin: what a .cfg file, which is a program, describes parameters with.
+
+catkin_make runs it with four folders: of dynamic_reconfigure, and for documents, C++ headers and Python modules.
+Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import Entry, Value, generated, header
+
+__all__ = [
+    "ParameterGenerator",
+    "bool_t",
+    "check_description",
+    "check_name",
+    "double_t",
+    "int_t",
+    "str_t",
+]
+
+str_t = "str"
+bool_t = "bool"
+int_t = "int"
+double_t = "double"
+
+_PYTHON_TYPES: dict[str, type[Value]] = {str_t: str, int_t: int, double_t: float, bool_t: bool}
+_CPP_TYPES = {str_t: "std::string", int_t: "int", double_t: "double", bool_t: "bool"}
+_CPP_CONSTANTS = {
+    str_t: "const char * const",
+    int_t: "const int",
+    double_t: "const double",
+    bool_t: "const bool",
+}
+_ValueKey: TypeAlias = Literal["value", "default", "min", "max"]
+_NAME = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*\Z")
+
+_USAGE = """This program describes parameters; it is not called by itself.
+
+catkin_make runs it: name it in CMakeLists.txt, before catkin_package(),
+
+    generate_dynamic_reconfigure_options(cfg/NAME.cfg)
+
+See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
+
+
+def check_description(description: str) -> None:
+    """Raise Exception where a description has a quote, which the C++ header cannot hold."""
+    if "'" in description or '"' in description:
+        raise Exception(f"quotes not allowed in description string `{description}`")
+
+
+def check_name(name: str) -> None:
+    """Raise Exception where a parameter cannot have this name."""
+    if not _NAME.match(name):
+        raise Exception(
+            f"The name of field '{name}' does not follow the ROS naming conventions, "
+            "see http://wiki.ros.org/ROS/Patterns/Conventions"
+        )
+
+
+class ParameterGenerator:
+    """The parameters of a node, in groups; ``generate`` writes what programs import and include."""
+
+    minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
+    maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
+    defval: Mapping[str, Value] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
+
+    class Group:
+        """Parameters that are shown together, and groups in it."""
+
+        def __init__(
+            self, gen: ParameterGenerator, name: str, type: str, state: bool, id: int, parent: int
+        ) -> None:
+            """``type``: how it is shown ("", "collapse", "tab", "hide", "apply"); ``state``: whether it is open."""
+            self.gen = gen
+            self.name = name.replace(" ", "_")
+            self.type = type
+            self.state = state
+            self.id = id
+            self.parent = parent
+            self.groups: list[ParameterGenerator.Group] = []
+            self.parameters: list[Entry] = []
+            self.srcfile, self.srcline = _source_line()
+            gen._groups[id] = self
+
+        def get_group(self, id: int) -> ParameterGenerator.Group:
+            """Return a group by its number. Raises KeyError."""
+            return self.gen._groups[id]
+
+        def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
+            """Add a group to this one; return it."""
+            group = self.gen.Group(self.gen, name, type, state, len(self.gen._groups), self.id)
+            self.groups.append(group)
+            return group
+
+        def add(
+            self,
+            name: str,
+            paramtype: str,
+            level: int,
+            description: str,
+            default: Value | None = None,
+            min: Value | None = None,
+            max: Value | None = None,
+            edit_method: str = "",
+        ) -> None:
+            """Add a parameter; ``level``: the bits that the server's callback gets when it changes.
+
+            Raises Exception (a wrong name, limits of a text), TypeError (a value of another type).
+            """
+            if paramtype in (str_t, bool_t) and (max is not None or min is not None):
+                raise Exception(f"Max or min specified for {name}, which is of '{paramtype}' type")
+            check_name(name)
+            srcfile, srcline = _source_line()
+            param: Entry = {
+                "name": name,
+                "type": paramtype,
+                "default": default,
+                "level": level,
+                "description": description,
+                "min": min,
+                "max": max,
+                "srcline": srcline,
+                "srcfile": srcfile,
+                "edit_method": edit_method,
+            }
+            gen = self.gen
+            gen.fill_type(param)
+            gen.check_type_fill_default(param, "default", gen.defval[paramtype])
+            gen.check_type_fill_default(param, "max", gen.maxval[paramtype])
+            gen.check_type_fill_default(param, "min", gen.minval[paramtype])
+            self.parameters.append(param)
+
+        def get_parameters(self) -> list[Entry]:
+            """Return its parameters, and those of all groups in it."""
+            return [*self.parameters, *(each for group in self.groups for each in group.get_parameters())]
+
+        def get_parents(self) -> list[str]:
+            """Return the names of the groups that it is in, the outermost first, and its own."""
+            above = self.get_group(self.parent).get_parents() if self.id else []
+            return [*above, self.name]
+
+        def get_field(self) -> str:
+            """Return the C++ name of the member that holds it."""
+            *above, name = self.get_parents()
+            return "::".join([*map(str.upper, above), name.lower()])
+
+        def get_class(self, parent: bool = False) -> str:
+            """Return the C++ name of its class; with ``parent`` of the class that holds it."""
+            names = [name.upper() for name in self.get_parents()]
+            return "::".join(names[:-1] if parent else names)
+
+        def to_dict(self) -> dict[str, object]:
+            """Return what the generated module knows of it."""
+            return {
+                "name": self.name,
+                "type": self.type,
+                "state": self.state,
+                "cstate": "true" if self.state else "false",
+                "id": self.id,
+                "parent": self.parent,
+                "parameters": self.parameters,
+                "groups": [group.to_dict() for group in self.groups],
+                "srcline": self.srcline,
+                "srcfile": self.srcfile,
+                "class": self.get_class(),
+                "parentclass": self.get_class(parent=True),
+                "parentname": self.get_group(self.parent).name,
+                "field": self.get_field(),
+                "upper": self.name.upper(),
+                "lower": self.name.lower() if self.id else "groups",
+            }
+
+    def __init__(self) -> None:
+        """Take the folders from the command line. Raises SystemExit where it has none."""
+        self._groups: dict[int, ParameterGenerator.Group] = {}
+        self.group = self.Group(self, "Default", "", True, 0, 0)
+        self.constants: list[Entry] = []
+        if len(sys.argv) < 5:
+            raise SystemExit(_USAGE)
+        self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
+
+    def pytype(self, drtype: str) -> type[Value]:
+        """Return the Python type of a parameter's type. Raises KeyError."""
+        return _PYTHON_TYPES[drtype]
+
+    def check_type(self, param: Entry, field: _ValueKey) -> None:
+        """Convert a parameter's value to its type. Raises TypeError where it has another."""
+        value, wanted = param[field], self.pytype(param["type"])
+        if type(value) is not wanted and (wanted is not float or type(value) is not int):
+            raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
+        param[field] = float(value) if type(value) is int and wanted is float else value
+
+    def fill_type(self, param: Entry) -> None:
+        """Add the C++ types of a parameter or constant. Raises TypeError where its type is unknown."""
+        if param["type"] not in _CPP_TYPES:
+            raise TypeError(
+                f"'{param['name']}' has type {param['type']!r}: a type is {', '.join(_CPP_TYPES)}"
+            )
+        param["ctype"] = _CPP_TYPES[param["type"]]
+        param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
+
+    def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
+        """Convert a parameter's value, or set the default where there is none. Raises TypeError."""
+        if param[field] is None:
+            param[field] = default
+        else:
+            self.check_type(param, field)
+
+    def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
+        """Add a constant ``NAME_name`` to the module; return what ``enum`` takes. Raises Exception, TypeError."""
+        srcfile, srcline = _source_line()
+        constant: Entry = {
+            "name": name,
+            "type": type,
+            "value": value,
+            "srcline": srcline,
+            "srcfile": srcfile,
+            "description": descr,
+        }
+        check_description(descr)
+        self.fill_type(constant)
+        self.check_type(constant, "value")
+        self.constants.append(constant)
+        return constant
+
+    def enum(self, constants: Sequence[Entry], description: str) -> str:
+        """Return the ``edit_method`` of a parameter that is one of some constants. Raises Exception."""
+        if len({constant["type"] for constant in constants}) != 1:
+            raise Exception("Inconsistent types in enum!")
+        check_description(description)
+        return repr({"enum": constants, "enum_description": description})
+
+    def add(
+        self,
+        name: str,
+        paramtype: str,
+        level: int,
+        description: str,
+        default: Value | None = None,
+        min: Value | None = None,
+        max: Value | None = None,
+        edit_method: str = "",
+    ) -> None:
+        """Add a parameter to the outermost group, as ``Group.add``."""
+        self.group.add(name, paramtype, level, description, default, min, max, edit_method)
+
+    def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
+        """Add a group to the outermost one; return it."""
+        return self.group.add_group(name, type, state)
+
+    def generate(self, pkgname: str, nodename: str, name: str) -> None:
+        """Write NAMEConfig.py, NAMEConfig.h and documents; ``name`` is that of the .cfg file."""
+        self.pkgname, self.nodename, self.name = pkgname, nodename, name
+        self.msgname = f"{name}Config"
+        print(f"Generating reconfiguration files for {name} in {pkgname}")
+
+        documents = Path(self.binary_dir) / "docs"
+        for path, text in (
+            (documents / f"{self.msgname}.dox", generated.parameters_document(self.group)),
+            (documents / f"{self.msgname}.wikidoc", generated.wiki_document(self.group)),
+            (
+                documents / f"{self.msgname}-usage.dox",
+                generated.usage_document(self.group, pkgname, nodename),
+            ),
+            (Path(self.cpp_gen_dir) / f"{self.msgname}.h", self._header()),
+            (Path(self.py_gen_dir) / "cfg" / f"{self.msgname}.py", self._module()),
+        ):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        (Path(self.py_gen_dir) / "cfg" / "__init__.py").touch()
+
+    def _module(self) -> str:
+        return generated.python_module(self.pkgname, self.name, self.group.to_dict(), self.constants)
+
+    def _header(self) -> str:
+        return header.cpp_header(self.pkgname, self.name, self.group, self.constants)
+
+
+def _source_line() -> tuple[str, int]:
+    """Return the name of the .cfg file and the line in it that is running, for the headers' comments."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename == __file__:
+        frame = frame.f_back
+    return Path(frame.f_code.co_filename).name, frame.f_lineno

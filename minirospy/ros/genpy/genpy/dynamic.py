@@ -1,0 +1,58 @@
+"""genpy.dynamic: message classes from a full text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from minirospy.base.errors import DefinitionError
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.protocols import Message
+
+__all__ = ["generate_dynamic"]
+
+
+def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
+    """Return the classes of a full text and of all types in it, by name.
+
+    Raises InvalidMsgSpec, MsgNotFound where the text lacks a type, MsgGenerationException where a part of it is unnamed.
+    """
+    from minirospy.core.idl import load
+
+    try:
+        return dict(load.classes_from_text(core_type, msg_cat))
+    except DefinitionError as error:
+        raise _as_genpy(core_type, msg_cat, error) from error
+
+
+def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception:
+    """Return the error that genpy raises of a full text."""
+    from minirospy.ros.genmsg.genmsg.base import InvalidMsgSpec
+    from minirospy.ros.genmsg.genmsg.msg_loader import (
+        MsgContext,
+        MsgNotFound,
+        load_depends,
+        load_msg_from_string,
+    )
+    from minirospy.ros.genpy.genpy.base import MsgGenerationException
+
+    first, *others = msg_cat.split(f"\n{'=' * 80}\n")
+    if not all(part.startswith("MSG:") for part in others):
+        return MsgGenerationException(
+            "invalid input to generate_dynamic: dependent type is missing 'MSG:' type declaration header"
+        )
+
+    context = MsgContext.create_default()
+    try:
+        specs = [load_msg_from_string(context, first, core_type)]
+        for part in others:
+            head, _, body = part.partition("\n")
+            specs.append(load_msg_from_string(context, body, head.removeprefix("MSG:").strip()))
+        for spec in specs:
+            load_depends(context, spec, {})
+    except (InvalidMsgSpec, MsgNotFound) as found:
+        return found
+    except (ValueError, RecursionError):
+        # A name that is none, and a message that contains itself: our error says so.
+        pass
+    return InvalidMsgSpec(str(error))

@@ -1,0 +1,269 @@
+"""image_geometry.cameramodels: the models of one camera and of two. Pixels are (u, v), points (x, y, z) in meters.
+
+K is the camera matrix of the raw image, D its distortion, R the rotation to the rectified image, P the projection of that.
+Source: http://wiki.ros.org/image_geometry, http://wiki.ros.org/image_pipeline/CameraInfo.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from minirospy.ros.image_geometry.image_geometry.rectification import (
+    Distortion,
+    distorted,
+    rectified_image,
+    undistorted,
+)
+
+if TYPE_CHECKING:
+    import genpy
+    from numpy.typing import NDArray
+    from sensor_msgs.msg import CameraInfo, RegionOfInterest
+
+    Matrix: TypeAlias = Any
+    """A numpy.matrix of doubles, which is what programs get from ROS."""
+    Array: TypeAlias = NDArray[Any]
+    Point: TypeAlias = Sequence[float]
+
+__all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
+
+
+def mkmat(rows: int, cols: int, L: Sequence[float]) -> Matrix:
+    """Return a matrix of these values, row by row. Raises ValueError where they are not ``rows`` x ``cols``."""
+    import numpy as np
+
+    return np.array(L, np.float64).reshape(rows, cols).view(np.matrix)
+
+
+class PinholeCameraModel:
+    """A camera, as its CameraInfo describes it; binning and region of interest are applied to K and P."""
+
+    def __init__(self) -> None:
+        self.K: Matrix = None
+        self.D: Matrix = None
+        self.R: Matrix = None
+        self.P: Matrix = None
+        self.full_K: Matrix = None
+        self.full_P: Matrix = None
+        self.width: int | None = None
+        self.height: int | None = None
+        self.binning_x: int | None = None
+        self.binning_y: int | None = None
+        self.raw_roi: RegionOfInterest | None = None
+        self.tf_frame: str | None = None
+        self.stamp: genpy.Time | None = None
+
+    def fromCameraInfo(self, msg: CameraInfo) -> None:
+        """Set the parameters of the camera."""
+        self.K = mkmat(3, 3, msg.K)
+        self.D = mkmat(len(msg.D), 1, msg.D) if msg.D else None
+        self.R = mkmat(3, 3, msg.R)
+        self.P = mkmat(3, 4, msg.P)
+        self.full_K, self.full_P = self.K.copy(), self.P.copy()
+        self.width, self.height = msg.width, msg.height
+        self.resolution = (msg.width, msg.height)
+        self.binning_x, self.binning_y = max(1, msg.binning_x), max(1, msg.binning_y)
+        self.tf_frame, self.stamp = msg.header.frame_id, msg.header.stamp
+
+        self.raw_roi = copy.copy(msg.roi)
+        if not any((msg.roi.x_offset, msg.roi.y_offset, msg.roi.width, msg.roi.height)):
+            self.raw_roi.width, self.raw_roi.height = self.width, self.height
+
+        # The principal point first moves with the region's corner, then everything shrinks by the binning.
+        for matrix in (self.K, self.P):
+            matrix[0, 2] -= self.raw_roi.x_offset
+            matrix[1, 2] -= self.raw_roi.y_offset
+            matrix[0, :3] /= self.binning_x
+            matrix[1, :3] /= self.binning_y
+
+    def rectifyImage(self, raw: Array, rectified: Array) -> None:
+        """Write the rectified image of a raw one into ``rectified``, an array of the same shape and type.
+
+        By OpenCV where it is installed, else by numpy with the same interpolation. Raises ValueError where the arrays do
+        not fit each other, or an uncalibrated camera has no size.
+        """
+        self._check()
+        rectified_image(raw, rectified, (self.K, self._distortion(), self.R, self.P), self.resolution)
+
+    def rectifyPoint(self, uv_raw: Point) -> Array:
+        """Return the pixel of the rectified image, as an array (u, v), for one of the raw image."""
+        self._check()
+        return undistorted(uv_raw, self.K, self._distortion(), self.R, self.P)
+
+    def unrectifyPoint(self, uv_rect: Point) -> Array:
+        """Return the pixel of the raw image, as an array (u, v), for one of the rectified image, as the C++ class does."""
+        import numpy as np
+
+        self._check()
+        u, v = (np.atleast_1d(np.float64(each)) for each in uv_rect)
+        raw_u, raw_v = distorted(u, v, self.K, self._distortion(), self.R, self.P)
+        return np.array([raw_u[0], raw_v[0]])
+
+    def project3dToPixel(self, point: Point) -> tuple[float, float]:
+        """Return the rectified pixel (u, v) of a point; (nan, nan) of one in the plane of the camera's center."""
+        u, v, w = (float(row) for row in self._checked_P() @ [point[0], point[1], point[2], 1.0])
+        return (u / w, v / w) if w != 0 else (math.nan, math.nan)
+
+    def projectPixelTo3dRay(self, uv: Point) -> tuple[float, float, float]:
+        """Return the unit vector from the camera's center through a rectified pixel."""
+        self._check()
+        x, y = _ratio(uv[0] - self.cx(), self.fx()), _ratio(uv[1] - self.cy(), self.fy())
+        norm = math.sqrt(x * x + y * y + 1)
+        return _ratio(x, norm), _ratio(y, norm), 1.0 / norm
+
+    def getDeltaU(self, deltaX: float, Z: float) -> float:
+        """Return how many pixels ``deltaX`` meters are at the distance ``Z``; inf at zero."""
+        return self.fx() * deltaX / Z if Z else math.inf
+
+    def getDeltaV(self, deltaY: float, Z: float) -> float:
+        """Return how many pixels ``deltaY`` meters are at the distance ``Z``; inf at zero."""
+        return self.fy() * deltaY / Z if Z else math.inf
+
+    def getDeltaX(self, deltaU: float, Z: float) -> float:
+        """Return how many meters ``deltaU`` pixels are at the distance ``Z``."""
+        return _ratio(Z * deltaU, self.fx())
+
+    def getDeltaY(self, deltaV: float, Z: float) -> float:
+        """Return how many meters ``deltaV`` pixels are at the distance ``Z``."""
+        return _ratio(Z * deltaV, self.fy())
+
+    def fullResolution(self) -> tuple[int, int]:
+        """Return (width, height) of the whole sensor in pixels."""
+        self._check()
+        return self.resolution
+
+    def intrinsicMatrix(self) -> Matrix:
+        """Return K, 3x3; None before ``fromCameraInfo``, as the following."""
+        return self.K
+
+    def distortionCoeffs(self) -> Matrix:
+        """Return D, a column; None without distortion."""
+        return self.D
+
+    def rotationMatrix(self) -> Matrix:
+        """Return R, 3x3."""
+        return self.R
+
+    def projectionMatrix(self) -> Matrix:
+        """Return P, 3x4."""
+        return self.P
+
+    def fullIntrinsicMatrix(self) -> Matrix:
+        """Return K of the whole sensor."""
+        return self.full_K
+
+    def fullProjectionMatrix(self) -> Matrix:
+        """Return P of the whole sensor."""
+        return self.full_P
+
+    def cx(self) -> float:
+        """Return the principal point's u."""
+        return self._of_P(0, 2)
+
+    def cy(self) -> float:
+        """Return the principal point's v."""
+        return self._of_P(1, 2)
+
+    def fx(self) -> float:
+        """Return the focal length in pixels, horizontally."""
+        return self._of_P(0, 0)
+
+    def fy(self) -> float:
+        """Return the focal length in pixels, vertically."""
+        return self._of_P(1, 1)
+
+    def Tx(self) -> float:
+        """Return P's translation in x: of a right camera, minus fx times the baseline."""
+        return self._of_P(0, 3)
+
+    def Ty(self) -> float:
+        """Return P's translation in y."""
+        return self._of_P(1, 3)
+
+    def fovX(self) -> float:
+        """Return the horizontal field of view in radians."""
+        return 2 * math.atan(_ratio(self.fullResolution()[0], 2 * self.fx()))
+
+    def fovY(self) -> float:
+        """Return the vertical field of view in radians."""
+        return 2 * math.atan(_ratio(self.fullResolution()[1], 2 * self.fy()))
+
+    def tfFrame(self) -> str | None:
+        """Return the camera's frame."""
+        return self.tf_frame
+
+    def _of_P(self, row: int, column: int) -> float:
+        value: float = self._checked_P()[row, column]
+        return value
+
+    def _checked_P(self) -> Array:
+        self._check()
+        array: Array = self.P.A
+        return array
+
+    def _check(self) -> None:
+        if self.P is None:
+            raise TypeError("the camera model is empty: call fromCameraInfo() first")
+
+    def _distortion(self) -> Distortion:
+        return () if self.D is None else self.D.A1
+
+
+class StereoCameraModel:
+    """Two rectified cameras, of which the right one has the baseline in its P."""
+
+    def __init__(self) -> None:
+        self.left = PinholeCameraModel()
+        self.right = PinholeCameraModel()
+
+    def fromCameraInfo(self, left_msg: CameraInfo, right_msg: CameraInfo) -> None:
+        """Set the parameters of both cameras."""
+        import numpy as np
+
+        self.left.fromCameraInfo(left_msg)
+        self.right.fromCameraInfo(right_msg)
+        fx, cx, cy = self.right.fx(), self.right.cx(), self.right.cy()
+        baseline = _ratio(-self.right.Tx(), fx)
+
+        self.Q: Array = np.zeros((4, 4))
+        self.Q[0, 0] = self.Q[1, 1] = 1.0
+        self.Q[0, 3], self.Q[1, 3], self.Q[2, 3] = -cx, -cy, fx
+        self.Q[3, 2] = _ratio(1.0, baseline)
+
+    def tfFrame(self) -> str | None:
+        """Return the frame of the points, which is that of the left camera."""
+        return self.left.tfFrame()
+
+    def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the rectified pixels of a point in the left and in the right image."""
+        return self.left.project3dToPixel(point), self.right.project3dToPixel(point)
+
+    def projectPixelTo3d(self, left_uv: Point, disparity: float) -> tuple[float, float, float]:
+        """Return the point of a rectified pixel of the left image; (0, 0, 0) where it is infinitely far away."""
+        self._check()
+        x, y, z, w = (float(row) for row in self.Q @ [left_uv[0], left_uv[1], disparity, 1.0])
+        return (x / w, y / w, z / w) if w != 0 else (0.0, 0.0, 0.0)
+
+    def getZ(self, disparity: float) -> float:
+        """Return the distance in meters of a disparity in pixels; inf for zero."""
+        return -self.right.Tx() / disparity if disparity else math.inf
+
+    def getDisparity(self, Z: float) -> float:
+        """Return the disparity in pixels of a distance in meters; inf for zero."""
+        return -self.right.Tx() / Z if Z else math.inf
+
+    def _check(self) -> None:
+        if not hasattr(self, "Q"):
+            raise TypeError("the camera model is empty: call fromCameraInfo() first")
+
+
+def _ratio(above: float, below: float) -> float:
+    """Return a quotient; by zero inf or nan, as numpy divides, but without its warning."""
+    if below:
+        return above / below
+    if above == 0 or math.isnan(above):
+        return math.nan
+    return math.copysign(math.inf, above) * math.copysign(1.0, below)

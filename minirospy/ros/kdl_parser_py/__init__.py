@@ -1,0 +1,1 @@
+"""The ROS package kdl_parser_py."""

@@ -1,0 +1,125 @@
+"""map_saver: a map of the topic `map` -> NAME.pgm and NAME.yaml, byte by byte those of ROS.
+
+`map_saver [--occ THRESHOLD] [--free THRESHOLD] [-f NAME] [map:=TOPIC]`. Source: http://wiki.ros.org/map_server#map_saver.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from nav_msgs.msg import OccupancyGrid
+
+from minirospy import client as rospy
+from minirospy.base.errors import UsageError
+from minirospy.ros.map_server.grid import MapError, pgm_of_grid, yaml_of_map, yaw_of_quaternion
+
+__all__ = ["SaverOptions", "main", "parse_options", "save_map"]
+
+_USAGE = """Usage: 
+  map_saver -h
+  map_saver [--occ <threshold_occupied>] [--free <threshold_free>] [-f <mapname>] [ROS remapping args]"""  # noqa: W291
+
+
+class SaverOptions(NamedTuple):
+    """The name of the files without its suffix, and the occupancies from which and up to which a cell is occupied or free."""
+
+    name: str = "map"
+    occupied: int = 65
+    free: int = 25
+
+
+def parse_options(words: Sequence[str]) -> SaverOptions | None:
+    """Return the options; None for ``-h``. Raises UsageError, with a text where ROS has one."""
+    options = SaverOptions()
+    rest = iter(words)
+    for word in rest:
+        if word == "-h":
+            return None
+        value = next(rest, None) if word in ("-f", "--occ", "--free") else None
+        if value is None:
+            raise UsageError("")
+        if word == "-f":
+            options = options._replace(name=value)
+        elif word == "--occ":
+            options = options._replace(occupied=_threshold(value, "threshold_occupied", 1))
+        else:
+            options = options._replace(free=_threshold(value, "threshold_free", 0))
+    if options.occupied <= options.free:
+        raise UsageError("threshold_free must be smaller than threshold_occupied")
+    return options
+
+
+def _threshold(text: str, name: str, least: int) -> int:
+    # As C's atoi: what follows the digits is not read, and no digit is 0.
+    match = re.match(r"\s*[+-]?\d+", text)
+    value = int(match[0]) if match else 0
+    if not least <= value <= 100:
+        raise UsageError(f"{name} must be between {least} and 100")
+    return value
+
+
+def main() -> int:
+    """Save one map; return the exit status: 1 where that fails."""
+    try:
+        options = parse_options(rospy.myargv()[1:])
+    except UsageError as error:
+        if not str(error):
+            print(_USAGE)
+            return 1
+        # No node runs yet, and no master is needed to see it.
+        print(f"map_saver: ERROR: {error}", file=sys.stderr)
+        return 1
+    if options is None:
+        print(_USAGE)
+        return 0
+    try:
+        rospy.init_node("map_saver")
+        return _save_one(options)
+    except rospy.ROSInterruptException:
+        return 0
+
+
+def _save_one(options: SaverOptions) -> int:
+    received: list[OccupancyGrid] = []
+    has_come = threading.Event()
+
+    def receive(grid: OccupancyGrid) -> None:
+        received.append(grid)
+        has_come.set()
+
+    rospy.on_shutdown(has_come.set)
+    rospy.loginfo("Waiting for the map")
+    subscriber = rospy.Subscriber("map", OccupancyGrid, receive, queue_size=1)
+    has_come.wait()
+    subscriber.unregister()
+    if not received:
+        return 0
+    try:
+        save_map(received[0], options)
+    except MapError as error:
+        rospy.logerr("%s", error)
+        return 1
+    rospy.loginfo("Done\n")
+    return 0
+
+
+def save_map(grid: OccupancyGrid, options: SaverOptions) -> None:
+    """Write a map's two files. Raises MapError."""
+    info = grid.info
+    rospy.loginfo("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
+    image = pgm_of_grid(grid.data, info.width, info.height, info.resolution, options.occupied, options.free)
+    position, turn = info.origin.position, info.origin.orientation
+    yaw = yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w)
+    image_name = f"{options.name}.pgm"
+    text = yaml_of_map(image_name, info.resolution, (position.x, position.y, yaw))
+    for name, data in ((image_name, image), (f"{options.name}.yaml", text.encode())):
+        rospy.loginfo("Writing map occupancy data to %s", name)
+        try:
+            Path(name).write_bytes(data)
+        except OSError as error:
+            raise MapError(f"Couldn't save map file to {name}: {error.strerror}") from error

@@ -1,0 +1,1 @@
+"""The ROS package message_filters."""

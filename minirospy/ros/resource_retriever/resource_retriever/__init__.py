@@ -1,0 +1,48 @@
+"""resource_retriever: files and pages by their URL, package:// too. Source: http://wiki.ros.org/resource_retriever."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from urllib.error import URLError
+from urllib.request import urlopen
+
+from minirospy.ros.rospkg.rospkg.rospack import RosPack
+
+__all__ = ["PACKAGE_PREFIX", "URLError", "get", "get_filename", "urlopen"]
+
+PACKAGE_PREFIX = "package://"
+_TIMEOUT = 60.0
+"""Seconds without any byte from a server, after which it counts as unreachable."""
+
+
+def get(url: str) -> bytes:
+    """Return what is at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or what urllib opens, as http and https.
+
+    Raises Exception, as ROS does, where there is nothing; ResourceNotFound where the package is not found, ValueError
+    where it is not a URL.
+    """
+    try:
+        if url.startswith(PACKAGE_PREFIX):
+            return Path(get_filename(url, use_protocol=False)).read_bytes()
+        with urlopen(url, timeout=_TIMEOUT) as answer:
+            content: bytes = answer.read()
+    except OSError as error:
+        raise Exception(f"Invalid URL: {get_filename(url)}") from error
+    return content
+
+
+def get_filename(url: str, use_protocol: bool = True) -> str:
+    """Return a package:// URL as one of the file; any other as it is.
+
+    Without ``use_protocol`` the result is the file's path. Raises ResourceNotFound (no such package), Exception (no file).
+    """
+    if not url.startswith(PACKAGE_PREFIX):
+        return url
+    package, slash, name = url[len(PACKAGE_PREFIX) :].partition("/")
+    if not slash:
+        raise Exception(f"Could not parse package:// format into file:// format for {url}")
+    path = f"{RosPack().get_path(package)}/{name}"
+    if not use_protocol:
+        return path
+    return Path(path).as_uri() if os.name == "nt" else f"file://{path}"

@@ -1,0 +1,36 @@
+"""ros_numpy.image: images as arrays (height, width) or (height, width, channels), and back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from sensor_msgs.msg import Image
+
+from minirospy.ros.cv_bridge.cv_bridge.core import CvBridge, CvBridgeError
+from minirospy.ros.ros_numpy.ros_numpy.registry import converts_from_numpy, converts_to_numpy
+
+if TYPE_CHECKING:
+    from minirospy.ros.ros_numpy.ros_numpy.registry import Array
+
+__all__ = ["image_to_numpy", "numpy_to_image"]
+
+
+@converts_to_numpy(Image)
+def image_to_numpy(msg: Image) -> Array:
+    """Return an image, a read-only view of the message where its bytes are in this machine's order. Raises TypeError."""
+    return CvBridge().imgmsg_to_cv2(msg)
+
+
+@converts_from_numpy(Image)
+def numpy_to_image(arr: Array, encoding: str) -> Image:
+    """Return an array as an image of an encoding. Raises TypeError where the encoding has another type."""
+    dtype, channels = CvBridge().encoding_to_dtype_with_channels(encoding)
+    if arr.ndim not in (2, 3):
+        raise TypeError("Array must be two or three dimensional")
+    given = arr.shape[2] if arr.ndim == 3 else 1
+    if given != channels:
+        raise CvBridgeError(f"Array has {given} channels, {encoding} requires {channels}")
+    if arr.dtype.newbyteorder("=") != np.dtype(dtype):
+        raise CvBridgeError(f"Array is {arr.dtype.name}, {encoding} requires {dtype}")
+    return CvBridge().cv2_to_imgmsg(arr, encoding)

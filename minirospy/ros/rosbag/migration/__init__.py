@@ -1,0 +1,1 @@
+"""Migration of bags to newer message definitions."""

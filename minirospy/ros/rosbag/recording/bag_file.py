@@ -1,0 +1,185 @@
+"""One file of a recording: written as ``NAME.active`` by the disk's thread, renamed when it is complete."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import BinaryIO, Protocol, cast
+
+from minirospy.base import private_files
+from minirospy.base.errors import BagFormatError
+from minirospy.core.bag.writer import BagWriter, Buffer
+from minirospy.ros.rosbag.recording.disk import DiskThread, QueuedFile
+from minirospy.ros.rosbag.recording.options import RecordOptions
+
+__all__ = ["BagFile", "FileWriter"]
+
+_UNLIMITED = 2**31
+_KNOWN_HEADERS = 10_000
+_DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
+"""What a bag needs, and third-party publishers may leave out of their connection headers."""
+
+
+class FileWriter(Protocol):
+    """The common part of the writers of bags and of MCAP files."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory that the stream has not been given."""
+
+    def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
+        """Return the number of a new connection."""
+
+    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
+        """Write a message."""
+
+    def write_ready(self) -> None:
+        """Write the complete chunks whose compression has ended."""
+
+    def close(self) -> None:
+        """Complete the file."""
+
+    def salvage(self, written: int | None = None) -> int:
+        """Complete a file whose stream has failed; return how many messages are lost."""
+
+
+class BagFile:
+    """A bag that is being recorded. Methods are called under ``lock``.
+
+    ``on_error(file, error, lost)`` is called in the disk's thread when the disk, or a compression, has failed; by then the
+    file is readable, has its final name, and lacks ``lost`` messages (-1: it could not be completed). Raise OSError if it
+    cannot be created.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        options: RecordOptions,
+        disk: DiskThread,
+        lock: threading.Lock,
+        executor: Executor | None,
+        on_error: Callable[[BagFile, Exception, int], object],
+    ) -> None:
+        self.name = name
+        self._path = Path(name)
+        self._active = Path(f"{name}.active")
+        self._report = on_error
+        self._is_closed = False
+
+        self._disk = disk
+        self._lock = lock
+        self._stream = QueuedFile(disk, self._active, self._failed)
+        self._writer = _open_writer(self._stream, options, executor)
+        self._by_identity: dict[int, tuple[Mapping[str, str], int]] = {}
+        self._by_content: dict[tuple[str, frozenset[tuple[str, str]]], int] = {}
+
+    @property
+    def active_name(self) -> str:
+        """The name while it is written."""
+        return str(self._active)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._writer.size
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory besides those that the disk's thread has queued."""
+        return self._writer.gathered
+
+    def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
+        """Write a message that came with this connection header. Raise BagFormatError."""
+        if self._is_closed:
+            return
+        # All messages of a link come with the same object.
+        known = self._by_identity.get(id(header))
+        number = known[1] if known and known[0] is header else self._connection(topic, header)
+        try:
+            self._writer.write(number, time, body, tail)
+        except BagFormatError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever ended a compression
+            self._give_up(error)
+
+    def write_ready(self) -> None:
+        """Write what has been compressed since the last message."""
+        if not self._is_closed:
+            try:
+                self._writer.write_ready()
+            except Exception as error:  # noqa: BLE001 - as above
+                self._give_up(error)
+
+    def close(self) -> None:
+        """Complete the file in the disk's thread, behind what is queued."""
+        self._disk.submit(self._finish)
+
+    def _connection(self, topic: str, header: Mapping[str, str]) -> int:
+        # A publisher that has connected again is the same connection.
+        key = topic, frozenset(header.items())
+        number = self._by_content.get(key)
+        if number is None:
+            number = self._by_content[key] = self._writer.add_connection(
+                topic, {**_DEFAULTS, **dict(sorted(header.items())), "topic": topic}
+            )
+        if len(self._by_identity) > _KNOWN_HEADERS:
+            self._by_identity.clear()
+        self._by_identity[id(header)] = header, number
+        return number
+
+    def _finish(self) -> None:
+        if self._is_closed:
+            return
+        self._is_closed = True
+        try:
+            self._writer.close()
+            self._stream.close_file()
+            private_files.replace_file(self._active, self._path)
+        except Exception as error:  # noqa: BLE001 - also of a chunk's compression: MemoryError, for example
+            self._salvage(error)
+
+    def _give_up(self, error: Exception) -> None:
+        """End the file behind what is queued, as a chunk could not be compressed."""
+        self._is_closed = True
+        self._disk.submit(lambda: self._salvage(error))
+
+    def _failed(self, error: Exception) -> None:
+        with self._lock:
+            if self._is_closed:
+                return
+            # No message is written from now on.
+            self._is_closed = True
+        self._salvage(error)
+
+    def _salvage(self, error: Exception) -> None:
+        lost = -1
+        with contextlib.suppress(Exception):
+            lost = self._writer.salvage(self._stream.written())
+        with contextlib.suppress(OSError):
+            self._stream.close_file()
+            if lost >= 0:
+                private_files.replace_file(self._active, self._path)
+        self._report(self, error, lost)
+
+
+def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | None) -> FileWriter:
+    stream = cast(BinaryIO, file)
+    if options.mcap:
+        from minirospy.core.bag.mcap_writer import McapWriter
+
+        return McapWriter(stream, compression=options.compression, chunk_size=options.chunk_size)
+    return BagWriter(
+        stream,
+        compression=options.compression,
+        chunk_threshold=options.chunk_size,
+        executor=executor,
+        # The recorder limits what waits, in bytes.
+        most_waiting=_UNLIMITED,
+    )

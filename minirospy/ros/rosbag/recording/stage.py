@@ -1,0 +1,250 @@
+"""What a player publishes into: this process's node, for `rosbag play`; another one for a player that is a part of a program."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import struct
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Protocol
+
+from minirospy import client
+from minirospy.base.escape import SafeTerminal
+from minirospy.core.bag.base import StoredMessage
+from minirospy.core.bag.records import Connection
+from minirospy.ros.rosbag.recording.frames import ReceivedFrame, frame_class
+from minirospy.ros.rosbag.recording.keys import read_keys
+from minirospy.ros.rosbag.recording.schedule import PlayOptions
+
+if TYPE_CHECKING:
+    from std_srvs.srv import SetBoolRequest, SetBoolResponse
+
+__all__ = ["CLOCK", "Controls", "NodeStage", "Stage"]
+
+_SECOND = 10**9
+_SWITCH_SECONDS = 0.00005
+"""How long the thread that reads ahead may keep the GIL when a message is due."""
+
+_STAMP = struct.Struct("<4xII")
+"""A message that starts with a Header: its sequence number, then the stamp."""
+
+CLOCK = struct.Struct("<II")
+"""A message of rosgraph_msgs/Clock."""
+
+
+class Controls(Protocol):
+    """What a stage does with its player. From any thread."""
+
+    def end(self) -> None:
+        """End the playing."""
+
+    def set_paused(self, paused: bool) -> bool:
+        """Pause, or go on; return whether that changed anything."""
+
+    def control_rate(self, stamp: int) -> None:
+        """Store the stamp of the last message of the topic that controls the rate."""
+
+
+class Stage(Protocol):
+    """The graph of a player. Called in the player's thread."""
+
+    def open(self, player: Controls) -> None:
+        """Have the player end with the graph. Called first."""
+
+    def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
+        """Advertise what will be played: the connections, each with the number of its bag."""
+
+    def offer(self, player: Controls) -> None:
+        """Offer what controls the player."""
+
+    def has_all_subscribers(self) -> bool:
+        """Return whether each topic has a subscriber."""
+
+    def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
+        """Return the context that the playing runs in; ``on_key`` gets the keys that are typed meanwhile."""
+
+    def publish(self, number: int, message: StoredMessage) -> None:
+        """Publish a message of the bag of this number."""
+
+    def publish_clock(self, time: int) -> None:
+        """Publish the bag's time."""
+
+    def waiting_bytes(self) -> int:
+        """Return how many bytes subscribers have not taken yet."""
+
+    def print(self, text: str, end: str = "\n") -> None:
+        """Print a line for a person."""
+
+
+class _Outlet:
+    """The messages of one publisher of the bag on a topic: the publisher of that topic sends them."""
+
+    def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
+        self.publisher = publisher
+        self.message = publisher.data_class()
+        self.is_latched = is_latched
+        self.last: bytes | None = None
+        """The last message, if latched."""
+
+    def publish(self, body: bytes) -> None:
+        self.message._buff = body
+        if self.is_latched:
+            self.last = body
+        self.publisher.publish(self.message)
+
+
+class _LateSubscribers(client.SubscribeListener):
+    """Gives a late subscriber the last message of each latched publisher of the bag: a topic itself keeps one only."""
+
+    def __init__(self) -> None:
+        self.outlets: list[_Outlet] = []
+
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
+    ) -> None:
+        latched = [outlet for outlet in self.outlets if outlet.last is not None]
+        if len(latched) < 2:
+            return
+        for outlet in latched:
+            message = outlet.publisher.data_class()
+            message._buff = outlet.last
+            peer_publish(message)
+
+
+class NodeStage:
+    """This process's node, which init_node has made, and the terminal."""
+
+    def __init__(self, options: PlayOptions) -> None:
+        self._options = options
+        self._publishers: dict[str, tuple[client.Publisher[client.AnyMsg], _LateSubscribers]] = {}
+        self._outlets: dict[tuple[int, int], _Outlet | None] = {}
+        self._clock: client.Publisher[client.AnyMsg] | None = None
+        self._is_header_first: bool | None = None
+
+    def open(self, player: Controls) -> None:
+        """See :meth:`Stage.open`."""
+        client.on_shutdown(player.end)
+
+    def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
+        """See :meth:`Stage.advertise`."""
+        self._clock = client.Publisher("clock", frame_class(*_clock_type()), queue_size=1)
+        for number, connection in connections:
+            self._advertise(number, connection)
+
+    def offer(self, player: Controls) -> None:
+        """Offer ~pause_playback, and follow the topic that controls the rate."""
+        from std_srvs.srv import SetBool, SetBoolResponse
+
+        def pause(request: SetBoolRequest) -> SetBoolResponse:
+            if player.set_paused(request.data):
+                return SetBoolResponse(True, "Playback is now " + ("paused" if request.data else "resumed"))
+            return SetBoolResponse(False, "Bag is already " + ("paused." if request.data else "running."))
+
+        client.Service("~pause_playback", SetBool, pause)
+        if self._options.rate_control_topic:
+            self.print("Creating rate control topic subscriber...", end="")
+            client.Subscriber(
+                self._options.rate_control_topic, ReceivedFrame, self._on_rate_control, callback_args=player
+            )
+            self.print(" done.")
+
+    def has_all_subscribers(self) -> bool:
+        """See :meth:`Stage.has_all_subscribers`."""
+        return all(publisher.get_num_connections() for publisher, _ in self._publishers.values())
+
+    @contextlib.contextmanager
+    def running(self, on_key: Callable[[str], object]) -> Iterator[None]:
+        """Have this process's threads switch soon, and read keys, for as long as that lasts."""
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_SECONDS)
+        # A collection that visits all that was imported takes milliseconds.
+        gc.freeze()
+        try:
+            with read_keys(on_key):
+                yield
+        finally:
+            sys.setswitchinterval(interval)
+
+    def publish(self, number: int, message: StoredMessage) -> None:
+        """See :meth:`Stage.publish`."""
+        outlet = self._outlets[number, message.connection.id]
+        if outlet:
+            outlet.publish(message.body)
+
+    def publish_clock(self, time: int) -> None:
+        """See :meth:`Stage.publish_clock`."""
+        if self._clock:
+            message = self._clock.data_class()
+            message._buff = CLOCK.pack(*divmod(time, _SECOND))
+            self._clock.publish(message)
+
+    def waiting_bytes(self) -> int:
+        """See :meth:`Stage.waiting_bytes`."""
+        topics = [publisher.impl for publisher, _ in self._publishers.values()]
+        return sum(link.waiting_bytes for topic in topics if topic for link in topic.publication.links)
+
+    def print(self, text: str, end: str = "\n") -> None:
+        """See :meth:`Stage.print`."""
+        with contextlib.suppress(OSError, ValueError):
+            if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
+                # The status line, written again and again in its place.
+                sys.stdout.write_own(text)
+                text = ""
+            print(text, end=end, flush=True)
+
+    def _advertise(self, number: int, connection: Connection) -> None:
+        topic = self._options.prefix + connection.topic
+        known = self._publishers.get(topic)
+        if known is None:
+            late = _LateSubscribers()
+            publisher = client.Publisher(
+                topic,
+                frame_class(connection.type, connection.md5sum, connection.definition),
+                subscriber_listener=late,
+                latch=connection.latching,
+                queue_size=self._options.queue_size,
+            )
+            known = self._publishers[topic] = publisher, late
+
+        publisher, late = known
+        if publisher.md5sum != connection.md5sum:
+            client.logerr(
+                "Tried to advertise on topic [%s] with md5sum [%s] and datatype [%s], but the topic is already "
+                "advertised as md5sum [%s] and datatype [%s]. These messages are left out",
+                topic,
+                connection.md5sum,
+                connection.type,
+                publisher.md5sum,
+                publisher.type,
+            )
+            self._outlets[number, connection.id] = None
+            return
+        if connection.latching and publisher.impl:
+            publisher.impl.enable_latch()
+        outlet = self._outlets[number, connection.id] = _Outlet(publisher, connection.latching)
+        late.outlets.append(outlet)
+
+    def _on_rate_control(self, message: ReceivedFrame, player: Controls) -> None:
+        if self._is_header_first is None:
+            definition = message._connection_header.get("message_definition", "")
+            self._is_header_first = _starts_with_header(definition)
+        frame = message.frame
+        if not self._is_header_first or len(frame) < _STAMP.size:
+            print("\nWARNING: Rate control topic is bad, header is not first. MSG may be malformed.")
+            return
+        secs, nsecs = _STAMP.unpack_from(frame)
+        player.control_rate(secs * _SECOND + nsecs)
+
+
+def _clock_type() -> tuple[str, str, str]:
+    from rosgraph_msgs.msg import Clock
+
+    return Clock._type, Clock._md5sum, Clock._full_text
+
+
+def _starts_with_header(definition: str) -> bool:
+    lines: Iterable[str] = (line.strip() for line in definition.splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
+    return first.startswith(("Header ", "std_msgs/Header "))

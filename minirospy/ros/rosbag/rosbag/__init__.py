@@ -1,0 +1,33 @@
+"""rosbag: bags, read and written, and migrated to newer message types. Source: http://wiki.ros.org/rosbag/Code%20API."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from minirospy.ros.rosbag.rosbag.bag import (
+    Bag,
+    Compression,
+    ROSBagException,
+    ROSBagFormatException,
+    ROSBagUnindexedException,
+)
+from minirospy.ros.submodules import on_first_use
+
+__all__ = [
+    "Bag",
+    "Compression",
+    "ROSBagException",
+    "ROSBagFormatException",
+    "ROSBagUnindexedException",
+    "rosbagmain",
+]
+
+__getattr__ = on_first_use("rosbag", "bag", "migration", "rosbag_main")
+
+
+def rosbagmain(argv: Sequence[str] | None = None) -> int:
+    """Run the command rosbag with ``argv``, whose first word is the program's name; return its exit status."""
+    from minirospy.ros.rosbag.commands import rosbag
+
+    return rosbag.main((sys.argv if argv is None else argv)[1:])

@@ -1,0 +1,488 @@
+"""rosbag.bag: bags that programs read and write. Source: http://wiki.ros.org/rosbag/Code%20API.
+
+Compared with the real module: opening a bag reads its chunk infos only, the index is kept in 16 bytes a message, and
+messages come in the order of time whatever the order in the file. Two types on one topic get two connections.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections import namedtuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from minirospy.base.errors import BagCompressionError, BagError
+from minirospy.core.bag import compression as compressions
+from minirospy.core.bag import info
+from minirospy.core.bag.reader import ChunkedReader
+from minirospy.core.bag.reader12 import Reader12
+from minirospy.core.bag.repair import Repair
+from minirospy.ros.rosbag.rosbag.exceptions import (
+    ROSBagEncryptException,
+    ROSBagEncryptNotSupportedException,
+    ROSBagException,
+    ROSBagFormatException,
+    ROSBagUnindexedException,
+    as_ros_errors,
+    raise_as_ros,
+)
+from minirospy.ros.rosbag.rosbag.internals import _ConnectionInfo, _get_message_type
+from minirospy.ros.rosbag.rosbag.opening import CLOSED, FileArgument, OpenedBag
+from minirospy.ros.rosbag.rosbag.private import (
+    BagMessage,
+    BagMessageWithConnectionHeader,
+    ConnectionFilter,
+    nanoseconds_of,
+)
+from minirospy.ros.rosbag.rosbag.readers import _BagReader, _BagReader200
+
+if TYPE_CHECKING:
+    from minirospy.base.times import Time
+    from minirospy.core.idl.protocols import Message
+
+__all__ = [
+    "Bag",
+    "BagMessage",
+    "BagMessageWithConnectionHeader",
+    "Compression",
+    "ROSBagEncryptException",
+    "ROSBagEncryptNotSupportedException",
+    "ROSBagException",
+    "ROSBagFormatException",
+    "ROSBagUnindexedException",
+    "found_lz4",
+]
+
+found_lz4 = True
+"""That LZ4 can be read and written, for programs that look."""
+
+
+class Compression:
+    """The compression of the chunks of a bag."""
+
+    NONE = compressions.NONE
+    BZ2 = compressions.BZ2
+    LZ4 = compressions.LZ4
+
+
+CompressionTuple = namedtuple("CompressionTuple", ["compression", "uncompressed", "compressed"])
+TopicTuple = namedtuple("TopicTuple", ["msg_type", "message_count", "connections", "frequency"])
+TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
+
+
+class _Pieces(list[bytes]):
+    """The buffer that a message's ``serialize`` writes to."""
+
+    __slots__ = ()
+    write = list.append
+
+
+class Options(TypedDict, total=False):
+    """The options of the next chunks."""
+
+    compression: str
+    chunk_threshold: int
+
+
+class Bag(OpenedBag):
+    """A bag that is read, written or appended to.
+
+    ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` in bytes.
+    ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may hold compression
+    and chunk_threshold. ``skip_index``: the info text shows no rates. Raise ValueError, ROSBagException, OSError.
+    """
+
+    def __init__(
+        self,
+        f: FileArgument,
+        mode: str = "r",
+        compression: str = Compression.NONE,
+        chunk_threshold: int = 768 * 1024,
+        allow_unindexed: bool = False,
+        options: Options | None = None,
+        skip_index: bool = False,
+    ) -> None:
+        if options is not None:
+            if type(options) is not dict:
+                raise ValueError("options must be of type dict")
+            compression = options.get("compression", compression)
+            chunk_threshold = options.get("chunk_threshold", chunk_threshold)
+        super().__init__(mode, _checked_compression(compression), _checked_threshold(chunk_threshold))
+        self._skip_index = skip_index
+        self._written: dict[tuple[str, str], int] = {}
+        """The connections of this program's messages, by topic and md5sum."""
+        self._pieces = _Pieces()
+
+        if not f:
+            raise ValueError("filename (or stream) is invalid")
+        opening = {"r": self._open_read, "w": self._open_write, "a": self._open_append}
+        if mode not in opening:
+            raise ValueError(f'mode "{mode}" is invalid')
+        try:
+            with as_ros_errors():
+                opening[mode](f, allow_unindexed)
+            self._create_reader()
+            # Ours reads the index when it is needed; a reader of the program's own may show its progress now.
+            if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
+                self._reader.prepare()
+            self._connection_indexes_read = not skip_index
+        except BaseException:
+            self._version = None
+            self._close_file()
+            raise
+
+    def __iter__(self) -> Iterator[BagMessage]:
+        return self.read_messages()
+
+    def __enter__(self) -> Bag:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def options(self) -> Options:
+        """The compression and the chunk threshold."""
+        return {"compression": self._compression, "chunk_threshold": self._chunk_threshold}
+
+    @property
+    def filename(self) -> str | os.PathLike[str] | None:
+        """The path that was given, None for a file object."""
+        return self._filename
+
+    @property
+    def version(self) -> int | None:
+        """The version: 200 for 2.0."""
+        return self._version
+
+    @property
+    def mode(self) -> str:
+        """Return the mode in which the bag was opened: r, w or a."""
+        return self._mode
+
+    @property
+    def size(self) -> int:
+        """The size of the file in bytes. Raise ValueError if the bag is closed."""
+        stream = self._open_file()
+        position = stream.tell()
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(position)
+        return size
+
+    @property
+    def compression(self) -> str:
+        """Return the compression of the next chunks. Raise ValueError."""
+        return self._compression
+
+    @compression.setter
+    def compression(self, compression: str) -> None:
+        compression = _checked_compression(compression)
+        self.flush()
+        self._compression = compression
+        if self._writer:
+            self._writer.compression = compression
+
+    @property
+    def chunk_threshold(self) -> int:
+        """Bytes after which a chunk is complete, before compression. Raise ValueError."""
+        return self._chunk_threshold
+
+    @chunk_threshold.setter
+    def chunk_threshold(self, chunk_threshold: int) -> None:
+        chunk_threshold = _checked_threshold(chunk_threshold)
+        self.flush()
+        self._chunk_threshold = chunk_threshold
+        if self._writer:
+            self._writer.chunk_threshold = chunk_threshold
+
+    def read_messages(
+        self,
+        topics: str | Iterable[str] | None = None,
+        start_time: Time | None = None,
+        end_time: Time | None = None,
+        connection_filter: ConnectionFilter | None = None,
+        raw: bool = False,
+        return_connection_header: bool = False,
+    ) -> Iterator[Any]:
+        """Yield BagMessage(topic, message, timestamp) in the order of time.
+
+        ``topics``: one or several, none or an empty list for all; ``start_time`` and ``end_time`` are included;
+        ``connection_filter(topic, type, md5sum, definition, header)`` selects connections. ``raw``: messages are tuples
+        of type, bytes, md5sum, position and class. ``return_connection_header``: as BagMessageWithConnectionHeader.
+        Raise ValueError if the bag is closed, ROSBagException where it is damaged.
+        """
+        self.flush()
+        self._current().prepare()
+        connections = list(self._get_connections(topics, connection_filter))
+        start, end = nanoseconds_of(start_time), nanoseconds_of(end_time)
+        return self._read(connections, start, end, raw=raw, with_header=return_connection_header)
+
+    def flush(self) -> None:
+        """Write the current chunk to the file. Raise ValueError if the bag is closed."""
+        stream = self._open_file()
+        if self._writer:
+            stream.seek(0, os.SEEK_END)
+            with as_ros_errors():
+                self._writer.flush()
+
+    def write(
+        self,
+        topic: str,
+        msg: Any,
+        t: Time | None = None,
+        raw: bool = False,
+        connection_header: Mapping[str, str | bytes] | None = None,
+    ) -> None:
+        """Write a message that came at ``t``, by default now.
+
+        ``raw``: the message is a tuple of type, bytes, md5sum, (position,) and class. ``connection_header`` is stored
+        with the first message of a topic and type. Raise ValueError, ROSBagException, OSError.
+        """
+        if self._file is None:
+            raise ValueError(CLOSED)
+        if not topic:
+            raise ValueError("topic is invalid")
+        if not msg:
+            raise ValueError("msg is invalid")
+        writer = self._writer
+        if writer is None:
+            raise self._not_writable()
+        nanoseconds = time.time_ns() if t is None else t.secs * 1_000_000_000 + t.nsecs
+        if isinstance(topic, bytes):
+            topic = topic.decode()
+
+        if raw:
+            if len(msg) not in (4, 5):
+                raise ValueError("msg must be of length 4 or 5")
+            body, md5sum = msg[1], msg[2]
+        else:
+            pieces = self._pieces
+            pieces.clear()
+            msg.serialize(pieces)
+            body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
+            md5sum = msg._md5sum
+        if type(body) is not bytes:
+            # A body that is not bytes must fail before a part of it is in the chunk.
+            body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
+
+        number = self._written.get((topic, md5sum))
+        try:
+            if number is None:
+                header = connection_header or (
+                    _raw_header(topic, msg[0], md5sum, msg[-1]) if raw else _header(topic, type(msg))
+                )
+                number = writer.add_connection(topic, header)
+                self._written[topic, md5sum] = number
+            if self._is_read:
+                # A read in between has moved the position.
+                self._file.seek(0, os.SEEK_END)
+            writer.write(number, nanoseconds, body)
+        except BagError as error:
+            raise_as_ros(error)
+
+    def reindex(self) -> Iterator[int]:
+        """Make the index again; yield the positions that are read, to show the progress.
+
+        What cannot be recovered is cut off where the bag was opened to append.
+        """
+        if self._version and self._version < 200:
+            reader = self._source
+            if isinstance(reader, Reader12):
+                yield from reader.scan()
+            return
+
+        stream = self._open_file()
+        repair = Repair(stream)
+        with as_ros_errors():
+            yield from repair.run()
+            self._source = ChunkedReader(
+                stream, repair.connections, repair.chunks, headers=dict(repair.headers)
+            )
+            if self._mode != "r":
+                repair.apply()
+                self._start_appending(repair.connections, repair.chunks, repair.end)
+
+    def close(self) -> None:
+        """Close the bag. Closing it again has no effect. Raise OSError."""
+        if self._file is None:
+            return
+        try:
+            if self._writer:
+                self._file.seek(0, os.SEEK_END)
+                with as_ros_errors():
+                    self._writer.close()
+        finally:
+            self._close_file()
+
+    def get_compression_info(self) -> CompressionTuple:
+        """Return the most frequent compression, and the sizes of all chunks: compression, uncompressed, compressed."""
+        with as_ros_errors():
+            stored = info.compression_of(self._current())
+        name = stored[0].compression if stored else self.compression
+        return CompressionTuple(
+            name, sum(each.size for each in stored), sum(each.compressed_size for each in stored)
+        )
+
+    def get_message_count(self, topic_filters: str | list[str] | None = None) -> int:
+        """Return the number of messages, on all or on these topics."""
+        if topic_filters is not None:
+            topics = self.get_type_and_topic_info(topic_filters).topics.values()
+            return sum(topic.message_count for topic in topics)
+        return self._summary(frequencies=False).messages
+
+    def get_start_time(self) -> float:
+        """Return the time of the first message in seconds. Raise ROSBagException if there is none."""
+        return self._times()[0]
+
+    def get_end_time(self) -> float:
+        """Return the time of the last message in seconds. Raise ROSBagException if there is none."""
+        return self._times()[1]
+
+    def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
+        """Return (msg_types, topics): md5sums by type, and (msg_type, message_count, connections, frequency) by topic."""
+        if self._file is None and self._filename is not None:
+            with Bag(self._filename, skip_index=self._skip_index) as bag:
+                return bag.get_type_and_topic_info(topic_filters)
+        summary = self._summary(frequencies=not self._skip_index)
+        topics = {
+            each.name: TopicTuple(each.type, each.messages, each.connections, each.frequency)
+            for each in summary.topics
+        }
+        if topic_filters is not None:
+            wanted = topic_filters if isinstance(topic_filters, list) else [topic_filters]
+            connected = {each.topic for name in wanted for each in self._get_connections(name)}
+            topics = {name: each for name, each in topics.items() if name in connected}
+        return TypesAndTopicsTuple(dict(summary.types), topics)
+
+    def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
+        """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
+
+        Raise ROSBagException where the bag already has chunks, as the real module does.
+        """
+        if self._current().chunks:
+            raise ROSBagException("Cannot set encryptor after chunks are written")
+        if encryptor == "rosbag/AesCbcEncryptor":
+            raise ROSBagEncryptNotSupportedException(f"encryption by [{encryptor}] is not supported")
+
+    def __str__(self) -> str:
+        return info.as_text(self._summary(frequencies=not self._skip_index))
+
+    def _get_yaml_info(self, key: str | None = None) -> str | None:
+        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None where it does not exist."""
+        text = info.as_yaml(self._summary(frequencies=not self._skip_index))
+        if not key:
+            return text
+        try:
+            return info.value_of(text, key)
+        except LookupError:
+            print(f'Error getting key "{key}"', file=sys.stderr)
+            return None
+
+    def _create_reader(self) -> None:
+        """Make ``_reader``, by which programs reach into the bag; a derived class may put another one there."""
+        self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _read(
+        self,
+        connections: Sequence[_ConnectionInfo],
+        start: int | None,
+        end: int | None,
+        *,
+        raw: bool,
+        with_header: bool,
+    ) -> Iterator[Any]:
+        """Yield the messages of these connections."""
+        from minirospy.client.time import Time
+
+        kinds: list[type[Message] | None] = [None] * len(connections)
+        new_time, new_message, new_tuple = Time.__new__, object.__new__, tuple.__new__
+        message: object
+        try:
+            for chunk, data, found in self._current().blocks([each.id for each in connections], start, end):
+                for nanoseconds, rank, at, body, after in found:
+                    connection = connections[rank]
+                    kind = kinds[rank]
+                    if kind is None:
+                        kind = kinds[rank] = _get_message_type(connection)
+                    # The steps of a constructor are not called a million times: deserialize sets every field.
+                    if raw:
+                        position = at if chunk is None else (chunk, at)
+                        message = connection.datatype, data[body:after], connection.md5sum, position, kind
+                    else:
+                        message = new_message(kind)
+                        message.deserialize(data[body:after])
+                    stamp = new_time(Time)
+                    stamp.secs, stamp.nsecs = divmod(nanoseconds, 1_000_000_000)
+                    if with_header:
+                        yield BagMessageWithConnectionHeader(
+                            connection.topic, message, stamp, connection.header
+                        )
+                    else:
+                        yield new_tuple(BagMessage, (connection.topic, message, stamp))
+        except BagError as error:
+            raise_as_ros(error)
+
+    def _summary(self, *, frequencies: bool) -> info.Summary:
+        # The real module still has it in memory when the bag is closed.
+        if self._file is None and self._filename is not None:
+            with Bag(self._filename, skip_index=True) as bag:
+                return bag._summary(frequencies=frequencies)
+        path = None if self._filename is None else os.fspath(self._filename)
+        if self._writer:
+            self.flush()
+        with as_ros_errors():
+            return info.summarize(self._current(), path, frequencies=frequencies)
+
+    def _times(self) -> tuple[float, float]:
+        summary = self._summary(frequencies=False)
+        if summary.start is None or summary.end is None:
+            raise ROSBagException("Bag contains no message")
+        return summary.start, summary.end
+
+
+def _checked_compression(compression: str) -> str:
+    try:
+        compressions.check_compression(compression)
+    except BagCompressionError as error:
+        text = f"compression must be one of: {', '.join(compressions.COMPRESSIONS)}"
+        if compression in compressions.COMPRESSIONS:
+            text = str(error)
+        raise ValueError(text) from error
+    return compression
+
+
+def _checked_threshold(threshold: int) -> int:
+    if threshold < 0:
+        raise ValueError("chunk_threshold must be greater than or equal to zero")
+    return threshold
+
+
+def _header(topic: str, kind: type[Message]) -> dict[str, str]:
+    return {
+        "topic": topic,
+        "type": kind._type,
+        "md5sum": kind._md5sum,
+        "message_definition": kind._full_text,
+    }
+
+
+def _raw_header(topic: str, type_: str, md5sum: str, kind: type[Message] | None) -> dict[str, str]:
+    if kind is None:
+        from minirospy.core.idl.load import get_message_class
+
+        kind = get_message_class(type_)
+    if kind is None:
+        raise ROSBagException(f"cannot locate message class and no message class provided for [{type_}]")
+    if kind._md5sum != md5sum:
+        print(
+            f"WARNING: md5sum of loaded type [{type_}] does not match that specified",
+            file=sys.stderr,
+        )
+    return _header(topic, kind) | {"type": type_, "md5sum": md5sum}

@@ -1,0 +1,68 @@
+"""rosbag.migration: messages of types that have changed. Source: http://wiki.ros.org/rosbag/migration."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from minirospy.ros.rosbag.migration.bags import check_bag, check_classes, fix_bag
+from minirospy.ros.rosbag.migration.rules import (
+    BagMigrationException,
+    MessageUpdateRule,
+    clean_name,
+    constants_from_def,
+    get_message_key,
+    get_path_key,
+    migration_default_value,
+    qualified_name,
+)
+from minirospy.ros.rosbag.migration.rules_files import MessageMigrator, Migration, RuleChain, ScaffoldNode
+from minirospy.ros.rosbag.rosbag.exceptions import as_ros_errors
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.protocols import Message
+
+__all__ = [
+    "BagMigrationException",
+    "MessageMigrator",
+    "MessageUpdateRule",
+    "RuleChain",
+    "ScaffoldNode",
+    "checkbag",
+    "checkmessages",
+    "clean_name",
+    "constants_from_def",
+    "fixbag",
+    "fixbag2",
+    "get_message_key",
+    "get_path_key",
+    "migration_default_value",
+    "qualified_name",
+]
+
+
+def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
+    """Return the path of each type that is to be migrated, and the rules of it that are missing. Raise ROSBagException."""
+    with as_ros_errors():
+        return check_bag(migrator, inbag, _warn)
+
+
+def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
+    """Return the same for message classes."""
+    return check_classes(migrator, messages)
+
+
+def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
+    """Write a bag again with its messages migrated; return whether all could be. Raise ROSBagException."""
+    return not fixbag2(migrator, inbag, outbag)
+
+
+def fixbag2(migrator: MessageMigrator, inbag: str, outbag: str, force: bool = False) -> list[Migration]:
+    """Write a bag again with its messages migrated; return the migrations that have no rule. Raise ROSBagException."""
+    with as_ros_errors():
+        return fix_bag(migrator, inbag, outbag, _warn, force=force)
+
+
+def _warn(line: str) -> None:
+    print(line, file=sys.stderr)

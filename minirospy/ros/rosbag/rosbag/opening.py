@@ -1,0 +1,128 @@
+"""The file of a rosbag.Bag: opened to read, write or append, and who reads or writes it."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any, BinaryIO, TypeAlias, cast
+
+from minirospy.base.errors import BagUnindexedError
+from minirospy.core.bag.base import BagReader
+from minirospy.core.bag.reader import ChunkedReader, open_bag
+from minirospy.core.bag.reader12 import unindexed_bag12
+from minirospy.core.bag.records import ChunkInfo, Connection, read_version
+from minirospy.core.bag.writer import BagWriter, Continued
+from minirospy.ros.rosbag.rosbag.exceptions import ROSBagException, ROSBagUnindexedException
+from minirospy.ros.rosbag.rosbag.private import PrivateBag
+
+__all__ = ["CLOSED", "FileArgument", "OpenedBag"]
+
+FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
+"""What a bag is read from or written to: a path or an open file."""
+
+CLOSED = "I/O operation on closed bag"
+
+
+class OpenedBag(PrivateBag):
+    """The state of a bag: its file, and the reader or writer of it."""
+
+    def __init__(self, mode: str, compression: str, chunk_threshold: int) -> None:
+        self._compression = compression
+        self._chunk_threshold = chunk_threshold
+        self._file: BinaryIO | None = None
+        self._filename: str | os.PathLike[str] | None = None
+        self._version: int | None = None
+        self._mode = mode
+        self._source: BagReader | None = None
+        """What reads the file; ``_reader`` is the real module's name for what a program may replace."""
+        self._writer: BagWriter | None = None
+        self._is_read = False
+        """Whether the file's position may be another than the writer left."""
+
+    def _current(self) -> BagReader:
+        """Return the reader, which also knows what has been written so far."""
+        stream = self._open_file()
+        reader = self._source
+        if reader is None:
+            reader = self._source = ChunkedReader(stream, {}, self._writer.chunks if self._writer else [])
+        if self._writer:
+            self._is_read = True
+            for connection in self._writer.connections:
+                reader.connections.setdefault(connection.id, connection)
+        return reader
+
+    def _open_read(self, f: FileArgument, allow_unindexed: bool) -> None:
+        stream = self._file = self._take(f, "rb")
+        position = stream.tell()
+        self._version = read_version(stream)
+        stream.seek(position)
+        try:
+            self._source = open_bag(stream)
+        except BagUnindexedError:
+            if not allow_unindexed:
+                raise
+            if self._version < 200:
+                stream.seek(position)
+                self._source = unindexed_bag12(stream)
+
+    def _open_write(self, f: FileArgument, allow_unindexed: bool) -> None:
+        self._file = self._take(f, "w+b")
+        self._version = 200
+        self._writer = BagWriter(
+            self._file, compression=self._compression, chunk_threshold=self._chunk_threshold
+        )
+
+    def _open_append(self, f: FileArgument, allow_unindexed: bool) -> None:
+        if isinstance(f, (str, os.PathLike)) and not os.path.exists(f):
+            self._open_write(f, allow_unindexed)
+            return
+        stream = self._file = self._take(f, "r+b")
+        position = stream.tell()
+        self._version = read_version(stream)
+        if self._version != 200:
+            raise ROSBagException(f"bag version {self._version} is unsupported for appending")
+        stream.seek(position)
+        try:
+            reader = open_bag(stream)
+        except BagUnindexedError:
+            if not allow_unindexed:
+                raise
+            return
+        assert isinstance(reader, ChunkedReader)
+        self._start_appending(reader.connections, reader.chunks, reader.index_position)
+
+    def _start_appending(
+        self, connections: Mapping[int, Connection], chunks: Iterable[ChunkInfo], position: int
+    ) -> None:
+        self._writer = BagWriter(
+            self._open_file(),
+            compression=self._compression,
+            chunk_threshold=self._chunk_threshold,
+            continued=Continued(connections.values(), chunks, position),
+        )
+        self._source = None
+
+    def _take(self, f: Any, mode: str) -> BinaryIO:
+        """Return the open file, or open a path."""
+        if not isinstance(f, io.IOBase):
+            self._filename = f
+            return cast("BinaryIO", open(f, mode))
+        if isinstance(f, io.TextIOBase):
+            raise ROSBagException("In Python 3 the bag file must be opened in binary mode")
+        return cast("BinaryIO", f)
+
+    def _open_file(self) -> BinaryIO:
+        if self._file is None:
+            raise ValueError(CLOSED)
+        return self._file
+
+    def _not_writable(self) -> Exception:
+        return io.UnsupportedOperation("write") if self._mode == "r" else ROSBagUnindexedException()
+
+    def _close_file(self) -> None:
+        if self._source:
+            self._source.close()
+        if self._file is not None:
+            self._file.close()
+            self._file = None

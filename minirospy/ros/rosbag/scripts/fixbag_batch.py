@@ -1,0 +1,8 @@
+#!/usr/bin/env python3
+"""`rosrun rosbag fixbag_batch.py`, as ROS's package has it; see http://wiki.ros.org/rosbag."""
+
+import sys
+
+from minirospy.ros.rosbag.commands.rosbag_scripts import main
+
+sys.exit(main("fixbag_batch.py"))

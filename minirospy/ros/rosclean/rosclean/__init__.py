@@ -1,0 +1,32 @@
+"""rosclean: how much log files take. Source: http://wiki.ros.org/rosclean."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.ros.rosclean.commands.rosclean import disk_usage, human_size, main
+
+__all__ = ["CleanupException", "get_disk_usage", "get_human_readable_disk_usage", "rosclean_main"]
+
+
+class CleanupException(Exception):
+    """The size of a folder cannot be determined."""
+
+
+def get_disk_usage(d: str) -> int:
+    """Return the bytes that a folder takes. Raises CleanupException."""
+    if not isinstance(d, str | Path) or not Path(d).is_dir():
+        raise CleanupException(f"[{d}] is not a folder")
+    return disk_usage(Path(d))
+
+
+def get_human_readable_disk_usage(d: str) -> str:
+    """Return the bytes that a folder takes, as `du -h` prints them. Raises CleanupException."""
+    return human_size(get_disk_usage(d))
+
+
+def rosclean_main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; ``argv`` starts with its name. Return its exit status."""
+    return main(list(sys.argv if argv is None else argv)[1:])

@@ -1,0 +1,85 @@
+"""Names, with rosgraph's function names. Source: http://wiki.ros.org/Names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from minirospy.base import names as _names
+from minirospy.ros.ros_names import (
+    canonicalize_name,
+    get_ros_namespace,
+    is_global,
+    is_private,
+    make_global_ns,
+    namespace,
+    ns_join,
+)
+
+__all__ = [
+    "ANYTYPE",
+    "BASE_NAME_LEGAL_CHARS_P",
+    "MSG_EXT",
+    "NAME_LEGAL_CHARS_P",
+    "REMAP_PATTERN",
+    "SRV_EXT",
+    "anonymous_name",
+    "is_legal_base_name",
+    "is_legal_name",
+    "is_legal_remap",
+    "make_caller_id",
+    "resolve_name",
+    "script_resolve_name",
+]
+
+ANYTYPE = "*"
+MSG_EXT = ".msg"
+SRV_EXT = ".srv"
+NAME_LEGAL_CHARS_P = re.compile(r"^[\~\/A-Za-z][\w\/]*$")
+BASE_NAME_LEGAL_CHARS_P = re.compile(r"^[A-Za-z][\w]*$")
+REMAP_PATTERN = re.compile(r"^([\~\/A-Za-z]|_|__)[\w\/]*:=.*")
+
+
+def is_legal_remap(arg: str | None) -> bool:
+    """Return whether an argument of a command line is a remapping."""
+    return arg is not None and REMAP_PATTERN.match(arg) is not None
+
+
+def is_legal_name(name: str | None) -> bool:
+    """Return whether a name may be one of the graph."""
+    return name is not None and _names.is_legal_name(name)
+
+
+def is_legal_base_name(name: str | None) -> bool:
+    """Return whether a name may be one of the graph, without namespaces."""
+    return name is not None and _names.is_legal_base_name(name)
+
+
+def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
+    """Return the global name of ``name`` as the node ``namespace_`` sees it, remapped."""
+    name = canonicalize_name(name)
+    if not is_global(name) and not is_private(name):
+        # Refuses what is not a name.
+        namespace(namespace_)
+    return _names.resolve(name, namespace_, remappings)
+
+
+def anonymous_name(id: str) -> str:
+    """Return a name that no other node has."""
+    return _names.anonymous_name(id)
+
+
+def make_caller_id(name: str) -> str:
+    """Return a global name in the namespace of the environment, with a trailing slash."""
+    return make_global_ns(ns_join(get_ros_namespace(), name))
+
+
+def script_resolve_name(script_name: str, name: str) -> str:
+    """Return the global name of a name that the command ``script_name`` was given."""
+    if not name:
+        return get_ros_namespace()
+    if is_global(name):
+        return name
+    if is_private(name):
+        return ns_join(make_caller_id(script_name), name[1:])
+    return get_ros_namespace() + name

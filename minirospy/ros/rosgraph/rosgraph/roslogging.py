@@ -1,0 +1,50 @@
+"""rosgraph.roslogging: the handler that logging configuration files name and programs derive from."""
+
+from __future__ import annotations
+
+import logging
+import os
+
+__all__ = ["LoggingException", "RospyLogger", "configure_logging"]
+
+
+class LoggingException(Exception):
+    """Logging cannot be set up."""
+
+
+class RospyLogger(logging.Logger):
+    """A logger of rospy's. Ours finds its caller without help; programs that mend this class find it."""
+
+
+def configure_logging(
+    logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
+) -> str | None:
+    """Log to a file in the log folder; return its path, which is also in ROS_LOG_FILENAME."""
+    from pathlib import Path
+
+    from minirospy.ros.rospkg.rospkg.environment import get_log_dir
+    from minirospy.runtime.master.log_file import LogFileHandler
+
+    path = Path(get_log_dir(env)) / (filename or f"{logname}-{os.getpid()}.log")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = LogFileHandler(path)
+    except OSError as error:
+        raise LoggingException(f"cannot write the log file [{path}]: {error.strerror}") from error
+    handler.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))
+    logging.getLogger().addHandler(handler)
+    logging.getLogger(logname).setLevel(level)
+    os.environ["ROS_LOG_FILENAME"] = str(path)
+    return str(path)
+
+
+# Of ROS's private names those that programs read and change.
+_color_reset = "\033[0m"
+_logging_to_rospy_names = {
+    "DEBUG": ("DEBUG", "\033[32m"),
+    "INFO": ("INFO", None),
+    "WARNING": ("WARN", "\033[33m"),
+    "ERROR": ("ERROR", "\033[31m"),
+    "CRITICAL": ("FATAL", "\033[31m"),
+}
+_defaultFormatter = logging.Formatter()

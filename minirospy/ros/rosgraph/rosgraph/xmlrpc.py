@@ -1,0 +1,109 @@
+"""rosgraph.xmlrpc: an XML-RPC server in a thread, for tools that are nodes by hand.
+
+Our own nodes do not use it; it is based on Python's xmlrpc.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from socketserver import ThreadingMixIn
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+from minirospy.ros.rosgraph.rosgraph.network import create_local_xmlrpc_uri, get_bind_address
+
+__all__ = ["SilenceableXMLRPCRequestHandler", "ThreadingXMLRPCServer", "XmlRpcHandler", "XmlRpcNode"]
+
+_log = logging.getLogger("xmlrpc")
+
+
+class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
+    """A request of HTTP 1.1, logged only if the server wants it."""
+
+    protocol_version = "HTTP/1.1"
+    rpc_paths = ()
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Log a request."""
+        if getattr(self.server, "logRequests", False):
+            super().log_message(format, *args)
+
+
+class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
+    """Answers each connection in a separate thread."""
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, addr: tuple[str, int], log_requests: int = 1) -> None:
+        super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Ignore peers that disconnect; log everything else."""
+        _log.debug("connection from %s", client_address, exc_info=True)
+
+
+class XmlRpcHandler:
+    """The root of what an :class:`XmlRpcNode` serves; names that start with an underscore are not served."""
+
+    def _ready(self, uri: str) -> None:
+        """Handle the start of the server, which listens at ``uri``."""
+
+    def _shutdown(self, reason: str) -> None:
+        """Handle the shutdown of the server."""
+
+
+class XmlRpcNode:
+    """Serves the methods of ``rpc_handler`` from a thread, once :meth:`start` was called; ``uri`` says where.
+
+    ``on_run_error`` is called with what the server's thread ends by.
+    """
+
+    def __init__(
+        self,
+        port: int | str | None = 0,
+        rpc_handler: XmlRpcHandler | None = None,
+        on_run_error: Callable[[Exception], object] | None = None,
+    ) -> None:
+        self.handler = rpc_handler
+        self.uri: str | None = None
+        self.server: ThreadingXMLRPCServer | None = None
+        self.port = int(port) if port and isinstance(port, str) else port
+        self.is_shutdown = False
+        self.on_run_error = on_run_error
+
+    def shutdown(self, reason: str) -> None:
+        """End the server. Idempotent."""
+        if self.is_shutdown:
+            return
+        self.is_shutdown = True
+        if self.server is not None:
+            self.server.shutdown()
+            self.server.server_close()
+        if isinstance(self.handler, XmlRpcHandler):
+            self.handler._shutdown(reason)
+
+    def start(self) -> None:
+        """Serve from a thread."""
+        threading.Thread(target=self.run, daemon=True).start()
+
+    def set_uri(self, uri: str) -> None:
+        """Say where the server is, instead of what the environment gives."""
+        self.uri = uri
+
+    def run(self) -> None:
+        """Serve in this thread until :meth:`shutdown`."""
+        try:
+            self.server = ThreadingXMLRPCServer((get_bind_address(), int(self.port or 0)), log_requests=False)
+            self.port = self.server.server_address[1]
+            self.set_uri(self.uri or create_local_xmlrpc_uri(self.port))
+            self.server.register_multicall_functions()
+            self.server.register_instance(self.handler)
+            if isinstance(self.handler, XmlRpcHandler):
+                self.handler._ready(str(self.uri))
+            self.server.serve_forever(poll_interval=0.1)
+        except Exception as error:  # the thread's edge: reported to the owner of the node
+            if self.on_run_error is None:
+                raise
+            self.on_run_error(error)

@@ -1,0 +1,80 @@
+"""The dependencies of launch files: nodes, files and packages, and those that package.xml does not name.
+
+Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.base.errors import LaunchError
+from minirospy.ros.roslaunch.launcher.arg_docs import describe_args
+from minirospy.ros.roslaunch.launcher.load import LaunchSource, Problems, load_sources
+from minirospy.workspace.manifest import Kind, read_manifest
+from minirospy.workspace.packages import Packages, package_name
+
+__all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
+
+
+class FileNeeds(NamedTuple):
+    """The dependencies of one launch file: the (package, program) of its nodes, the files that it includes, all packages."""
+
+    nodes: tuple[tuple[str, str], ...]
+    includes: tuple[str, ...]
+    packages: tuple[str, ...]
+
+
+def file_needs(
+    files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
+) -> dict[str, FileNeeds]:
+    """Return the needs of each launch file, and of those that they include. Raises LaunchError.
+
+    An arg without a value or a missing parameter file is not an error: they may be generated later. ``warn``
+    is called for each file that cannot be included.
+    """
+    sources = []
+    for file in files:
+        unset = {arg.name: "" for arg in describe_args(file) if arg.default is None}
+        sources.append(LaunchSource(file, None, unset))
+    problems: Problems = []
+    spec = load_sources(sources, packages, problems=problems)
+    for problem in problems:
+        if problem.text.startswith("cannot include"):
+            warn(problem)
+    needs: dict[str, FileNeeds] = {}
+    for file in dict.fromkeys([*files, *(inner for _, inner in spec.includes)]):
+        nodes = tuple(
+            dict.fromkeys((node.package, node.type) for node in spec.runnables() if node.file == file)
+        )
+        includes = tuple(dict.fromkeys(inner for outer, inner in spec.includes if outer == file))
+        called = [*(package for package, _ in nodes), *(package_of(inner) or "" for inner in includes)]
+        needs[file] = FileNeeds(nodes, includes, tuple(dict.fromkeys(filter(None, called))))
+    return needs
+
+
+def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
+    """Return the packages that launch files need and the package.xml of their package does not name, by package, sorted.
+
+    ``tests``: what it names for tests counts, too. Raises ManifestError.
+    """
+    found: dict[str, set[str]] = {}
+    for file, what in needs.items():
+        folder = _package_folder(file)
+        if folder is None:
+            continue
+        manifest = read_manifest(folder / "package.xml")
+        declared = {manifest.name, *manifest.depends(Kind.EXEC, *([Kind.TEST] if tests else []))}
+        found.setdefault(manifest.name, set()).update(set(what.packages) - declared)
+    return {package: sorted(missing) for package, missing in found.items() if missing}
+
+
+def package_of(file: str) -> str | None:
+    """Return the package that a file belongs to."""
+    folder = _package_folder(file)
+    return package_name(folder) if folder else None
+
+
+def _package_folder(file: str) -> Path | None:
+    return next((folder for folder in Path(file).resolve().parents if package_name(folder)), None)

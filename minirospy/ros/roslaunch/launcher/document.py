@@ -1,0 +1,170 @@
+"""The text of a launch file -> its tags, each with its line. Pure.
+
+Source: http://wiki.ros.org/roslaunch/XML.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+from minirospy.base.errors import LaunchError, NotFoundError
+from minirospy.base.suggestions import nearest
+from minirospy.base.xml_text import XmlElement as Element
+from minirospy.base.xml_text import XmlError, XmlSyntaxError, parse_xml
+from minirospy.ros.roslaunch.launcher.substitution import Substitution, SubstitutionError
+
+__all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
+
+_N = TypeVar("_N", int, float)
+_NODE = [
+    "pkg", "type", "name", "args", "machine", "respawn", "respawn_delay", "required", "ns", "clear_params", "output",
+    "cwd", "launch-prefix",
+]  # fmt: skip
+ATTRIBUTES: dict[str, frozenset[str]] = {
+    tag: frozenset({*names, "if", "unless"})
+    for tag, names in {
+        "launch": ["deprecated"],
+        "arg": ["name", "value", "default", "doc"],
+        "param": ["name", "value", "type", "textfile", "binfile", "command"],
+        "rosparam": ["command", "file", "param", "ns", "subst_value"],
+        "node": _NODE,
+        "test": [*_NODE, "test-name", "time-limit", "retry"],
+        "remap": ["from", "to"],
+        "env": ["name", "value"],
+        "group": ["ns", "clear_params"],
+        "include": ["file", "ns", "clear_params", "pass_all_args"],
+        "machine": ["name", "address", "env-loader", "ssh-port", "user", "password", "default", "timeout"],
+        "master": ["auto", "type", "uri"],
+    }.items()
+}
+"""Each tag, and the attributes that it may have."""
+
+_TRUTH = {"true": True, "false": False}
+_CONDITIONS = {**_TRUTH, "1": True, "0": False}
+
+
+def parse_document(text: bytes, file: str) -> Element:
+    """Return the ``<launch>`` of a launch file. Raises LaunchError."""
+    try:
+        root = parse_xml(text)
+    except XmlSyntaxError as error:
+        raise LaunchError(file, error.line, f"Invalid roslaunch XML syntax: {error.why}") from None
+    except XmlError as error:
+        raise LaunchError(file, error.line, error.why) from None
+    if root.tag != "launch":
+        why = f"Invalid roslaunch XML syntax: no root <launch> tag, but <{root.tag}>"
+        raise LaunchError(file, root.line, why)
+    return root
+
+
+class Tag:
+    """An element with its substitutions made: its attributes as values, its faults with their line."""
+
+    def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
+        self.element = element
+        self.file = file
+        self._substitution = substitution
+
+    @property
+    def name(self) -> str:
+        """The name behind the ``<``."""
+        return self.element.tag
+
+    @property
+    def line(self) -> int:
+        """The line that it starts on."""
+        return self.element.line
+
+    def children(self) -> Iterator[Tag]:
+        """Return the tags inside."""
+        return (Tag(child, self.file, self._substitution) for child in self.element.children)
+
+    def has(self, key: str) -> bool:
+        """Return whether an attribute is there, empty or not."""
+        return key in self.element.attributes
+
+    def resolve(self, text: str) -> str:
+        """Return a text with its substitutions made. Raises LaunchError."""
+        try:
+            return self._substitution.apply(text)
+        except (SubstitutionError, NotFoundError) as error:
+            raise self.error(str(error)) from error
+
+    def optional(self, key: str) -> str | None:
+        """Return an attribute, substitutions made; None where it is not there. Raises LaunchError."""
+        text = self.element.attributes.get(key)
+        return None if text is None else self.resolve(text)
+
+    def required(self, key: str, *, may_be_empty: bool = False) -> str:
+        """Return an attribute that has to be there. Raises LaunchError."""
+        text = self.optional(key)
+        if text is None:
+            unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
+            near = nearest(key, unknown)
+            hint = f" (there is '{near[0]}')" if near else ""
+            raise self.error(f"<{self.name}> tag is missing required attribute: '{key}'{hint}")
+        if not text and not may_be_empty:
+            raise self.error(f"<{self.name}> tag has an empty '{key}' attribute")
+        return text
+
+    def flag(self, key: str) -> bool:
+        """Return an attribute that is true or false (where it is not there). Raises LaunchError."""
+        text = self.optional(key)
+        if text is None:
+            return False
+        value = _TRUTH.get(text.strip().lower())
+        if value is None:
+            raise self.error(f"invalid bool value for {key}: {text} (it is 'true' or 'false')")
+        return value
+
+    def number(self, key: str, default: float) -> float:
+        """Return an attribute that is a number. Raises LaunchError."""
+        text = self.optional(key)
+        try:
+            return default if text is None else float(text)
+        except ValueError:
+            raise self.error(f"invalid float value for {key}: {text}") from None
+
+    def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
+        """Return an attribute that is a number of a kind; the default where it is empty. Raises LaunchError."""
+        text = self.optional(key)
+        try:
+            return kind(text) if text else default
+        except ValueError:
+            raise self.error(f"'{key}' must be a number: [{text}]") from None
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """Return an attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
+        text = self.optional(key)
+        if text is not None and text not in choices:
+            raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
+        return text or choices[0]
+
+    def applies(self) -> bool:
+        """Return the value of its ``if`` or ``unless``. Raises LaunchError."""
+        if self.has("if") and self.has("unless"):
+            raise self.error("cannot set both 'if' and 'unless' on the same tag")
+        for key in ("if", "unless"):
+            text = self.optional(key)
+            if text is not None:
+                value = _CONDITIONS.get(text.strip().lower())
+                if value is None:
+                    raise self.error(
+                        f"{key}: {text} is not a 'bool' type (it is 'true', 'false', '1' or '0')"
+                    )
+                return value == (key == "if")
+        return True
+
+    def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
+        """Warn of each attribute that a tag of this name does not have: most often it is a typing error."""
+        known = ATTRIBUTES[self.name]
+        for key in self.element.attributes:
+            if key not in known:
+                near = nearest(key, known)
+                hint = f": did you mean {' or '.join(near)}?" if near else ""
+                warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
+
+    def error(self, text: str) -> LaunchError:
+        """Return a fault of this tag, to be raised."""
+        return LaunchError(self.file, self.line, text)

@@ -1,0 +1,517 @@
+"""Launch files -> LaunchSpec. Reads files, runs nothing but ``<param command=...>``.
+
+Source: http://wiki.ros.org/roslaunch/XML.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.base import names
+from minirospy.base.errors import LaunchError
+from minirospy.base.suggestions import nearest
+from minirospy.ros.roslaunch.launcher.document import Tag, parse_document
+from minirospy.ros.roslaunch.launcher.files import hidden_hint, near_files, read_bytes, read_launch_file
+from minirospy.ros.roslaunch.launcher.parameters import param_value, rosparam_values
+from minirospy.ros.roslaunch.launcher.spec import (
+    ArgDoc,
+    LaunchSpec,
+    MachineSpec,
+    NodeSpec,
+    ParameterCommand,
+    TestSpec,
+)
+from minirospy.ros.roslaunch.launcher.substitution import Substitution
+from minirospy.workspace.packages import Packages
+
+__all__ = [
+    "STDIN",
+    "LaunchSource",
+    "Problems",
+    "load_files",
+    "load_sources",
+    "load_text",
+]
+
+STDIN = "<stdin>"
+_DEEPEST_INCLUDE = 50
+_MAX_INCLUDES = (
+    10_000  # files that a launch loads; 26 files that include the next one twice would be 67,108,863
+)
+
+Problems = list[LaunchError]
+
+
+class _TooManyIncludesError(LaunchError):
+    """A launch that loads files without end."""
+
+
+class LaunchSource(NamedTuple):
+    """A launch file, its text (None: it is read), and what its args are given."""
+
+    file: str
+    text: bytes | None
+    args: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """The settings that a tag inherits from those around it. ``private``: parameters of every node that follows.
+
+    ``machine`` is the default one. It alone is passed on to what follows the group or include that declares it, too.
+    """
+
+    namespace: str = "/"
+    remaps: tuple[tuple[str, str], ...] = ()
+    env: tuple[tuple[str, str], ...] = ()
+    private: tuple[tuple[str, object], ...] = ()
+    machine: str = ""
+
+
+@dataclass
+class _Args:
+    """The args of a file: ``given`` by name, or ``passed`` on by a file that hands on all its own."""
+
+    given: dict[str, str]
+    passed: dict[str, str] = field(default_factory=dict)
+    declared: set[str] = field(default_factory=set)
+    hands_on_all: bool = False
+
+
+def load_files(
+    files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
+) -> LaunchSpec:
+    """Load launch files one after another, with ``args`` as on the command line. Raises LaunchError."""
+    return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
+
+
+def load_text(
+    text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
+) -> LaunchSpec:
+    """Load one launch file from its text, as from standard input. Raises LaunchError."""
+    return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
+
+
+def load_sources(
+    sources: Sequence[LaunchSource],
+    packages: Packages,
+    environ: Mapping[str, str] | None = None,
+    problems: Problems | None = None,
+) -> LaunchSpec:
+    """Load launch files one after another. Faults are raised (LaunchError), or, with ``problems``, all put there."""
+    spec = LaunchSpec()
+    anonymous: dict[str, str] = {}
+    used: set[str] = set()
+    environ = os.environ if environ is None else environ
+
+    for file, text, args in sources:
+        substitution = Substitution(packages, environ, file, dict(args), anonymous, used)
+        reader = _File(spec, substitution, _Args(dict(args)), 0, problems)
+        try:
+            reader.read(read_launch_file(file) if text is None else text, _Scope())
+        except LaunchError as error:
+            reader.report(error)
+
+    for name in used:
+        # An arg that is used is known, though no <arg> declares it.
+        spec.args.setdefault(name, ArgDoc(name, None, None))
+
+    _check_names(spec, problems)
+    return spec
+
+
+def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
+    seen: dict[str, NodeSpec] = {}
+    # A <test> may be called as a node: it is one only where its program makes it one.
+    for node in spec.nodes:
+        other = seen.setdefault(node.name, node)
+        if other is not node:
+            error = LaunchError(
+                node.file,
+                node.line,
+                f"roslaunch file contains multiple nodes named [{node.name}] "
+                f"(the other one: {other.file}:{other.line})",
+            )
+            if problems is None:
+                raise error
+            problems.append(error)
+
+
+class _File:
+    """Reads one file into the spec that all share. ``problems``: where faults go that are not to be raised."""
+
+    def __init__(
+        self,
+        spec: LaunchSpec,
+        substitution: Substitution,
+        args: _Args,
+        depth: int,
+        problems: Problems | None,
+    ) -> None:
+        self._spec = spec
+        self._file = substitution.file
+        self._substitution = substitution
+        self._args = args
+        self._depth = depth
+        self._problems = problems
+
+        self._tags: dict[str, Callable[[Tag, _Scope], _Scope]] = {
+            "arg": self._arg,
+            "param": self._param,
+            "rosparam": self._rosparam,
+            "node": self._node,
+            "test": self._test,
+            "remap": self._remap,
+            "env": self._env,
+            "group": self._group,
+            "include": self._include,
+            "machine": self._machine,
+            "master": self._master,
+        }
+
+    def read(self, text: bytes, scope: _Scope) -> _Scope:
+        """Read the file's text; return the scope at its end. Raises LaunchError."""
+        path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
+        if path not in self._spec.files:
+            self._spec.files.append(path)
+        root = Tag(parse_document(text, self._file), self._file, self._substitution)
+        root.warn_of_attributes(self._spec.warnings.append)
+        if root.has("deprecated"):
+            self._spec.warnings.append(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
+        for tag in root.children():
+            scope = self._read(tag, scope)
+        return scope
+
+    def report(self, error: LaunchError) -> None:
+        """Raise a fault, or collect it where all are wanted."""
+        if self._problems is None:
+            raise error
+        self._problems.append(error)
+
+    def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
+        """Read a tag; return the scope of those after it."""
+        reader = self._tags.get(tag.name)
+        if reader is None or (allowed is not None and tag.name not in allowed):
+            near = [] if reader else nearest(tag.name, allowed or self._tags)
+            hint = f": did you mean <{near[0]}>?" if near else ""
+            where = "" if allowed is None else " here"
+            self._spec.warnings.append(tag.error(f"unrecognized tag <{tag.name}>{where}{hint}"))
+            return scope
+        tag.warn_of_attributes(self._spec.warnings.append)
+        try:
+            if tag.name == "arg" and not self._depth:
+                # Known, whether its `if` lets it be or not.
+                self._substitution.used.add(tag.element.attributes.get("name", ""))
+            return reader(tag, scope) if tag.applies() else scope
+        except _TooManyIncludesError:
+            # It ends the load: each file that is open would report it once for each of its includes.
+            raise
+        except LaunchError as error:
+            self.report(error)
+            return scope
+
+    # --- args, and what structures a file
+
+    def _arg(self, tag: Tag, scope: _Scope) -> _Scope:
+        name, value, default = _arg_texts(tag)
+        args, values = self._args, self._substitution.args
+        if name in args.declared:
+            raise tag.error(f"arg '{name}' has already been declared")
+        args.declared.add(name)
+
+        if not self._depth and value is None:
+            self._spec.args[name] = ArgDoc(name, default, tag.element.attributes.get("doc"))
+        if value is not None:
+            if name in args.given and not args.hands_on_all:
+                raise tag.error(f"cannot override arg '{name}', which has already been set")
+            values[name] = value
+        elif name in args.given or name in args.passed:
+            values[name] = args.given.get(name, args.passed.get(name, ""))
+        elif default is not None:
+            values[name] = default
+        elif self._depth:
+            self._substitution.unset[name] = f"requires the '{name}' arg to be set: give it in the <include>"
+        else:
+            self._substitution.unset[name] = f"requires the '{name}' arg to be set: add {name}:=VALUE"
+        return scope
+
+    def _group(self, tag: Tag, scope: _Scope) -> _Scope:
+        inner = self._below(tag, scope)
+        self._clear(tag, inner)
+        # An arg that a group declares ends with it.
+        declared, args = set(self._args.declared), dict(self._substitution.args)
+        for child in tag.children():
+            inner = self._read(child, inner)
+        self._args.declared, self._substitution.args = declared, args
+        return replace(scope, machine=inner.machine)
+
+    def _include(self, tag: Tag, scope: _Scope) -> _Scope:
+        file = tag.required("file")
+        if self._depth >= _DEEPEST_INCLUDE:
+            raise tag.error(
+                f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
+            )
+
+        if len(self._spec.includes) >= _MAX_INCLUDES:
+            raise _TooManyIncludesError(
+                self._file,
+                tag.line,
+                f"more than {_MAX_INCLUDES} files are included: do files include others twice?",
+            )
+
+        inner = self._below(tag, scope)
+        self._clear(tag, inner)
+        hands_on_all = tag.flag("pass_all_args")
+        passed = dict(self._substitution.args) if hands_on_all else {}
+        given: dict[str, str] = {}
+        for child in tag.children():
+            if child.name != "arg":
+                inner = self._read(child, inner, ("arg", "env"))
+            elif child.applies():
+                child.warn_of_attributes(self._spec.warnings.append)
+                name, value, default = _arg_texts(child)
+                if name in given and not hands_on_all:
+                    raise child.error(f"arg '{name}' has already been declared")
+                if value is None:
+                    # The value that is handed on goes before a default.
+                    value = given.get(name, passed.get(name, default))
+                if value is None:
+                    raise child.error(f'<arg name="{name}"> of an <include> needs a value')
+                given[name] = value
+        self._spec.includes.append((self._file, file))
+        try:
+            text = read_bytes(file)
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            hint = near_files(file) + hidden_hint(file, self._substitution.packages)
+            raise tag.error(f"cannot include [{file}]: {why}{hint}") from None
+
+        substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
+        args = _Args(given, passed, hands_on_all=hands_on_all)
+        inner = _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
+        unused = set(given) - args.declared
+        if unused and not hands_on_all:
+            raise tag.error(f"unused args [{', '.join(sorted(unused))}] for include of [{file}]")
+        return replace(scope, machine=inner.machine)
+
+    def _remap(self, tag: Tag, scope: _Scope) -> _Scope:
+        pair = (tag.required("from"), tag.required("to"))
+        for key, name in zip(("from", "to"), pair, strict=True):
+            if not names.is_legal_name(names.canonicalize(name)):
+                raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
+        # The last value of a name counts, and comes last.
+        others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
+        return replace(scope, remaps=(*others, pair))
+
+    def _env(self, tag: Tag, scope: _Scope) -> _Scope:
+        pair = (tag.required("name"), tag.required("value", may_be_empty=True))
+        return replace(scope, env=(*scope.env, pair))
+
+    def _machine(self, tag: Tag, scope: _Scope) -> _Scope:
+        for key in ("ros-root", "ros-package-path", "ros-ip", "ros-host-name"):
+            if tag.has(key):
+                raise tag.error(
+                    f"<machine>: '{key}' is not supported since ROS Fuerte: use env-loader instead"
+                )
+        if tag.element.children:
+            child = next(tag.children())
+            raise child.error(f"<machine>: <{child.name}> has no place in it: use env-loader instead")
+
+        timeout = tag.number("timeout", 10.0)
+        if timeout <= 0:
+            raise tag.error(f"'timeout' must be a positive number: [{timeout:g}]")
+        machine = MachineSpec(
+            name=tag.required("name"),
+            address=tag.required("address"),
+            env_loader=tag.optional("env-loader") or "",
+            user=tag.optional("user") or "",
+            password=tag.optional("password") or "",
+            ssh_port=tag.number_or_empty("ssh-port", 22, int),
+            timeout=timeout,
+            file=self._file,
+            line=tag.line,
+        )
+
+        other = self._spec.machines.setdefault(machine.name, machine)
+        if replace(other, file=machine.file, line=machine.line) != machine:
+            where = f"{other.file}:{other.line}"
+            raise tag.error(f"machine [{machine.name}] is declared otherwise at {where}")
+        default = (tag.optional("default") or "false").lower()
+        if default not in ("false", "true", "never"):
+            raise tag.error(f"default must be one of 'false', 'true', 'never', not '{default}'")
+        return replace(scope, machine=machine.name) if default == "true" else scope
+
+    def _master(self, tag: Tag, scope: _Scope) -> _Scope:
+        self._spec.warnings.append(tag.error("ignoring defunct <master /> tag"))
+        return scope
+
+    # --- parameters
+
+    def _param(self, tag: Tag, scope: _Scope) -> _Scope:
+        name = tag.required("name")
+        value = param_value(tag)
+        if names.is_private(name):
+            return replace(scope, private=(*scope.private, (name[1:].lstrip("/"), value)))
+        self._set(tag, names.join(scope.namespace, name), value)
+        return scope
+
+    def _param_of_node(self, tag: Tag, full_name: str) -> None:
+        """All names in a node are its own, whatever they start with."""
+        self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
+
+    def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
+        command = tag.choice("command", ("load", "dump", "delete"))
+        ns, param = tag.optional("ns") or "", tag.optional("param") or ""
+        namespace = names.join(scope.namespace, ns)
+
+        if command == "load":
+            is_private = names.is_private(ns) or (not ns and names.is_private(param))
+            if not is_private:
+                for name, value in rosparam_values(tag, namespace, param):
+                    self._set(tag, name, value)
+                return scope
+            values = rosparam_values(tag, "/" + ns.lstrip("~/"), param.lstrip("~/"))
+            return replace(scope, private=(*scope.private, *((name[1:], value) for name, value in values)))
+
+        name = names.canonicalize(names.join(namespace, param)) or "/"
+        file = tag.optional("file")
+        if command == "delete" and file is not None:
+            raise tag.error("<rosparam>: 'file' attribute is invalid with 'delete' command")
+        if command == "delete" and name == "/":
+            raise tag.error(
+                '<rosparam command="delete"> needs a param or ns: it would delete every parameter'
+            )
+        if command == "dump" and not file:
+            raise tag.error('<rosparam command="dump"> needs a file')
+        self._spec.commands.append(ParameterCommand(name, file))
+        return scope
+
+    def _set(self, tag: Tag, name: str, value: object) -> None:
+        name = names.canonicalize(name)
+        upper = name
+        while upper := upper.rpartition("/")[0]:
+            if upper in self._spec.params and not isinstance(self._spec.params[upper], dict):
+                text = f"parameter [{name}] conflicts with parent parameter [{upper}]"
+                self._spec.warnings.append(tag.error(text))
+        self._spec.params[name] = value
+
+    # --- nodes
+
+    def _node(self, tag: Tag, scope: _Scope) -> _Scope:
+        name = tag.required("name")
+        if not names.is_legal_base_name(name):
+            if "/" in name:
+                raise tag.error(f"node name cannot contain a namespace: [{name}]: use ns")
+            if names.is_private(name):
+                raise tag.error(f"cannot turn [{name}] into a global name")
+            self._spec.warnings.append(
+                tag.error(f"illegal <node> name '{name}': letters, digits and _ alone")
+            )
+        self._spec.nodes.append(self._process(tag, scope, name))
+        return scope
+
+    def _test(self, tag: Tag, scope: _Scope) -> _Scope:
+        for key in ("output", "respawn"):
+            if tag.has(key):
+                raise tag.error(f"<test> tags cannot have '{key}' attribute")
+        test_name = tag.required("test-name", may_be_empty=True)
+        name = tag.optional("name") or test_name
+        if "/" in name:
+            raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
+        if names.is_private(name):
+            raise tag.error(f"cannot turn [{name}] into a global name")
+        node = self._process(tag, scope, name)
+        seconds = tag.number_or_empty("time-limit", 60.0, float)
+        if seconds <= 0:
+            raise tag.error("'time-limit' must be a positive number of seconds")
+        self._spec.tests.append(TestSpec(test_name, node, seconds, tag.number_or_empty("retry", 0, int)))
+        return scope
+
+    def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
+        """Return the attributes that ``<node>`` and ``<test>`` have in common."""
+        required, respawn = tag.flag("required"), tag.flag("respawn")
+        if required and respawn:
+            raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
+
+        scope = self._below(tag, scope)
+        full_name = names.canonicalize(f"{scope.namespace}/{name}")
+        if tag.flag("clear_params"):
+            if not name:
+                raise tag.error("<node> tag must have a 'name' attribute to use 'clear_params' attribute")
+            self._spec.clear.append(full_name)
+        for private, value in scope.private:
+            self._set(tag, f"{full_name}/{private}", value)
+
+        inner = replace(scope, namespace=full_name + "/", private=())
+        for child in tag.children():
+            if child.name == "param":
+                self._read_own_param(child, full_name)
+            else:
+                inner = self._read(child, inner, ("param", "rosparam", "remap", "env"))
+        for private, value in inner.private:
+            self._set(tag, f"{full_name}/{private}", value)
+        return NodeSpec(
+            name=full_name if name else full_name.rstrip("/") + "/",
+            package=tag.required("pkg"),
+            type=tag.required("type"),
+            args=tag.optional("args") or "",
+            output=tag.choice("output", ("log", "screen")) if tag.has("output") else "",
+            respawn=respawn,
+            respawn_delay=tag.number("respawn_delay", 0.0),
+            required=required,
+            cwd=_folder(tag),
+            launch_prefix=tag.optional("launch-prefix") or "",
+            machine=tag.optional("machine") or scope.machine,
+            remaps=inner.remaps,
+            env=inner.env,
+            file=self._file,
+            line=tag.line,
+        )
+
+    def _read_own_param(self, tag: Tag, full_name: str) -> None:
+        tag.warn_of_attributes(self._spec.warnings.append)
+        try:
+            if tag.applies():
+                self._param_of_node(tag, full_name)
+        except LaunchError as error:
+            self.report(error)
+
+    # --- helpers
+
+    def _below(self, tag: Tag, scope: _Scope) -> _Scope:
+        namespace = tag.optional("ns")
+        if namespace is None:
+            return scope
+        if not namespace:
+            raise tag.error(f"<{tag.name}> tag has an empty 'ns' attribute")
+        if names.is_private(namespace):
+            raise tag.error(f"cannot turn [{namespace}] into a global name")
+        return replace(scope, namespace=names.join(scope.namespace, namespace))
+
+    def _clear(self, tag: Tag, inner: _Scope) -> None:
+        if not tag.flag("clear_params"):
+            return
+        if not tag.has("ns") or inner.namespace.strip("/") == "":
+            raise tag.error("'ns' attribute must be set in order to use 'clear_params'")
+        self._spec.clear.append(names.canonicalize(inner.namespace))
+
+
+def _folder(tag: Tag) -> str:
+    """Return the ``cwd`` of a node; "" where it is not there. Raises LaunchError."""
+    text = tag.optional("cwd")
+    if text is None:
+        return ""
+    # ROS knows this one in lower case, too.
+    return "ROS_HOME" if text == "ros_home" else tag.choice("cwd", ("ROS_HOME", "node"))
+
+
+def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
+    """Return the name, value and default of an ``<arg>``. Raises LaunchError."""
+    name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
+    if value is not None and default is not None:
+        raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")
+    return name, value, default

@@ -1,0 +1,154 @@
+"""The master of a launch: found or started, with its /run_id and the parameters of the launch file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from minirospy.base.environment import DISTRO, ROS_VERSION, Environment, run_folder
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
+from minirospy.ros.roslaunch.launcher.output import Output
+from minirospy.ros.roslaunch.launcher.process import Process, start_process
+from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+__all__ = ["CORE_PARAMETERS", "LaunchMaster"]
+
+CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_VERSION}
+"""Set at each launch, as in ROS."""
+
+_START_SECONDS = 60.0
+
+
+class LaunchMaster:
+    """The master that the nodes of a launch use.
+
+    ``pause(seconds)`` waits, and raises KeyboardInterrupt where the run has been stopped meanwhile.
+    """
+
+    def __init__(self, environment: Environment, output: Output, pause: Callable[[float], None]) -> None:
+        self._environment = environment
+        self._output = output
+        self._pause = pause
+        self._proxy = MasterProxy(environment.master_uri, "/roslaunch")
+        self.run_id = ""
+        """The folder of the log files, and /run_id at the master."""
+        self.has_logs = True
+        """Whether log files can be written."""
+
+    @property
+    def log_folder(self) -> Path:
+        """Where the log files of this run are."""
+        return self._environment.log_dir / self.run_id
+
+    def is_online(self) -> bool:
+        """Return whether a master answers."""
+        return self._proxy.is_online()
+
+    def close(self) -> None:
+        """Close the connections. Idempotent."""
+        self._proxy.close()
+
+    def wait(self) -> None:
+        """Wait until a master answers."""
+        self._output.print("roscore/master is not yet running, will wait for it to start")
+        while not self.is_online():
+            self._pause(0.1)
+        self._output.print("master has started, initiating launch")
+
+    def start(self, arguments: tuple[str, ...]) -> Process:
+        """Start a master on this machine. Raises MasterUnreachableError where it belongs on another, MinirospyError."""
+        if not self._environment.master_is_local:
+            # Its error names what is wrong: a name without an address, a master that is suspended.
+            self._proxy.get_pid()
+            raise MasterUnreachableError(self._environment.master_uri)
+        self._output.print("auto-starting new master")
+        port = str(self._environment.master_address[1])
+        command = [
+            sys.executable,
+            "-m",
+            "minirospy.ros.rosmaster.commands.master",
+            "-q",
+            "-p",
+            port,
+            *arguments,
+        ]
+        return start_process("master", command, environ=os.environ)
+
+    def wait_for_start(self, process: Process) -> None:
+        """Wait until a master that was started answers, and set its /run_id. Raises MinirospyError."""
+        end = time.monotonic() + _START_SECONDS
+        while not self.is_online():
+            if not process.is_running:
+                raise MinirospyError(f"the master ended with status {process.exit_code}")
+            if time.monotonic() > end:
+                raise MinirospyError(f"the master does not answer at {self._environment.master_uri}")
+            self._pause(0.02)
+
+        if self.run_id:
+            # That of a program that launches: the folder of its log files is named by it.
+            self._proxy.set_param("/run_id", self.run_id)
+        # A master that cannot write its log has said so itself.
+        self.find_run_id(warns=False)
+
+    def find_run_id(self, *, warns: bool = True) -> None:
+        """Take over the master's /run_id, or set one, and open the log of roslaunch."""
+        try:
+            found = self._proxy.get_param("/run_id")
+        except RpcError:
+            found = None
+        if run_folder(self._environment.log_dir, found):
+            self.run_id = str(found)
+        else:
+            if found is not None:
+                self._output.warn(
+                    "WARNING: /run_id at the master cannot be the name of a folder: it is replaced"
+                )
+            self.run_id = self.run_id or str(uuid.uuid1())
+            self._proxy.set_param("/run_id", self.run_id)
+            self._output.print(f"setting /run_id to {self.run_id}", bold=True)
+
+        try:
+            self._output.print(f"... logging to {self._output.log_to(self.log_folder)}")
+        except OSError as error:
+            # A disk that is full or read-only must not stop the nodes.
+            self.has_logs = False
+            if warns:
+                why = error.strerror or error
+                self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
+
+    def set_parameters(self, spec: LaunchSpec) -> None:
+        """Set the parameters, after what <rosparam> commands and clear_params delete. Raises MinirospyError."""
+        for namespace in spec.clear:
+            with contextlib.suppress(RpcError):
+                self._proxy.delete_param(namespace)
+
+        for command in spec.commands:
+            if command.file is None:
+                self._output.print(f"running rosparam delete {command.name}")
+                try:
+                    self._proxy.delete_param(command.name)
+                except RpcError:
+                    self._output.warn(f"ERROR: parameter [{command.name}] is not set")
+            else:
+                self._output.print(f"running rosparam dump {command.file} {command.name}")
+                self._dump(command.name, command.file)
+
+        for name, value in {**CORE_PARAMETERS, **spec.params}.items():
+            try:
+                self._proxy.set_param(name, value)
+            except (RpcError, ValueTextError) as error:
+                raise MinirospyError(f"parameter [{name}]: {error}") from error
+
+    def _dump(self, name: str, file: str) -> None:
+        from minirospy.introspect.parameters import dump_parameters
+
+        try:
+            Path(file).write_text(dump_parameters(self._proxy.get_param(name)), encoding="utf-8")
+        except (OSError, RpcError) as error:
+            self._output.warn(f"ERROR: parameters cannot be dumped to [{file}]: {error}")

@@ -1,0 +1,78 @@
+"""A NodeSpec -> the process of that node: its command, environment, working folder and log files."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
+from minirospy.ros.roslaunch.launcher.command import node_command, node_environment, node_folder
+from minirospy.ros.roslaunch.launcher.master import LaunchMaster
+from minirospy.ros.roslaunch.launcher.options import RunOptions
+from minirospy.ros.roslaunch.launcher.process import Process, start_process
+from minirospy.ros.roslaunch.launcher.spec import NodeSpec
+from minirospy.workspace.packages import Packages
+
+__all__ = ["NodeStarter"]
+
+
+class NodeStarter:
+    """Starts the nodes of one launch."""
+
+    def __init__(
+        self, environment: Environment, packages: Packages, options: RunOptions, master: LaunchMaster
+    ) -> None:
+        self._environment = environment
+        self._packages = packages
+        self._options = options
+        self._master = master
+        self._has_warned = False
+
+    def start(self, node: NodeSpec, name: str) -> Process:
+        """Start a node as the process ``name``. Raises MinirospyError."""
+        command = node_command(node, self._packages)
+        folder = node_folder(node, self._packages, self._environment)
+        environ = node_environment(node, self._environment)
+        screen = self._uses_screen(node)
+        if not screen or not sys.stdout.isatty():
+            # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
+            # writes whole lines, which those of another node do not cut in two.
+            environ.setdefault("PYTHONUNBUFFERED", "1")
+        folder = self._made(folder)
+
+        log = self._master.log_folder / name.replace("/", "-")
+        process = start_process(
+            name,
+            [*command, f"__log:={log}.log"],
+            environ=environ,
+            folder=folder,
+            stdout_file=None if screen else log.with_name(f"{log.name}-stdout.log"),
+            log_errors=self._options.log_errors,
+        )
+        process.node = node
+        process.log_files = f"{log}*.log" if self._master.has_logs else "none"
+        return process
+
+    def _made(self, folder: Path) -> Path:
+        """Return a node's folder, which is made; where ROS_HOME cannot be written to, the folder of temporary files."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = error.strerror or error
+            if folder != self._environment.home:
+                raise MinirospyError(f"the folder {folder} cannot be made: {why}") from error
+            instead = Path(tempfile.gettempdir())
+            if not self._has_warned:
+                self._has_warned = True
+                text = f"WARNING: the folder {folder} cannot be made: {why}; nodes start in {instead}; set ROS_HOME"
+                print(text, file=sys.stderr)
+            return instead
+        return folder
+
+    def _uses_screen(self, node: NodeSpec) -> bool:
+        """Return whether a node prints to the terminal instead of a file."""
+        if not self._master.has_logs:
+            return True
+        return (self._options.screen or node.output == "screen") and not self._options.log

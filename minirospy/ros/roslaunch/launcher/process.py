@@ -1,0 +1,243 @@
+"""Processes that roslaunch starts: in separate process groups, terminated step by step, and never left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, TypedDict
+
+from minirospy.base import private_files
+from minirospy.base.child_lifetime import guard_children, start_outside_of_job
+from minirospy.base.errors import MinirospyError
+from minirospy.ros.roslaunch.launcher import guardian
+from minirospy.ros.roslaunch.launcher.spec import NodeSpec
+
+__all__ = ["Guardian", "Process", "Timeouts", "end_processes", "start_process"]
+
+_WINDOWS = sys.platform == "win32"
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Seconds that a process has to end after SIGINT, and then after SIGTERM."""
+
+    interrupt: float = 15.0
+    terminate: float = 2.0
+
+
+@dataclass(eq=False)
+class Process:
+    """A process that was started, for ``node`` where it is one. ``starts``: how often it was started."""
+
+    name: str
+    command: Sequence[str]
+    popen: subprocess.Popen[bytes]
+    node: NodeSpec | None = None
+    log_files: str = ""
+    stdout_file: Path | None = None
+    starts: int = 1
+    started: float = field(default_factory=time.monotonic)
+    is_ending: bool = False
+    """It was ended on request: its exit is not reported."""
+
+    is_restarting: bool = False
+    """It is to be started again when it has ended, because its file changed."""
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self.popen.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit status, as in subprocess; None while it runs."""
+        return self.popen.poll()
+
+    @property
+    def is_running(self) -> bool:
+        """Return whether it has not exited."""
+        return self.popen.poll() is None
+
+
+class _Group(TypedDict, total=False):
+    """The options of subprocess.Popen that give a process its own group."""
+
+    creationflags: int
+    start_new_session: bool
+
+
+class Guardian:
+    """Is notified of each process that starts and ends; where this process is killed, it ends those that are left.
+
+    On Windows the system ends them (`minirospy.base.child_lifetime`). There a guardian only unregisters nodes, from a master that
+    this launch has not started, and else no process is started for it.
+    """
+
+    def __init__(self, timeouts: Timeouts, master_uri: str) -> None:
+        self._children = guard_children()
+        self._words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate), master_uri]
+        self._words += [guardian.SYSTEM_ENDS_THEM] if self._children.is_guarded else []
+        self._guard = threading.Lock()
+        self._has_master = False
+        self._popen = None if self._children.is_guarded else self._start()
+
+    def add(self, process: Process) -> None:
+        """Report a process that has started."""
+        if process.node is None:
+            self._has_master = True
+        elif self._popen is None and not self._has_master:
+            self._popen = self._start()
+        self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
+
+    def remove(self, process: Process) -> None:
+        """Report a process that has exited."""
+        self._write(f"-{process.pid}\n")
+
+    def close(self) -> None:
+        """End the guardian: no process is left. Idempotent."""
+        if self._popen:
+            with self._guard, contextlib.suppress(OSError):
+                if self._popen.stdin:
+                    self._popen.stdin.close()
+            self._popen.wait()
+        self._children.close()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        # A process that is killed just while it starts one outside of its job leaves that one behind, suspended.
+        return start_outside_of_job(
+            [sys.executable, "-I", "-S", *self._words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            **_own_group(),
+        )
+
+    def _write(self, line: str) -> None:
+        if self._popen is None:
+            return
+        # Without a guardian (it was killed) all goes on.
+        with self._guard, contextlib.suppress(OSError, ValueError):
+            assert self._popen.stdin
+            self._popen.stdin.write(line.encode())
+            self._popen.stdin.flush()
+
+
+def start_process(
+    name: str,
+    command: Sequence[str],
+    *,
+    environ: Mapping[str, str],
+    folder: Path | None = None,
+    stdout_file: Path | None = None,
+    log_errors: bool = False,
+    stdin: int | None = subprocess.DEVNULL,
+    stdout: int | None = None,
+) -> Process:
+    """Start a process. Its output goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
+
+    Raises MinirospyError.
+    """
+    try:
+        with _opened(stdout_file) as output:
+            popen = subprocess.Popen(
+                command,
+                env=dict(environ),
+                cwd=folder,
+                stdin=stdin,
+                stdout=output or stdout,
+                stderr=subprocess.STDOUT if log_errors and (output or stdout) else None,
+                **_own_group(),
+            )
+    except OSError as error:
+        raise MinirospyError(f"[{name}] cannot be started: {error}") from error
+    return Process(name, command, popen, stdout_file=stdout_file)
+
+
+def end_processes(
+    processes: Sequence[Process], timeouts: Timeouts, warn: Callable[[str], None]
+) -> list[Process]:
+    """Send SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; return those that SIGKILL ended."""
+    steps = (
+        (_interrupt, timeouts.interrupt, ""),
+        (_terminate, timeouts.terminate, "escalating to SIGTERM"),
+        (_kill, timeouts.terminate, "escalating to SIGKILL"),
+    )
+
+    killed: list[Process] = []
+    for step, seconds, words in steps:
+        running = [process for process in processes if process.is_running]
+        if step is _kill:
+            killed = running
+        notified = []
+        for process in running:
+            process.is_ending = True
+            if words:
+                warn(f"[{process.name}] {words}")
+            # It fails where the process has exited, or on Windows without a console: there is nothing to wait for.
+            with contextlib.suppress(OSError):
+                step(process.popen)
+                notified.append(process)
+        end = time.monotonic() + seconds
+        for process in notified:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.popen.wait(max(0.0, end - time.monotonic()))
+
+    if not _WINDOWS:
+        for process in processes:
+            # Processes that a node started and left behind, in its group.
+            with contextlib.suppress(OSError):
+                os.killpg(process.pid, signal.SIGKILL)
+    return killed
+
+
+def _own_group() -> _Group:
+    """Return the options of a process that a Ctrl-C in the terminal does not reach: roslaunch ends its nodes in order."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}
+
+
+@contextlib.contextmanager
+def _opened(path: Path | None) -> Iterator[IO[str] | None]:
+    if path is None:
+        yield None
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = private_files.open_text(path, "a")
+    except OSError as error:
+        raise MinirospyError(f"cannot write the log file {path}: {error.strerror}") from error
+    with file:
+        yield file
+
+
+def _interrupt(popen: subprocess.Popen[bytes]) -> None:
+    if _WINDOWS:
+        popen.send_signal(signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined,unused-ignore]
+    else:
+        os.killpg(popen.pid, signal.SIGINT)
+
+
+def _terminate(popen: subprocess.Popen[bytes]) -> None:
+    if _WINDOWS:
+        popen.terminate()
+    else:
+        os.killpg(popen.pid, signal.SIGTERM)
+
+
+def _kill(popen: subprocess.Popen[bytes]) -> None:
+    """Kill the process and all that it started."""
+    import psutil
+
+    with contextlib.suppress(psutil.Error):
+        for child in psutil.Process(popen.pid).children(recursive=True):
+            child.kill()
+    popen.kill()

@@ -1,0 +1,95 @@
+"""Registrations that dead nodes leave with the master: removed by the roslaunch that ran them.
+
+A program, too: ``python -m minirospy.ros.roslaunch.launcher.registrations MASTER_URI NODE ...``, for the
+guardian of a killed roslaunch.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import sys
+import threading
+from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from minirospy.base.errors import MasterUnreachableError, RpcError
+from minirospy.introspect.graph import Graph, NodeAddress
+from minirospy.introspect.nodes import forget_node, has_exited
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
+
+__all__ = ["DeadNodes", "main", "unregister_dead"]
+
+_ANSWER_SECONDS = 5.0
+"""A process of this machine that has exited refuses immediately: only one that hangs takes this long."""
+
+_AT_ONCE = 16
+
+
+class DeadNodes:
+    """Unregisters nodes whose processes have exited, in a thread: one pass for all that exited meanwhile."""
+
+    def __init__(self, master_uri: str) -> None:
+        self._master_uri = master_uri
+        self._exited: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    def add(self, node: str) -> None:
+        """Unregister a node (global name) soon."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="dead-nodes", daemon=True)
+            self._thread.start()
+        self._exited.put(node)
+
+    def close(self) -> None:
+        """Return when the nodes added so far are unregistered, or the master does not answer. Idempotent."""
+        if self._thread:
+            self._exited.put(None)
+            self._thread.join()
+            self._thread = None
+
+    def _run(self) -> None:
+        is_open = True
+        while is_open:
+            names = [self._exited.get()]
+            with contextlib.suppress(queue.Empty):
+                while True:
+                    names.append(self._exited.get_nowait())
+            is_open = None not in names
+            unregister_dead(self._master_uri, {name for name in names if name})
+
+
+def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
+    """Unregister those of ``nodes`` (global names) that have exited; their names.
+
+    A new node of one of the names, and a node that lives or hangs, keep their registrations. A master that does not
+    answer is left alone.
+    """
+    if not nodes:
+        return []
+    try:
+        with Graph(MasterProxy(master_uri, "/roslaunch"), "roslaunch") as graph:
+            state = graph.state()
+            registered = {name for table in state for names in table.values() for name in names}
+            left = [node for node in graph.addresses(sorted(registered.intersection(nodes))) if node.uri]
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                return [name for name in pool.map(lambda node: _unregister(graph, node, state), left) if name]
+    except (MasterUnreachableError, RpcError):
+        return []
+
+
+def main(argv: Sequence[str]) -> int:
+    """Unregister; ``argv``: the master's URI, and the names of the nodes."""
+    unregister_dead(argv[0], argv[1:])
+    return 0
+
+
+def _unregister(graph: Graph, node: NodeAddress, state: SystemState) -> str:
+    if not has_exited(graph, node, _ANSWER_SECONDS):
+        return ""
+    forget_node(graph, node, state)
+    return node.name
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,36 @@
+"""The summary that roslaunch shows before it starts anything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from minirospy.ros.roslaunch.launcher.spec import NodeSpec
+
+__all__ = ["summary"]
+
+_LONGEST = 20
+
+
+def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iterable[str]) -> str:
+    """Return the text between SUMMARY and the first process."""
+    lines = ["", "SUMMARY", "========", ""]
+    cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
+    if cleared:
+        lines += ["CLEAR PARAMETERS", *cleared, ""]
+    lines += ["PARAMETERS", *sorted(f" * {name}: {_short(value)}" for name, value in params.items())]
+    lines += ["", "NODES"]
+    by_namespace: dict[str, list[str]] = {}
+    for node in nodes:
+        text = f"    {node.base_name} ({node.package}/{node.type})"
+        by_namespace.setdefault(node.namespace, []).append(text)
+    for namespace, texts in sorted(by_namespace.items()):
+        lines += [f"  {namespace}", *sorted(texts)]
+    return "\n".join([*lines, ""])
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST - 3]}..."
+    text = text.rstrip()
+    return text if text.isascii() and text.isprintable() else "<...>"

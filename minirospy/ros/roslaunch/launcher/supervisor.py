@@ -1,0 +1,294 @@
+"""The processes of a launch that run: watched, started again where they respawn, until the run is over."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from minirospy.base.errors import MinirospyError
+from minirospy.ros.roslaunch.launcher.output import Output
+from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, end_processes
+from minirospy.ros.roslaunch.launcher.spec import NodeSpec
+from minirospy.ros.roslaunch.launcher.watch import FileWatch
+
+__all__ = ["Supervisor"]
+
+_RESPAWN_SECONDS = 0.1
+"""Shortest time between two starts of a node that exits immediately."""
+
+_SLICE = 0.5
+"""Seconds. The main thread, where signals arrive, waits in slices: one that arrives just before the wait starts, and on Windows
+any, is noticed only after it. Changed files and the processes on other machines are looked after in between."""
+
+_BAR = "=" * 80
+
+
+class _Exited(NamedTuple):
+    """A process has exited."""
+
+    process: Process
+
+
+class _RemoteExited(NamedTuple):
+    """A process on another machine has exited."""
+
+    node: NodeSpec | None
+    name: str
+    code: int
+
+
+class _Ended(NamedTuple):
+    """A process was ended by :meth:`Supervisor.end_process`."""
+
+    process: Process
+
+
+class _Stop(NamedTuple):
+    """A signal, or a caller, stops the run."""
+
+    why: str
+
+
+class _NoMoreNodes(NamedTuple):
+    """No further node will be started: the run ends with those that there are."""
+
+
+_Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
+
+
+class Supervisor:
+    """Watches processes. ``start(node, name)`` starts one again; ``on_exit(process)`` is called when one has exited.
+
+    ``files`` finds the nodes whose programs have changed, which are started again. ``is_remote_running()``: whether a
+    process on another machine runs. ``clock`` gives seconds.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[NodeSpec, str], Process],
+        on_exit: Callable[[Process], object],
+        output: Output,
+        timeouts: Timeouts,
+        *,
+        files: FileWatch | None = None,
+        is_remote_running: Callable[[], bool] = lambda: False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._start = start
+        self._on_exit = on_exit
+        self._output = output
+        self._timeouts = timeouts
+        self._files = files
+        self._is_remote_running = is_remote_running
+        self._clock = clock
+
+        self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
+        self._restarts: list[tuple[float, Process]] = []
+
+        self.on_change: Callable[[], object] = lambda: None
+        """Called from any thread after a process was started, has exited, or is being ended."""
+        self.processes: list[Process] = []
+        """The nodes that were started and are watched, those that wait to be started again included."""
+        self.master: Process | None = None
+        """The master, where this launch has started one."""
+        self.stopped_by = ""
+        """The signal, or who called stop(), that ended the run; empty where the nodes ended it."""
+
+    @property
+    def is_anything_left(self) -> bool:
+        """Return whether a process runs, or waits to be started again."""
+        return bool(self.processes) or self.master is not None or self._is_remote_running()
+
+    def add(self, process: Process) -> None:
+        """Watch the process of a node."""
+        self.processes.append(process)
+        self._attend(process)
+        self.on_change()
+
+    def add_master(self, process: Process) -> None:
+        """Watch a master: when it exits, the run is over."""
+        self.master = process
+        self._attend(process)
+
+    def clear(self) -> None:
+        """Watch nothing any more."""
+        self.processes.clear()
+        self._restarts.clear()
+        self.master = None
+
+    # --- from any thread
+
+    def stop(self, why: str) -> None:
+        """End the run."""
+        self._events.put(_Stop(why))
+
+    def end_with_nodes(self) -> None:
+        """Have a watch(forever=True) end with the last node after all."""
+        self._events.put(_NoMoreNodes())
+
+    def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
+        """Report that a process on another machine has exited."""
+        self._events.put(_RemoteExited(node, name, code))
+
+    # --- in the thread that runs the launch
+
+    def watch(self, *, forever: bool = False) -> int | None:
+        """Watch until all processes, or a required one, have exited, or stop() was called.
+
+        Return the exit status; None where no process is left. ``forever``: go on where no process is left.
+        """
+        while forever or self.is_anything_left:
+            event = self._next_event()
+            status = None
+            match event:
+                case _Stop(why):
+                    self.stopped_by = why
+                    return 0
+                case _NoMoreNodes():
+                    forever = False
+                case _Exited(process):
+                    status = self._exited(process)
+                    self.on_change()
+                case _Ended(process):
+                    self._forget_restart(process)
+                    self.on_change()
+                case _RemoteExited():
+                    status = self._remote_exited(event)
+            if status is not None:
+                return status
+        return None
+
+    def pause(self, seconds: float) -> None:
+        """Wait. Raises KeyboardInterrupt where stop() is called meanwhile."""
+        try:
+            event = self._events.get(timeout=seconds)
+        except queue.Empty:
+            return
+        self._events.put(event)
+        if isinstance(event, _Stop):
+            self.stopped_by = event.why
+            raise KeyboardInterrupt
+
+    def end_process(self, process: Process) -> None:
+        """End one process, and wait for that; it is not started again, unless its file has changed."""
+        process.is_ending = True
+        self.on_change()
+        end_processes([process], self._timeouts, self._output.warn)
+        self._events.put(_Ended(process))
+
+    # --- helpers
+
+    def _attend(self, process: Process) -> None:
+        """Put an event when a process exits."""
+
+        def wait() -> None:
+            process.popen.wait()
+            self._events.put(_Exited(process))
+
+        threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
+
+    def _next_event(self) -> _Event | None:
+        """Return what happened; None after a while without events, when restarts and files have been looked after."""
+        pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
+        try:
+            return self._events.get(timeout=min(pauses))
+        except queue.Empty:
+            pass
+
+        now = self._clock()
+        ready = [process for when, process in self._restarts if when <= now]
+        self._restarts = [each for each in self._restarts if each[0] > now]
+        for process in ready:
+            self._restart(process)
+        if self._files:
+            self._restart_changed(self._files)
+        return None
+
+    def _exited(self, process: Process) -> int | None:
+        """React to a process that has exited; return a status where the run is over."""
+        self._on_exit(process)
+        if process is self.master:
+            self.master = None
+            self._output.warn("the master has ended: shutting down")
+            return 1
+        if process not in self.processes:
+            return None
+        if process.is_restarting:
+            self._restart(process)
+            return None
+        if process.is_ending:
+            self.processes.remove(process)
+            return None
+
+        node = process.node
+        assert node
+        is_clean = process.exit_code == 0
+        text = f"{_how_it_exited(process)}\nlog file: {process.log_files}"
+        if node.required:
+            self.processes.remove(process)
+            self._output.warn(
+                f"{_BAR}\nREQUIRED process [{process.name}] has died!\n{text}\nInitiating shutdown!\n{_BAR}"
+            )
+            return 0 if is_clean else 1
+        if is_clean:
+            self._output.print(f"[{process.name}] {text}", bold=True)
+        else:
+            self._output.warn(f"[{process.name}] {text}")
+
+        if node.respawn:
+            due = self._clock() + max(node.respawn_delay, _RESPAWN_SECONDS)
+            self._restarts.append((due, process))
+        else:
+            self.processes.remove(process)
+        return None
+
+    def _remote_exited(self, event: _RemoteExited) -> int | None:
+        if event.node is None or not event.node.required:
+            return None
+        self._output.warn(f"{_BAR}\nREQUIRED process [{event.name}] has died!\nInitiating shutdown!\n{_BAR}")
+        return 0 if event.code == 0 else 1
+
+    def _forget_restart(self, process: Process) -> None:
+        """Watch a process that has been ended, and waits to be started again, no more."""
+        others = [each for each in self._restarts if each[1] is not process]
+        if len(others) < len(self._restarts) and not process.is_restarting:
+            self._restarts = others
+            self.processes.remove(process)
+
+    def _restart(self, process: Process) -> None:
+        """Start a node that has exited again, in its place among the others."""
+        node = process.node
+        assert node
+        if process.is_ending and not process.is_restarting:
+            self.processes.remove(process)
+            return
+        place = self.processes.index(process)
+        self._output.print(f"[{process.name}] restarting process")
+        try:
+            again = self._start(node, process.name)
+        except MinirospyError as error:
+            self._output.warn(f"ERROR: cannot launch node of type [{node.package}/{node.type}]: {error}")
+            del self.processes[place]
+            return
+        again.starts = process.starts + 1
+        self.processes[place] = again
+        self._attend(again)
+        self.on_change()
+
+    def _restart_changed(self, files: FileWatch) -> None:
+        for process in self.processes:
+            if process.node and not process.is_restarting and (file := files.changed(process.node)):
+                self._output.print(f"[{process.name}] {file} has changed")
+                process.is_restarting = True
+                if process.is_running:
+                    threading.Thread(target=self.end_process, args=(process,), daemon=True).start()
+
+
+def _how_it_exited(process: Process) -> str:
+    if process.exit_code == 0:
+        return "process has finished cleanly"
+    command = " ".join(process.command)
+    return f"process has died [pid {process.pid}, exit code {process.exit_code}, cmd {command}]."

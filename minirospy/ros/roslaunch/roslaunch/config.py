@@ -1,0 +1,209 @@
+"""Launch files as programs see them: the classes of roslaunch.core and roslaunch.config, over a LaunchSpec.
+
+Source: http://wiki.ros.org/roslaunch/API%20Usage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from minirospy.base.environment import DISTRO, ROS_VERSION, Environment
+from minirospy.base.errors import LaunchError
+from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
+from minirospy.ros.roslaunch.launcher.summary import summary
+from minirospy.ros.roslaunch.roslaunch.core import (
+    Machine,
+    Master,
+    Node,
+    Param,
+    RLException,
+    Test,
+    is_machine_local,
+    local_machine,
+)
+from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader
+
+__all__ = [
+    "LaunchFile",
+    "ROSLaunchConfig",
+    "get_roscore_filename",
+    "load_config_default",
+    "namespaces_of",
+]
+
+LaunchFile = str | tuple[str, Sequence[str]]
+"""A launch file, or one with its arguments ``["name:=value", ...]``."""
+
+
+class ROSLaunchConfig:
+    """The content of launch files: ``nodes``, ``params`` (by global name), ``machines``, ``tests``, ``clear_params``."""
+
+    def __init__(self) -> None:
+        self.master = Master()
+        self.nodes: list[Node] = []
+        self.nodes_core: list[Node] = []
+        self.executables: list[object] = []
+        self.tests: list[Test] = []
+        self.params: dict[str, Param] = {}
+        self.machines: dict[str, Machine] = {"": local_machine()}
+        self.clear_params: list[str] = []
+        self.roslaunch_files: list[str] = []
+        self.config_errors: list[str] = []
+        self._spec = LaunchSpec()
+
+    @property
+    def resolved_node_names(self) -> list[str]:
+        """The global names of the nodes."""
+        return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
+
+    def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
+        """Add a node. Raises RLException where there is one of its name."""
+        if node.name and node.spec.name in self.resolved_node_names:
+            raise RLException(
+                f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
+                "Please check all <node> 'name' attributes to make sure they are unique.\n"
+                "Also check that $(anon id) use different ids."
+            )
+        (self.nodes_core if core else self.nodes).append(node)
+
+    def add_test(self, test: Test, verbose: bool = True) -> None:
+        """Add a test."""
+        self.tests.append(test)
+
+    def add_roslaunch_file(self, f: str) -> None:
+        """Add a file to those that were read."""
+        if f not in self.roslaunch_files:
+            self.roslaunch_files.append(f)
+
+    def set_master(self, m: Master) -> None:
+        """Set the master that nodes are started with."""
+        self.master = m
+
+    def assign_machines(self) -> None:
+        """Set ``machine`` of each node to the one of its ``machine_name``. Raises RLException."""
+        spec = self.spec
+        for node in (*self.nodes, *self.tests):
+            try:
+                found = spec.machine_of(node.spec)
+            except LaunchError as error:
+                raise RLException(str(error)) from error
+            node.machine = self.machines[found.name if found else ""]
+
+    def has_remote_nodes(self) -> bool:
+        """Return whether a node runs on another machine, as assign_machines() found."""
+        nodes = (*self.nodes, *self.tests)
+        return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
+
+    def summary(self, local: bool = False) -> str:
+        """Return what roslaunch shows before it starts anything."""
+        return summary(
+            self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.spec.clear
+        )
+
+    def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
+        """Add a parameter; one below another is an error of the configuration."""
+        for parent in namespaces_of(p.key):
+            if parent in self.params:
+                self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
+        self.params[p.key] = p
+
+    def add_clear_param(self, param: str) -> None:
+        """Delete a namespace before the parameters are set."""
+        self.clear_params.append(param)
+
+    def add_machine(self, m: Machine, verbose: bool = True) -> bool:
+        """Add a machine; False where the same is there already. Raises RLException where another of its name is."""
+        if m.name not in self.machines:
+            self.machines[m.name] = m
+            return True
+        if m != self.machines[m.name]:
+            raise RLException(f"Machine [{m.name}] already added and does not match duplicate entry")
+        return False
+
+    def add_config_error(self, msg: str) -> None:
+        """Add a warning."""
+        self.config_errors.append(msg)
+
+    def add(self, spec: LaunchSpec) -> None:
+        """Add the content of launch files."""
+        self._spec.commands += spec.commands
+        self._spec.warnings += spec.warnings
+        for node in spec.nodes:
+            self.add_node(Node.of(node))
+        self.tests += map(Test.of_test, spec.tests)
+        self.params.update({name: Param(name, _as_read(value)) for name, value in spec.params.items()})
+        for each in spec.machines.values():
+            self.machines[each.name] = Machine(
+                each.name, each.address, each.env_loader or None, each.ssh_port, each.user or None, each.password or None,
+                timeout=each.timeout,
+            )  # fmt: skip
+        self.clear_params += [f"{name.rstrip('/')}/" for name in spec.clear]
+        self.roslaunch_files += [file for file in spec.files if file not in self.roslaunch_files]
+        self.config_errors += map(str, spec.warnings)
+
+    @property
+    def spec(self) -> LaunchSpec:
+        """All of it, as it is run."""
+        return LaunchSpec(
+            nodes=[node.spec for node in self.nodes],
+            params={name: _as_sent(param.value) for name, param in self.params.items()},
+            clear=[name.rstrip("/") or "/" for name in self.clear_params],
+            commands=self._spec.commands,
+            files=self.roslaunch_files,
+            machines={name: machine.spec for name, machine in self.machines.items() if name},
+            warnings=self._spec.warnings,
+        )
+
+
+def load_config_default(
+    roslaunch_files: Sequence[LaunchFile],
+    port: int | None,
+    roslaunch_strs: Sequence[str] | None = None,
+    loader: XmlLoader | None = None,
+    verbose: bool = False,
+    assign_machines: bool = True,
+    ignore_unset_args: bool = False,
+) -> ROSLaunchConfig:
+    """Return the configuration of launch files and texts together. Raises RLException."""
+    config, loader = ROSLaunchConfig(), loader or XmlLoader()
+    if port:
+        environment = Environment.read()
+        config.set_master(Master(uri=f"http://{environment.uri_host}:{port}/"))
+
+    for name, value in (("/rosversion", ROS_VERSION), ("/rosdistro", DISTRO)):
+        config.add_param(Param(name, value))
+
+    for each in roslaunch_files:
+        file, argv = (each, []) if isinstance(each, str) else each
+        loader.load(file, config, argv=argv)
+    for text in roslaunch_strs or ():
+        loader.load_string(text, config)
+
+    if assign_machines:
+        config.assign_machines()
+    return config
+
+
+def get_roscore_filename() -> str | None:
+    """Return the launch file of the master's own nodes: None, as there are none."""
+    return None
+
+
+def _as_read(value: object) -> object:
+    """Return a parameter's value as programs see it: the content of a file is an xmlrpc.client.Binary."""
+    if not isinstance(value, bytes):
+        return value
+    from xmlrpc.client import Binary
+
+    return Binary(value)
+
+
+def _as_sent(value: object) -> object:
+    data = getattr(value, "data", None)
+    return data if isinstance(data, bytes) else value
+
+
+def namespaces_of(name: str) -> list[str]:
+    """Return the namespaces that contain a global name, the root first."""
+    parts = name.strip("/").split("/")[:-1]
+    return ["/", *("/" + "/".join(parts[: i + 1]) for i in range(len(parts)))]

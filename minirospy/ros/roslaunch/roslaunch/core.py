@@ -1,0 +1,464 @@
+"""roslaunch.core: nodes, parameters and machines, and the output of roslaunch."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import socket
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+from xml.sax.saxutils import escape
+
+from minirospy.base import names
+from minirospy.base.environment import Environment, is_own_host
+from minirospy.ros.roslaunch.launcher.command import node_environment
+from minirospy.ros.roslaunch.launcher.output import ERROR, Output
+from minirospy.ros.roslaunch.launcher.spec import MachineSpec, NodeSpec, TestSpec
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+if TYPE_CHECKING:
+    from xmlrpc.client import MultiCall, ServerProxy
+
+__all__ = [
+    "PHASE_RUN",
+    "PHASE_SETUP",
+    "PHASE_TEARDOWN",
+    "TEST_TIME_LIMIT_DEFAULT",
+    "Machine",
+    "Master",
+    "Node",
+    "Param",
+    "RLException",
+    "Test",
+    "add_printerrlog_handler",
+    "add_printlog_handler",
+    "clear_printerrlog_handlers",
+    "clear_printlog_handlers",
+    "generate_run_id",
+    "get_master_uri_env",
+    "is_machine_local",
+    "local_machine",
+    "printerrlog",
+    "printlog",
+    "printlog_bold",
+    "setup_env",
+]
+
+PHASE_SETUP, PHASE_RUN, PHASE_TEARDOWN = "setup", "run", "teardown"
+
+TEST_TIME_LIMIT_DEFAULT = 60
+"""Seconds that a <test> has."""
+
+
+class RLException(Exception):
+    """roslaunch failed."""
+
+
+class Master:
+    """The master that nodes are started with; ``uri`` is that of the environment where none is given."""
+
+    ROSMASTER = "rosmaster"
+
+    def __init__(self, type_: str | None = None, uri: str | None = None, auto: bool | None = None) -> None:
+        self.type = type_ or self.ROSMASTER
+        self.uri = uri or Environment.read().master_uri
+        self.auto = auto
+
+    @property
+    def environment(self) -> Environment:
+        """The environment with this master."""
+        return Environment.read()._replace(master_uri=self.uri)
+
+    def get_host(self) -> str:
+        """Return the host of its URI. Raises ValueError on one that is not a URL."""
+        return _host_and_port(self.uri)[0]
+
+    def get_port(self) -> int:
+        """Return the port of its URI, 80 where it has none. Raises ValueError on one that is not a URL."""
+        return _host_and_port(self.uri)[1]
+
+    def get(self) -> ServerProxy:
+        """Return an xmlrpc.client.ServerProxy for its calls."""
+        from xmlrpc.client import ServerProxy
+
+        return ServerProxy(self.uri)
+
+    def get_multi(self) -> MultiCall:
+        """Return a proxy that sends several calls in one request."""
+        from xmlrpc.client import MultiCall
+
+        return MultiCall(self.get())
+
+    def is_running(self) -> bool:
+        """Return whether it answers."""
+        with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
+            return proxy.is_online()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Master) and (self.type, self.uri) == (other.type, other.uri)
+
+    def __hash__(self) -> int:
+        return hash(self.uri)
+
+
+class Param:
+    """A parameter: its global name and value."""
+
+    def __init__(self, key: str, value: object) -> None:
+        self.key = names.canonicalize(key)
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Param) and (self.key, self.value) == (other.key, other.value)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __repr__(self) -> str:
+        return f"{self.key}={self.value}"
+
+
+class Machine:
+    """A machine that nodes run on."""
+
+    def __init__(
+        self,
+        name: str,
+        address: str,
+        env_loader: str | None = None,
+        ssh_port: int = 22,
+        user: str | None = None,
+        password: str | None = None,
+        assignable: bool = True,
+        env_args: Sequence[object] = (),
+        timeout: float | None = None,
+    ) -> None:
+        self.name = name
+        self.address = address
+        self.env_loader = env_loader
+
+        self.ssh_port = ssh_port
+        self.user = user
+        self.password = password
+        self.assignable = assignable
+        self.timeout = timeout or 10.0
+
+    @property
+    def spec(self) -> MachineSpec:
+        """As a launch file says it."""
+        return MachineSpec(
+            self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
+            self.timeout,
+        )  # fmt: skip
+
+    def config_key(self) -> str:
+        """Return a text that is the same for machines that are reached and set up alike."""
+        return (
+            f"Machine(address[{self.address}] env_loader[{self.env_loader}] ssh_port[{self.ssh_port}] "
+            f"user[{self.user or ''}] password[{self.password or ''}] timeout[{self.timeout}])"
+        )
+
+    def config_equals(self, m2: object) -> bool:
+        """Return whether another machine is reached and set up alike, whatever its name."""
+        return isinstance(m2, Machine) and self.config_key() == m2.config_key()
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Machine)
+            and (self.name, self.assignable) == (other.name, other.assignable)
+            and self.config_equals(other)
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    def __str__(self) -> str:
+        return (
+            f"Machine(name[{self.name}] env_loader[{self.env_loader}] address[{self.address}] ssh_port[{self.ssh_port}] "
+            f"user[{self.user}] assignable[{self.assignable}] timeout[{self.timeout}])"
+        )
+
+
+@functools.cache
+def local_machine() -> Machine:
+    """Return this machine, the same object each time."""
+    return Machine("", "localhost")
+
+
+def is_machine_local(machine: Machine) -> bool:
+    """Return whether a machine is this one. Raises RLException on an address that is not found."""
+    try:
+        socket.getaddrinfo(machine.address or ".", None)
+    except (OSError, UnicodeError) as error:
+        raise RLException(f"cannot resolve host address for machine [{machine.address}]") from error
+    return not machine.user and is_own_host(machine.address)
+
+
+class Node:
+    """A node to be launched. One without a ``name`` gets a new one when it is."""
+
+    def __init__(
+        self,
+        package: str,
+        node_type: str,
+        name: str | None = None,
+        namespace: str | None = "/",
+        machine_name: str | None = None,
+        args: str | None = "",
+        respawn: bool = False,
+        respawn_delay: float = 0.0,
+        remap_args: Iterable[tuple[str, str]] | None = None,
+        env_args: Iterable[tuple[str, str]] | None = None,
+        output: str | None = None,
+        cwd: str | None = None,
+        launch_prefix: str | None = None,
+        required: bool = False,
+        filename: str = "<unknown>",
+    ) -> None:
+        if not package.strip():
+            raise ValueError("package must be non-empty")
+        if not node_type.strip():
+            raise ValueError("type must be non-empty")
+        if name and "/" in name:
+            raise ValueError("node name cannot contain a namespace")
+        if output not in (None, "log", "screen"):
+            raise ValueError("output must be one of 'log', 'screen'")
+        if cwd == "ros_home":
+            cwd = "ROS_HOME"
+        if cwd not in (None, "ROS_HOME", "node"):
+            raise ValueError("cwd must be one of 'ROS_HOME', 'node'")
+        if required and respawn:
+            raise ValueError("respawn and required cannot both be set to true")
+
+        self.package = package
+        self.type = node_type
+        self.name = name or None
+        self.namespace = "/" + "".join(f"{part}/" for part in (namespace or "").split("/") if part)
+        self.machine_name = machine_name or None
+        self.args = args or ""
+        self.respawn = respawn
+        self.respawn_delay = respawn_delay
+
+        self.machine: Machine | None = None
+        self.process_name: str | None = None
+
+        self.remap_args = [list(pair) for pair in remap_args or ()]
+        self.env_args = [tuple(pair) for pair in env_args or ()]
+        self.output = output
+        self.cwd = cwd
+        self.launch_prefix = launch_prefix or None
+        self.required = required
+        self.filename = filename
+
+    @classmethod
+    def of(cls, spec: NodeSpec) -> Node:
+        """Return the node of a launch file."""
+        return cls(
+            spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
+            spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
+            spec.file,
+        )  # fmt: skip
+
+    def give_name(self) -> None:
+        """Generate a unique name, where it has none."""
+        self.name = self.spec.named().base_name
+
+    def xmltype(self) -> str:
+        """Return the name of its tag."""
+        return "node"
+
+    def xmlattrs(self) -> list[tuple[str, object]]:
+        """Return (name, value) of its tag's attributes, those that are unset with None."""
+        return [
+            *self._placed(),
+            ("respawn", self.respawn),
+            ("respawn_delay", self.respawn_delay),
+            *self._named(),
+        ]
+
+    def to_xml(self) -> str:
+        """Return the node as the text of a launch file."""
+        return self._as_tag(self.xmlattrs())
+
+    def to_remote_xml(self) -> str:
+        """Return the same without its machine."""
+        return self._as_tag([each for each in self.xmlattrs() if each[0] != "machine"])
+
+    def _placed(self) -> list[tuple[str, object]]:
+        return [
+            ("pkg", self.package), ("type", self.type), ("machine", self.machine_name), ("ns", self.namespace),
+            ("args", self.args), ("output", self.output), ("cwd", self.cwd),
+        ]  # fmt: skip
+
+    def _named(self) -> list[tuple[str, object]]:
+        return [("name", self.name), ("launch-prefix", self.launch_prefix), ("required", self.required)]
+
+    def _as_tag(self, attributes: list[tuple[str, object]]) -> str:
+        words = [f"{name}={_quoted(value)}" for name, value in attributes if value is not None]
+        remaps = [f"  <remap from={_quoted(old)} to={_quoted(new)} />" for old, new in self.remap_args]
+        variables = [
+            f"  <env name={_quoted(name)} value={_quoted(value)} />" for name, value in self.env_args
+        ]
+        lines = [f"<{self.xmltype()} {' '.join(words)}>", *remaps, *variables, f"</{self.xmltype()}>"]
+        return "\n".join(lines)
+
+    @property
+    def spec(self) -> NodeSpec:
+        """As a launch file says it."""
+        return NodeSpec(
+            name=f"{self.namespace}{self.name or ''}",
+            package=self.package,
+            type=self.type,
+            args=self.args,
+            output=self.output or "",
+            respawn=self.respawn,
+            respawn_delay=self.respawn_delay,
+            required=self.required,
+            cwd=self.cwd or "",
+            launch_prefix=self.launch_prefix or "",
+            machine=self.machine_name or "",
+            remaps=tuple((a, b) for a, b in self.remap_args),
+            env=tuple((a, b) for a, b in self.env_args),
+            file="" if self.filename == "<unknown>" else self.filename,
+        )
+
+
+class Test(Node):
+    """A ``<test>``."""
+
+    def __init__(
+        self,
+        test_name: str,
+        package: str,
+        node_type: str,
+        name: str | None = None,
+        namespace: str | None = "/",
+        machine_name: str | None = None,
+        args: str | None = "",
+        remap_args: Iterable[tuple[str, str]] | None = None,
+        env_args: Iterable[tuple[str, str]] | None = None,
+        time_limit: float | None = None,
+        cwd: str | None = None,
+        launch_prefix: str | None = None,
+        retry: int | None = None,
+        filename: str = "<unknown>",
+    ) -> None:
+        super().__init__(
+            package, node_type, name, namespace, machine_name, args, remap_args=remap_args, env_args=env_args,
+            output="log", cwd=cwd, launch_prefix=launch_prefix, filename=filename,
+        )  # fmt: skip
+
+        self.test_name = test_name
+        limit = time_limit or TEST_TIME_LIMIT_DEFAULT
+        if not isinstance(limit, (int, float)):
+            raise ValueError("'time-limit' must be a number")
+        self.time_limit = float(limit)
+        if self.time_limit <= 0:
+            raise ValueError("'time-limit' must be a positive number")
+        self.retry = retry or 0
+
+    def xmltype(self) -> str:
+        """Return the name of its tag."""
+        return "test"
+
+    def xmlattrs(self) -> list[tuple[str, object]]:
+        """Return (name, value) of its tag's attributes: retry and time-limit where they are not the default."""
+        attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
+        if self.retry:
+            attributes.append(("retry", str(self.retry)))
+        if self.time_limit != TEST_TIME_LIMIT_DEFAULT:
+            attributes.append(("time-limit", self.time_limit))
+        return attributes
+
+    @classmethod
+    def of_test(cls, spec: TestSpec) -> Test:
+        """Return the test of a launch file."""
+        node = spec.node
+        return cls(
+            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
+            node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
+        )  # fmt: skip
+
+
+def _host_and_port(uri: str) -> tuple[str, int]:
+    parts = urlsplit(uri)
+    if not parts.hostname:
+        raise ValueError("not a valid URL")
+    return parts.hostname, parts.port or 80
+
+
+def _quoted(value: object) -> str:
+    return '"' + escape(str(value), {'"': "&quot;"}) + '"'
+
+
+class _Handler:
+    """Receives the lines of one kind: errors, or all others."""
+
+    def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
+        self._function = function
+        self.errors = errors
+
+    def __call__(self, level: int, text: str) -> None:
+        if (level >= ERROR) == self.errors:
+            self._function(text)
+
+
+def add_printlog_handler(h: Callable[[str], object]) -> None:
+    """Call a function with each line that roslaunch writes to standard output."""
+    Output.handlers.append(_Handler(h, errors=False))
+
+
+def add_printerrlog_handler(h: Callable[[str], object]) -> None:
+    """Call a function with each line that roslaunch writes to standard error."""
+    Output.handlers.append(_Handler(h, errors=True))
+
+
+def clear_printlog_handlers() -> None:
+    """Forget the functions of add_printlog_handler()."""
+    _clear(errors=False)
+
+
+def clear_printerrlog_handlers() -> None:
+    """Forget the functions of add_printerrlog_handler()."""
+    _clear(errors=True)
+
+
+def generate_run_id() -> str:
+    """Return a new run id."""
+    return str(uuid.uuid1())
+
+
+def get_master_uri_env() -> str:
+    """Return the master's URI, as the environment has it."""
+    return Environment.read().master_uri
+
+
+def setup_env(
+    node: Node | None, machine: Machine, master_uri: str, env: Mapping[str, str] | None = None
+) -> dict[str, str]:
+    """Return the environment of a node's process, on ``env`` (of this process, where none is given)."""
+    environment = Environment.read()._replace(master_uri=master_uri)
+    return node_environment((node or Node("p", "t", "n")).spec, environment, env)
+
+
+def printlog(msg: str) -> None:
+    """Print a line to standard output."""
+    Output().print(msg)
+
+
+def printlog_bold(msg: str) -> None:
+    """Print a line to standard output, bold on a terminal."""
+    Output().print(msg, bold=True)
+
+
+def printerrlog(msg: str) -> None:
+    """Print a line to standard error, red on a terminal."""
+    Output().warn(msg)
+
+
+def _clear(*, errors: bool) -> None:
+    Output.handlers[:] = [
+        each for each in Output.handlers if not (isinstance(each, _Handler) and each.errors == errors)
+    ]

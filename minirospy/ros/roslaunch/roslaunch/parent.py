@@ -1,0 +1,133 @@
+"""Launching from a program: the classes of roslaunch.parent, roslaunch.scriptapi and roslaunch.launch.
+
+Source: http://wiki.ros.org/roslaunch/API%20Usage.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Sequence
+
+from minirospy.base.environment import Environment
+from minirospy.ros.roslaunch.launcher.process import Timeouts
+from minirospy.ros.roslaunch.launcher.runner import RunOptions
+from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
+from minirospy.ros.roslaunch.roslaunch.core import RLException
+from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner, master_options, replacement_of
+from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener, ProcessMonitor
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+__all__ = ["ROSLaunchParent"]
+
+
+class ROSLaunchParent:
+    """Runs launch files (paths, or paths with arguments) while the program goes on. Errors are RLException."""
+
+    def __init__(
+        self,
+        run_id: str,
+        roslaunch_files: Sequence[LaunchFile],
+        is_core: bool = False,
+        port: int | None = None,
+        local_only: bool = False,
+        process_listeners: Sequence[ProcessListener] | None = None,
+        verbose: bool = False,
+        force_screen: bool = False,
+        force_log: bool = False,
+        is_rostest: bool = False,
+        roslaunch_strs: Sequence[str] | None = None,
+        num_workers: int = 3,
+        timeout: float | None = None,
+        master_logger_level: str | bool = False,
+        show_summary: bool = True,
+        force_required: bool = False,
+        sigint_timeout: float = 15.0,
+        sigterm_timeout: float = 2.0,
+    ) -> None:
+        if sigint_timeout <= 0 or sigterm_timeout <= 0:
+            raise RLException("sigint_timeout and sigterm_timeout must be positive numbers")
+
+        self.logger = logging.getLogger("roslaunch.parent")
+        self.run_id = run_id
+        self.roslaunch_files = roslaunch_files
+        self.roslaunch_strs = roslaunch_strs
+        self.is_core = is_core
+        self.port = port
+        self.local_only = local_only
+        self.process_listeners = process_listeners
+
+        self.verbose = verbose
+        self.force_screen = force_screen
+        self.force_log = force_log
+        self.force_required = force_required
+        self.show_summary = show_summary
+
+        self.config: ROSLaunchConfig | None = None
+        self.runner: ROSLaunchRunner | None = None
+        self.pm: ProcessMonitor | None = None
+        self.server = self.remote_runner = None
+        self._master_options = master_options(timeout, master_logger_level)
+        self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
+
+    def start(self, auto_terminate: bool = True) -> None:
+        """Start everything, and return when all nodes were started. Raises RLException.
+
+        Without ``auto_terminate`` it does not end with the last node.
+        """
+        if self.runner is not None:
+            raise RLException("this roslaunch instance has been started before: make another one")
+        if self.config is None:
+            self._load_config()
+        assert self.config
+        runner = ROSLaunchRunner(self.run_id, self.config, is_core=self.is_core, options=self._options())
+        for listener in self.process_listeners or ():
+            runner.add_process_listener(listener)
+        self.runner, self.pm = runner, runner.pm
+        try:
+            runner.launch()
+        except RLException:
+            # So that it may be tried again.
+            self.runner = None
+            raise
+        if auto_terminate and self.pm:
+            self.pm.registrations_complete()
+
+    def spin(self) -> None:
+        """Wait until all nodes have ended, or a signal came; then end what is left."""
+        if self.runner is None:
+            raise RLException("parent not started yet")
+        if self.runner.pm:
+            self.runner.spin()
+
+    def spin_once(self) -> bool:
+        """Return whether it runs on; signals are heard meanwhile."""
+        return self.runner is not None and self.runner.spin_once()
+
+    def shutdown(self) -> None:
+        """End all, and wait for that. Idempotent."""
+        if self.runner:
+            self.runner.stop()
+
+    def _load_config(self) -> None:
+        """Fill ``config``; programs override this to fill it differently."""
+        load = replacement_of("roslaunch.config", "load_config_default", load_config_default)
+        self.config = load(
+            self.roslaunch_files, self.port, roslaunch_strs=self.roslaunch_strs, verbose=self.verbose
+        )
+
+    def _options(self) -> RunOptions:
+        return RunOptions(
+            screen=self.force_screen,
+            log=self.force_log,
+            required=self.force_required,
+            local=self.local_only,
+            summary=self.show_summary,
+            timeouts=self._timeouts,
+            master_arguments=self._master_options,
+        )
+
+
+def _master_answers(environment: Environment) -> bool:
+    with contextlib.closing(MasterProxy(environment.master_uri, "/roslaunch")) as master:
+        return master.is_online()

@@ -1,0 +1,78 @@
+"""roslib.rosenv: values of the environment, with roslib's former names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+
+from minirospy.ros.rosgraph.rosgraph import rosenv
+from minirospy.ros.roslib.roslib.exceptions import ROSLibException
+from minirospy.ros.rospkg.rospkg import environment
+
+__all__ = [
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "ROSEnvException",
+    "get_log_dir",
+    "get_master_uri",
+    "get_ros_home",
+    "get_ros_package_path",
+    "get_ros_root",
+    "get_test_results_dir",
+    "makedirs_with_parent_perms",
+]
+
+ROS_ROOT = "ROS_ROOT"
+ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
+ROS_HOME = "ROS_HOME"
+ROS_LOG_DIR = "ROS_LOG_DIR"
+
+
+class ROSEnvException(ROSLibException):
+    """A variable that is needed is not set."""
+
+
+def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
+    """Return ROS_ROOT. Raise ROSEnvException where it is not set, if ``required``."""
+    return _variable(ROS_ROOT, required, env)
+
+
+def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
+    """Return ROS_PACKAGE_PATH. Raise ROSEnvException where it is not set, if ``required``."""
+    return _variable(ROS_PACKAGE_PATH, required, env)
+
+
+def get_master_uri(
+    required: bool = True, env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
+) -> str:
+    """Return the URI of the master that the command line or the environment names."""
+    return rosenv.get_master_uri(env, argv)
+
+
+def get_ros_home(env: Mapping[str, str] | None = None) -> str:
+    """Return the folder of ROS's own files: ROS_HOME, or ~/.ros."""
+    return environment.get_ros_home(env)
+
+
+def get_log_dir(env: Mapping[str, str] | None = None) -> str:
+    """Return the folder of log files."""
+    return environment.get_log_dir(env)
+
+
+def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
+    """Return the folder of test results."""
+    return environment.get_test_results_dir(env)
+
+
+def makedirs_with_parent_perms(p: str) -> None:
+    """Make a folder and those above it."""
+    os.makedirs(p, exist_ok=True)
+
+
+def _variable(name: str, required: bool, env: Mapping[str, str] | None) -> str | None:
+    value = (os.environ if env is None else env).get(name)
+    if required and not value:
+        raise ROSEnvException(f"The {name} environment variable has not been set.")
+    return value

@@ -1,0 +1,17 @@
+"""roslib.scriptutil: the master, as old scripts get it."""
+
+from __future__ import annotations
+
+from xmlrpc.client import ServerProxy
+
+from minirospy.ros.rosgraph.rosgraph.rosenv import get_master_uri
+
+__all__ = ["get_master", "get_param_server"]
+
+
+def get_master() -> ServerProxy:
+    """Return the master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
+    return ServerProxy(get_master_uri())
+
+
+get_param_server = get_master

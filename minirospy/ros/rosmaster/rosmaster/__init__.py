@@ -1,0 +1,29 @@
+"""rosmaster: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from minirospy.ros.submodules import on_first_use
+
+__all__ = ["rosmaster_main"]
+
+__getattr__ = on_first_use(
+    "rosmaster",
+    "exceptions",
+    "main",
+    "master_api",
+    "paramserver",
+    "registrations",
+    "threadpool",
+    "util",
+    "validators",
+)
+
+
+def rosmaster_main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; ``argv`` starts with its name. Return its exit status when it ends."""
+    from minirospy.ros.rosmaster.commands.master import rosmaster
+
+    return rosmaster(list(sys.argv if argv is None else argv)[1:])

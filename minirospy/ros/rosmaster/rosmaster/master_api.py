@@ -1,0 +1,122 @@
+"""rosmaster.master_api: the Master API as an object with a method for each call, which a program may serve or call itself.
+
+The answers are those of ``core/graph/master_api.py``. Nodes are notified from a thread of this object.
+Source: http://wiki.ros.org/ROS/Master_API.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any, cast
+from xmlrpc.client import Error
+
+from minirospy.base.steps import Steps, finish
+from minirospy.core.graph.calls import ERROR, Answer
+from minirospy.core.graph.master_api import MasterApi, Notice
+from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
+from minirospy.core.graph.registry import NodeShutdown
+from minirospy.ros.rosmaster.rosmaster.util import xmlrpcapi
+
+__all__ = ["ROSMasterHandler"]
+
+STATUS, MSG, VAL = 0, 1, 2
+NUM_WORKERS = 3
+LOG_API = False
+_CALLER_ID = "/master"
+
+
+class _Api(MasterApi):
+    """The tables and their answers; what is to be sent to nodes goes to ``notices``."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.where = ""
+        self.notices: queue.SimpleQueue[Notice | None] = queue.SimpleQueue()
+        self.is_stopped = False
+
+    @property
+    def uri(self) -> str:
+        """Return the address that :meth:`ROSMasterHandler._ready` was given."""
+        return self.where
+
+    def notify(self, action: Notice) -> None:
+        """Pass a notice on to the thread that sends it."""
+        self.notices.put(action)
+
+    def defer(self, uri: str, topic: str) -> None:
+        """Hold nothing back: a notice carries the state of the moment in which it is sent."""
+
+    def stop(self) -> None:
+        """End the notices."""
+        self.is_stopped = True
+        self.notices.put(None)
+
+    def get_status(self, caller_id: str) -> Answer:
+        """Refuse what only minirospy's own master answers."""
+        return [ERROR, "not a call of the Master API", 0]
+
+
+class ROSMasterHandler:
+    """The Master API: each method takes the caller's name first, and returns (code, text, value)."""
+
+    def __init__(self, num_workers: int = NUM_WORKERS) -> None:
+        self.uri: str | None = None
+        self.done = False
+        self._api = _Api()
+        self._lock = threading.Lock()
+        threading.Thread(target=self._notify, name="rosmaster", daemon=True).start()
+
+    def __getattr__(self, name: str) -> Callable[..., tuple[int, str, object]]:
+        # One method for each call of the table.
+        if name.startswith("_") or name not in self._api.dispatcher.methods:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return lambda *args: self._call(name, args)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._api.dispatcher.methods]
+
+    def _ready(self, uri: str) -> None:
+        self.uri = self._api.where = uri
+
+    def _shutdown(self, reason: str = "") -> None:
+        self.done = True
+        self._api.stop()
+
+    def _ok(self) -> bool:
+        return not self.done
+
+    def _call(self, name: str, args: tuple[object, ...]) -> tuple[int, str, object]:
+        with self._lock:
+            answer = self._api.dispatch(name, args)
+            code, text, value = (
+                answer if isinstance(answer, list) else finish(cast("Steps[list[Any]]", answer))
+            )
+        return code, text, value
+
+    def _notify(self) -> None:
+        while (notice := self._api.notices.get()) is not None:
+            with contextlib.suppress(OSError, Error):
+                self._send(notice)
+
+    def _send(self, notice: Notice) -> None:
+        node: Any = xmlrpcapi(notice.uri)
+        if node is None:
+            return
+        if isinstance(notice, NodeShutdown):
+            node.shutdown(_CALLER_ID, f"[{notice.name}] Reason: {notice.reason}")
+        elif isinstance(notice, ParameterUpdate):
+            with self._lock:
+                value = _value(self._api.parameters, notice.key)
+            node.paramUpdate(_CALLER_ID, notice.key, value)
+        else:
+            with self._lock:
+                publishers = self._api.registry.publisher_uris(notice.topic)
+            node.publisherUpdate(_CALLER_ID, notice.topic, publishers)
+
+
+def _value(tree: ParameterTree, key: str) -> object:
+    """Return what a node is notified of: {} where the parameter is not set."""
+    return tree.get(key) if tree.has(key) else {}

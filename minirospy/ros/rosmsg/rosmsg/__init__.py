@@ -1,0 +1,222 @@
+"""rosmsg: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, TextIO
+
+from minirospy.base.errors import DefinitionError, NotFoundError
+from minirospy.base.times import TVal
+from minirospy.introspect.interfaces import Interfaces, Kind, describe
+from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.protocols import Message
+    from minirospy.ros.genmsg.genmsg.msg_loader import MsgContext
+    from minirospy.ros.genmsg.genmsg.msgs import MsgSpec
+    from minirospy.ros.rospkg.rospkg.rospack import RosPack
+
+__all__ = [
+    "MODE_MSG",
+    "MODE_SRV",
+    "ROSMsgException",
+    "get_msg_text",
+    "get_srv_text",
+    "get_yaml_for_msg",
+    "iterate_packages",
+    "list_msgs",
+    "list_srvs",
+    "list_types",
+    "rosmsg_md5",
+    "rosmsg_search",
+    "rosmsgmain",
+    "spec_to_str",
+]
+
+MODE_MSG = ".msg"
+MODE_SRV = ".srv"
+_WIDE = 4
+_KINDS = {MODE_MSG: Kind.MESSAGE, MODE_SRV: Kind.SERVICE}
+
+
+class ROSMsgException(Exception):
+    """A type does not exist, or its definition is invalid."""
+
+
+def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
+    """Return the text of a message type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
+    return _text(type_, raw, Kind.MESSAGE)
+
+
+def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
+    """Return the text of a service type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
+    return _text(type_, raw, Kind.SERVICE)
+
+
+def list_msgs(package: str, rospack: object = None) -> list[str]:
+    """Return the message types of a package. Raises rospkg.ResourceNotFound."""
+    return list_types(package, MODE_MSG)
+
+
+def list_srvs(package: str, rospack: object = None) -> list[str]:
+    """Return the service types of a package. Raises rospkg.ResourceNotFound."""
+    return list_types(package, MODE_SRV)
+
+
+def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
+    """Return the types of a package. Raises rospkg.ResourceNotFound, ValueError on an unknown mode."""
+    from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
+
+    if not isinstance(package, str):
+        raise ResourceNotFound(str(package))
+    try:
+        return _interfaces(_kind(mode)).in_package(package)
+    except NotFoundError as error:
+        raise ResourceNotFound(package) from error
+
+
+def rosmsg_md5(mode: str, type_: str) -> str:
+    """Return the md5sum of a type. Raises ROSMsgException."""
+    try:
+        return _interfaces(_kind(mode)).md5sum(type_)
+    except (NotFoundError, DefinitionError) as error:
+        raise ROSMsgException(str(error)) from error
+
+
+def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
+    """Yield the types of a name without its package."""
+    with contextlib.suppress(NotFoundError):
+        yield from _interfaces(_kind(mode)).find(base_type)
+
+
+def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
+    """Yield (name, folder of its definitions) of each package that has any."""
+    packages = Packages()
+    for name in Interfaces(packages, _kind(mode)).packages():
+        yield name, str(packages.find(name) / mode.removeprefix("."))
+
+
+def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
+    """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
+
+    Raises KeyError where it needs a message that is not in the context.
+    """
+    from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
+
+    text = describe(parsed_message(spec), lookup_in(msg_context))
+    text = "".join(indent + line for line in text.splitlines(keepends=True))
+    if buff is not None:
+        buff.write(text)
+    return text
+
+
+def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None = None) -> str:
+    """Return a message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
+
+    Else flat values are in braces if a message or array has more than four entries, so that it fits the screen.
+    """
+    import yaml
+
+    plain = _plain(msg)
+    style = flow_style_ if flow_style_ is not None else None if _width(plain) > _WIDE else False
+    text = yaml.safe_dump(plain, default_flow_style=style).rstrip("\n")
+    return "\n".join(prefix + line for line in text.split("\n"))
+
+
+def rosmsgmain(mode: str = MODE_MSG) -> int:
+    """Run the command on this process's command line. Return its exit status."""
+    from minirospy.ros.rosmsg.commands import rosmsg
+
+    return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
+
+
+def rosmsg_cmd_list(mode: str, full: object, argv: Sequence[str] | None = None) -> int:
+    """Run ``rosmsg list`` or ``rossrv list``."""
+    return _run(mode, ["list", *(argv or sys.argv[1:])[1:]])
+
+
+def rosmsg_cmd_packages(mode: str, full: object, argv: Sequence[str] | None = None) -> int:
+    """Run ``rosmsg packages`` or ``rossrv packages``."""
+    return _run(mode, ["packages", *(argv or sys.argv[1:])[1:]])
+
+
+def rosmsg_cmd_md5(mode: str, full: object) -> int:
+    """Run ``rosmsg md5`` or ``rossrv md5`` with the arguments of this process's command line."""
+    return _run(mode, ["md5", *sys.argv[2:]])
+
+
+def rosmsg_cmd_package(mode: str, full: object) -> int:
+    """Run ``rosmsg package`` or ``rossrv package`` with the arguments of this process's command line."""
+    return _run(mode, ["package", *sys.argv[2:]])
+
+
+def rosmsg_cmd_show(mode: str, full: object, alias: str = "show") -> int:
+    """Run ``rosmsg show`` or ``rossrv show`` with the arguments of this process's command line."""
+    return _run(mode, ["show", *sys.argv[2:]])
+
+
+def _run(mode: str, words: Sequence[str]) -> int:
+    from minirospy.ros.rosmsg.commands import rosmsg
+
+    return rosmsg.main_srv(words) if mode == MODE_SRV else rosmsg.main(words)
+
+
+def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
+    """Return the names in a folder for whose path ``rfilter`` is true; none if the folder does not exist."""
+    if not os.path.isdir(path):
+        return []
+    return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
+
+
+def _msg_filter(ext: str) -> Callable[[str], bool]:
+    """Return a function of a path that returns whether it is a file with this extension."""
+    return lambda path: os.path.isfile(path) and path.endswith(ext)
+
+
+def _list_types(path: str, subdir: str, ext: str) -> list[str]:
+    """Return the names of the types that the files in a folder define, sorted; ``subdir`` has no effect, as in ROS."""
+    return sorted(name[: -len(ext)] for name in _list_resources(path, _msg_filter(ext)))
+
+
+def _plain(value: object) -> object:
+    """Return a value as dictionaries, lists and scalars of YAML."""
+    if isinstance(value, TVal):
+        return {"secs": value.secs, "nsecs": value.nsecs}
+    if hasattr(value, "__slots__"):
+        return {name: _plain(getattr(value, name)) for name in value.__slots__}
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def _width(plain: object) -> int:
+    """Return the number of entries of the widest dictionary or list."""
+    inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
+    return max(len(inner), *map(_width, inner), 0)
+
+
+def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
+    """Return the folders of a package's definitions, for programs that load them by genmsg."""
+    return [rospack.get_path(pkgname)]
+
+
+def _text(type_: str, raw: bool, kind: Kind) -> str:
+    if not isinstance(type_, str):
+        raise ROSMsgException(f"Invalid type [{type_}]: it is not text")
+    interfaces = _interfaces(kind)
+    try:
+        return interfaces.text(type_) if raw else interfaces.description(type_)
+    except (NotFoundError, DefinitionError) as error:
+        raise ROSMsgException(str(error)) from error
+
+
+def _kind(mode: str) -> Kind:
+    try:
+        return _KINDS[mode]
+    except KeyError:
+        raise ValueError(f"Unknown mode: {mode}") from None
+
+
+def _interfaces(kind: Kind) -> Interfaces:
+    return Interfaces(Packages(), kind)

@@ -1,0 +1,310 @@
+"""rosnode: queries about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import NoReturn
+
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
+from minirospy.introspect import nodes
+from minirospy.introspect.graph import Graph, NodeAddress, node_host
+from minirospy.introspect.texts import connections_text, node_text
+from minirospy.ros.rosgraph.rosgraph import masterapi
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+__all__ = [
+    "ID",
+    "NAME",
+    "ROSNodeException",
+    "ROSNodeIOException",
+    "cleanup_master_blacklist",
+    "cleanup_master_whitelist",
+    "get_api_uri",
+    "get_machines_by_nodes",
+    "get_node_connection_info_description",
+    "get_node_info_description",
+    "get_node_names",
+    "get_nodes_by_machine",
+    "kill_nodes",
+    "rosnode_cleanup",
+    "rosnode_info",
+    "rosnode_listnodes",
+    "rosnode_ping",
+    "rosnode_ping_all",
+    "rosnodemain",
+]
+
+NAME = "rosnode"
+ID = "/rosnode"
+_RULE = "-" * 80
+_PING_SECONDS = 3.0
+
+
+class ROSNodeException(Exception):
+    """A request about a node failed."""
+
+
+class ROSNodeIOException(ROSNodeException):
+    """The master or the node does not answer."""
+
+
+def get_node_names(namespace: str | None = None) -> list[str]:
+    """Return the names of the nodes at or below ``namespace``. Raises ROSNodeIOException."""
+    with _graph() as graph:
+        return nodes.list_nodes(graph, graph.resolve(namespace) if namespace else "/")
+
+
+def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = False) -> str | None:
+    """Return the URI of a node; None where the master does not know it. The master is always queried."""
+    with _graph(master) as graph:
+        return graph.node_uri(caller_id)
+
+
+def get_node_info_description(node_name: str) -> str:
+    """Return what the master knows of a node, as `rosnode info` prints it. Raises ROSNodeIOException."""
+    with _graph() as graph:
+        name = graph.resolve(node_name)
+        try:
+            return node_text(nodes.node_detail(graph, name))
+        except NotFoundError:
+            return node_text(nodes.NodeDetail(name, None, [], [], []))
+
+
+def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
+    """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
+
+    Raises ROSNodeIOException where the node does not answer.
+    """
+    with _graph(master) as graph:
+        try:
+            return connections_text(graph, nodes.node_connections(graph, NodeAddress(node_api, node_api)))
+        except NodeUnreachableError as error:
+            raise ROSNodeIOException(f"Communication with node[{node_api}] failed!") from error
+
+
+def rosnode_ping(
+    node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
+) -> bool:
+    """Return whether a node answers ``max_count`` pings (None: pings until it does not). Raises ROSNodeIOException.
+
+    Why it does not is printed on stderr, all else with ``verbose`` alone.
+    """
+    with _graph() as graph:
+        name = graph.resolve(node_name)
+        uri = graph.node_uri(name)
+        if uri is None:
+            print(f"cannot ping [{name}]: unknown node", file=sys.stderr)
+            return False
+        if verbose:
+            _announce(name)
+        times: list[float] = []
+        while max_count is None or len(times) < max_count:
+            if times:
+                time.sleep(1.0)
+            seconds = _ping(graph, NodeAddress(name, uri), verbose)
+            if seconds is None:
+                return False
+            times.append(seconds)
+        if verbose and len(times) > 1:
+            print(f"ping average: {sum(times) / len(times) * 1000.0:f}ms")
+    return True
+
+
+def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
+    """Return (nodes that answer, nodes that do not). Raises ROSNodeIOException."""
+    answering: list[str] = []
+    silent: list[str] = []
+    with _graph() as graph:
+        found = graph.addresses(nodes.list_nodes(graph))
+        if verbose:
+            print("Will ping the following nodes: \n" + "".join(f" * {node.name}\n" for node in found))
+        for node in found:
+            if verbose:
+                _announce(node.name)
+            answers = node.uri is not None and _ping(graph, node, verbose) is not None
+            (answering if answers else silent).append(node.name)
+    return answering, silent
+
+
+def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
+    """Request nodes to shut down; return (notified, unknown or unreachable). Without a master all are unknown."""
+    notified: list[str] = []
+    unknown: list[str] = []
+    try:
+        with _graph() as graph:
+            for node in graph.addresses(node_names):
+                if node.uri is None:
+                    unknown.append(node.name)
+                    continue
+                try:
+                    nodes.kill_node(graph, node)
+                    notified.append(node.name)
+                except NodeUnreachableError:
+                    unknown.append(node.name)
+    except ROSNodeIOException:
+        unknown = [name for name in node_names if name not in notified]
+    return notified, unknown
+
+
+def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
+    """Take what the nodes in ``blacklist`` registered out of the master, and print their names.
+
+    Raises ConnectionRefusedError where no master answers, as ROS's does.
+    """
+    with _graph(master, ConnectionRefusedError) as graph:
+        # Also where nothing is on the list: a master that does not answer is an error.
+        graph.state()
+        for node in graph.addresses(blacklist):
+            print(f"Unregistering {node.name}")
+            nodes.forget_node(graph, node)
+
+
+def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
+    """Take what all nodes but those in ``whitelist`` registered out of the master.
+
+    Raises ConnectionRefusedError where no master answers, as ROS's does.
+    """
+    with _graph(master, ConnectionRefusedError) as graph:
+        for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
+            nodes.forget_node(graph, node)
+
+
+def get_machines_by_nodes() -> list[str]:
+    """Return the machines that nodes run on."""
+    with _graph() as graph:
+        hosts = (node_host(node.uri) for node in graph.addresses(nodes.list_nodes(graph)))
+        return sorted({host for host in hosts if host})
+
+
+def get_nodes_by_machine(machine: str) -> list[str]:
+    """Return the nodes on a machine. Raises ROSNodeException where its name does not resolve."""
+    try:
+        wanted = socket.gethostbyname(machine)
+    except OSError as error:
+        raise ROSNodeException(f"cannot resolve machine name [{machine}] to address") from error
+    with _graph() as graph:
+        return [
+            node.name
+            for node in graph.addresses(nodes.list_nodes(graph))
+            if (host := node_host(node.uri)) and (host == machine or _address(host) == wanted)
+        ]
+
+
+def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list_all: bool = False) -> None:
+    """Print what `rosnode list` prints."""
+    print(_sub_rosnode_listnodes(namespace, list_uri, list_all))
+
+
+def rosnode_info(node_name: str, quiet: bool = False) -> None:
+    """Print what `rosnode info` prints; ``quiet``: without asking the node. Raises ROSNodeIOException."""
+    print(f"{_RULE}\n{get_node_info_description(node_name)}")
+    if quiet:
+        return
+    with _graph() as graph:
+        name = graph.resolve(node_name)
+        uri = graph.node_uri(name)
+    if uri is None:
+        print(f"cannot contact [{name}]: unknown node", file=sys.stderr)
+        return
+    print(f"\ncontacting node {uri} ...")
+    print(get_node_connection_info_description(uri, masterapi.Master(ID)))
+
+
+def rosnode_cleanup() -> None:
+    """Run `rosnode cleanup` with its confirmation prompt. Raises ROSNodeIOException."""
+    from minirospy.ros.rosnode.commands.rosnode import main
+
+    with _graph() as graph:
+        graph.master.get_pid()
+    main(["cleanup"])
+
+
+def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
+    """Run the command; ``argv`` starts with its name. Exit with its status, as ROS's does."""
+    from minirospy.ros.rosnode.commands.rosnode import main
+
+    sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
+
+
+# Of ROS's private functions those that programs call.
+
+
+def _command(argv: Sequence[str]) -> None:
+    from minirospy.ros.rosnode.commands.rosnode import main
+
+    if status := main(list(argv)[1:]):
+        sys.exit(status)
+
+
+_rosnode_cmd_cleanup = _rosnode_cmd_info = _rosnode_cmd_kill = _command
+_rosnode_cmd_list = _rosnode_cmd_machine = _rosnode_cmd_ping = _command
+
+
+def _fullusage(return_error: bool = True) -> NoReturn:
+    """Print the commands, and exit: with the status of a usage error, or 0."""
+    from minirospy.ros.rosnode.commands.rosnode import main
+
+    status = main([])
+    sys.exit(status if return_error else 0)
+
+
+def _sub_rosnode_listnodes(
+    namespace: str | None = None, list_uri: bool = False, list_all: bool = False
+) -> str:
+    """Return the lines that `rosnode list` prints."""
+    with _graph() as graph:
+        found = graph.addresses(get_node_names(namespace))
+    if list_all:
+        return "\n".join(f"{node.uri or 'unknown address'} \t{node.name}" for node in found)
+    return "\n".join((node.uri or "unknown address") if list_uri else node.name for node in found)
+
+
+def _succeed(args: Sequence[object]) -> object:
+    """Return the value of an answer (code, text, value). Raises ROSNodeException where it is an error."""
+    code, text, value = args
+    if code != 1:
+        raise ROSNodeException(f"remote call failed: {text}")
+    return value
+
+
+def _announce(name: str) -> None:
+    print(f"pinging {name} with a timeout of {_PING_SECONDS}s")
+
+
+def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
+    """Return the seconds that a ping takes; None where the node does not answer, which is printed."""
+    try:
+        seconds = nodes.ping_node(graph, node, _PING_SECONDS)
+    except NodeUnreachableError as error:
+        print(f"ERROR: {error}", file=sys.stderr)
+        return None
+    if verbose:
+        print(f"xmlrpc reply from {node.uri}\ttime={seconds * 1000.0:f}ms")
+    return seconds
+
+
+def _address(host: str) -> str | None:
+    try:
+        return socket.gethostbyname(host)
+    except OSError:
+        return None
+
+
+@contextmanager
+def _graph(
+    master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
+) -> Iterator[Graph]:
+    """Yield the graph of ``master``, else of the environment's; raise errors as this module's exceptions."""
+    # A ServerProxy, which old scripts pass, has any attribute, but no such text.
+    uri = getattr(master, "master_uri", None)
+    try:
+        with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:
+            yield graph
+    except MasterUnreachableError as error:
+        raise unreachable(str(error)) from error
+    except MinirospyError as error:
+        raise ROSNodeException(str(error)) from error

@@ -1,0 +1,155 @@
+"""rospy.core: the life cycle of a node, in addition to the names of `minirospy.client`.
+
+Source: the behaviour of rospy.core; its internal log functions write to the log file only.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from minirospy.base.environment import split_uri
+from minirospy.base.errors import ROSException
+from minirospy.client.log import logerr, logger_of, places, write
+from minirospy.client.session import current_session
+from minirospy.ros.rospy.rospy.names import ParameterInvalid, Validator, valid_name
+
+if TYPE_CHECKING:
+    from minirospy.client.log import Keywords
+
+__all__ = [
+    "MASTER_NAME",
+    "ROSRPC",
+    "add_client_shutdown_hook",
+    "add_preshutdown_hook",
+    "add_shutdown_hook",
+    "get_ros_root",
+    "is_initialized",
+    "is_shutdown_requested",
+    "is_topic",
+    "logerror",
+    "parse_rosrpc_uri",
+    "register_signals",
+    "rospydebug",
+    "rospyerr",
+    "rospyinfo",
+    "rospywarn",
+    "service_logger",
+    "topics_logger",
+]
+
+MASTER_NAME = "master"
+ROSRPC = "rosrpc://"
+service_logger = logging.getLogger("rospy.service")
+topics_logger = logging.getLogger("rospy.topics")
+_internal = logging.getLogger("rospy.internal")
+rospydebug = _internal.debug
+rospyinfo = _internal.info
+rospywarn = _internal.warning
+rospyerr = _internal.error
+logerror = logerr
+_LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "warning": logging.WARNING,
+    "error": logging.ERROR,
+    "critical": logging.CRITICAL,
+    "fatal": logging.CRITICAL,
+}
+
+
+def _base_logger(
+    msg: object,
+    args: tuple[object, ...],
+    kwargs: Keywords,
+    throttle: float | None = None,
+    throttle_identical: bool = False,
+    level: str = "info",
+    once: bool = False,
+) -> None:
+    """Log for the caller of the caller, as rospy's log functions do: programs have such functions, too.
+
+    ``level`` is a method of logging.Logger (``warning``), ``kwargs`` may have ``logger_name``.
+    """
+    logger = logger_of(kwargs.pop("logger_name", None))  # type: ignore[typeddict-item]
+    number = _LEVELS[level]
+    if not logger.isEnabledFor(number):
+        return
+    frame = sys._getframe(2)
+    if once:
+        is_due = places.is_first(frame)
+    else:
+        is_due = places.is_due(frame, throttle) if throttle else not throttle_identical
+        if throttle_identical:
+            is_due = places.is_new(frame, msg) or is_due
+    if is_due:
+        write(logger, number, frame, msg, args, **kwargs)
+
+
+def is_initialized() -> bool:
+    """Return whether init_node has been called."""
+    return current_session().initialized
+
+
+def is_shutdown_requested() -> bool:
+    """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
+    return current_session().lifecycle.is_shutdown_requested
+
+
+def add_preshutdown_hook(h: Callable[[object], object]) -> None:
+    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
+    lifecycle = current_session().lifecycle
+    lifecycle.add_hook(_given_reason(h), lifecycle.late_hooks)
+
+
+def add_shutdown_hook(h: Callable[[object], object]) -> None:
+    """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
+    lifecycle = current_session().lifecycle
+    lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
+
+
+def add_client_shutdown_hook(h: Callable[[], object]) -> None:
+    """Call ``h()`` at shutdown, as rospy.on_shutdown."""
+    current_session().lifecycle.add_hook(h)
+
+
+def register_signals() -> None:
+    """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
+    current_session().signals.install()
+
+
+def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
+    """Return ROS_ROOT of the environment. Raises ROSException where it is ``required`` and not set."""
+    root = (os.environ if env is None else env).get("ROS_ROOT")
+    if required and not root:
+        raise ROSException("ROS_ROOT is not set")
+    return root
+
+
+def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
+    """Return (host, port) of a service's ``rosrpc://host:port``. Raises ParameterInvalid."""
+    if not uri.startswith(ROSRPC):
+        raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
+    try:
+        host, port, _ = split_uri(uri, "rosrpc")
+    except ValueError:
+        raise ParameterInvalid(f"ROS service URL is invalid: {uri}") from None
+    return host, port
+
+
+def is_topic(param_name: str) -> Validator:
+    """Return a check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
+    return valid_name(param_name)
+
+
+def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
+    """Return ``h`` as a hook without an argument, for the lifecycle. Raises TypeError."""
+    if not callable(h):
+        raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
+    lifecycle = current_session().lifecycle
+    is_late = lifecycle.is_shutdown()
+    return lambda: h("already shutdown" if is_late else lifecycle.reason)

@@ -1,0 +1,107 @@
+"""rospy.impl.masterslave: the Slave API of this process's node, as an object with a method for each call.
+
+The server itself is ``runtime/node/slave.py``; this answers programs that call its methods within the process.
+Source: http://wiki.ros.org/ROS/Slave_API.
+"""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from minirospy.client.session import current_session
+from minirospy.ros.rosgraph.rosgraph.xmlrpc import XmlRpcHandler
+
+__all__ = ["ROSHandler"]
+
+STATUS, MSG, VAL = 0, 1, 2
+LOG_API = True
+
+Answer = tuple[int, str, Any]
+
+
+class ROSHandler(XmlRpcHandler):
+    """The Slave API of a node called ``name``: each method takes the caller's name first, and returns (code, text, value)."""
+
+    _remap_table = {"requestTopic": [0]}
+
+    def __init__(self, name: str, master_uri: str) -> None:
+        self.name = name
+        self.masterUri = master_uri
+        self.uri: str | None = None
+        self.done = False
+
+    @classmethod
+    def remappings(cls, methodName: str) -> list[int]:
+        """Return the positions of a method's arguments that are names."""
+        return cls._remap_table.get(methodName, [])
+
+    def getName(self, *args: object) -> Answer:
+        """Return the node's name."""
+        return self._call("getName", args, value=self.name)
+
+    def getUri(self, *args: object) -> Answer:
+        """Return the address of the server that this handler was given to; None before."""
+        return self._call("getUri", args, value=self.uri)
+
+    def getMasterUri(self, *args: object) -> Answer:
+        """Return the master's address."""
+        code, _, value = self._call("getMasterUri", args, value=self.masterUri)
+        return code, str(value), value
+
+    def getPid(self, *args: object) -> Answer:
+        """Return the process number."""
+        return self._call("getPid", args)
+
+    def getBusStats(self, *args: object) -> Answer:
+        """Return transferred bytes and messages."""
+        return self._call("getBusStats", args)
+
+    def getBusInfo(self, *args: object) -> Answer:
+        """Return a row for each connection."""
+        return self._call("getBusInfo", args)
+
+    def getPublications(self, *args: object) -> Answer:
+        """Return [topic, type] of each topic that the node publishes."""
+        return self._call("getPublications", args)
+
+    def getSubscriptions(self, *args: object) -> Answer:
+        """Return [topic, type] of each topic that the node subscribes to."""
+        return self._call("getSubscriptions", args)
+
+    def paramUpdate(self, *args: object) -> Answer:
+        """Take a parameter's new value."""
+        return self._call("paramUpdate", args)
+
+    def publisherUpdate(self, *args: object) -> Answer:
+        """Take the publishers of a topic."""
+        return self._call("publisherUpdate", args)
+
+    def requestTopic(self, *args: object) -> Answer:
+        """Return where a topic of this node is."""
+        return self._call("requestTopic", args)
+
+    def shutdown(self, *args: object) -> Answer:
+        """End the node."""
+        return self._call("shutdown", args)
+
+    def _ready(self, uri: str) -> None:
+        self.uri = uri
+
+    def _is_registered(self) -> bool:
+        return self.uri is not None
+
+    def _shutdown(self, reason: str = "") -> None:
+        self.done = True
+
+    def _call(self, method: str, args: tuple[object, ...], **known: object) -> Answer:
+        """Return the answer of the node's own API; with ``value``, of a call that any handler can answer."""
+        session = current_session()
+        if session.node is None:
+            return -1, "the node has not been initialized", known.get("value", 0)
+
+        from minirospy.base.steps import Steps, finish
+        from minirospy.runtime.node.slave import SlaveApi
+
+        answer = SlaveApi(session.node).dispatch(method, args)
+        code, text, value = answer if isinstance(answer, list) else finish(cast("Steps[list[Any]]", answer))
+        return code, text, known.get("value", value) if code == 1 else value

@@ -1,0 +1,78 @@
+"""Internal names of rospy that programs read and set: each is a property of its module.
+
+Imported by `import rospy` as the last of its modules, so that those are there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import rospy.client
+import rospy.core
+import rospy.rostime
+
+from minirospy.client.session import current_session, replace_session
+from minirospy.client.time import get_rostime
+from minirospy.ros.rospy.rospy.rostime import (
+    is_rostime_initialized,
+    is_wallclock,
+    set_rostime,
+    set_rostime_initialized,
+)
+
+__all__: list[str] = []
+
+
+_Get = Callable[[], object]
+_Put = Callable[[Any], object]
+
+
+def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
+    """Give ``module`` attributes: each a function that returns the value, and one that takes a new one.
+
+    To delete one brings back the value before, which is how unittest.mock ends a patch.
+    """
+
+    def attribute(get: _Get, put: _Put) -> property:
+        before: list[object] = []
+
+        def replace(_: ModuleType, value: object) -> None:
+            before[:] = [get()]
+            put(value)
+
+        def restore(_: ModuleType) -> None:
+            for value in before:
+                put(value)
+
+        return property(lambda _: get(), replace, restore)
+
+    kind = type("module", (ModuleType,), {name: attribute(*both) for name, both in names.items()})
+    module.__class__ = kind
+
+
+def _restart_unless(value: object) -> None:
+    if not value:
+        replace_session()
+
+
+# Programs that want another node after the first has shut down say so by setting the flags to False.
+_install(
+    rospy.core,
+    _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),
+    _in_shutdown=(lambda: current_session().lifecycle.is_shutdown_requested, _restart_unless),
+    _client_shutdown_hooks=(
+        lambda: current_session().lifecycle.hooks,
+        lambda value: current_session().lifecycle.hooks.__setitem__(slice(None), value),
+    ),
+)
+_install(
+    rospy.client,
+    _init_node_args=(lambda: current_session().init_arguments, _restart_unless),
+)
+_install(
+    rospy.rostime,
+    _rostime_initialized=(is_rostime_initialized, set_rostime_initialized),
+    _rostime_current=(lambda: None if is_wallclock() else get_rostime(), set_rostime),
+)

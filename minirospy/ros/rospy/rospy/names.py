@@ -1,0 +1,127 @@
+"""rospy.names: remappings, and the validation of a call's arguments.
+
+Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from minirospy.base import names
+from minirospy.base.errors import ROSException
+from minirospy.client.session import current_session
+from minirospy.ros.ros_names import is_global, is_private
+from minirospy.ros.rosgraph.rosgraph.names import resolve_name
+
+__all__ = [
+    "ANYTYPE",
+    "SERVICE_ANYTYPE",
+    "TOPIC_ANYTYPE",
+    "ParameterInvalid",
+    "get_mappings",
+    "get_resolved_mappings",
+    "global_name",
+    "initialize_mappings",
+    "reload_mappings",
+    "resolve_name_without_node_name",
+    "scoped_name",
+    "valid_name",
+    "valid_name_validator_resolved",
+    "valid_name_validator_unresolved",
+]
+
+
+def _set_caller_id(name: str) -> None:
+    current_session().identity.be_called(name)
+
+
+ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
+
+Validator = Callable[[object, str], str]
+"""Checks an argument of a call by the node ``caller_id``, and returns the value to use."""
+
+
+class ParameterInvalid(Exception):
+    """An argument of a call is invalid."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self._message = message
+
+    def __str__(self) -> str:
+        return self._message
+
+
+def get_mappings() -> dict[str, str]:
+    """Return the remappings of this node's command line as they are spelled, ``__name`` and its like included."""
+    arguments = current_session().identity.arguments
+    return {**arguments.remappings, **arguments.special}
+
+
+def get_resolved_mappings() -> dict[str, str]:
+    """Return the remappings by global names; empty before init_node."""
+    session = current_session()
+    identity = session.identity
+    return {**identity.remappings, **identity.arguments.special} if session.initialized else {}
+
+
+def reload_mappings(argv: Sequence[str]) -> None:
+    """Use ``argv`` as this node's command line."""
+    current_session().identity.reload_arguments(argv)
+
+
+def initialize_mappings(node_name: str) -> None:
+    """Resolve the remappings again, as the node ``node_name`` sees them."""
+    identity = current_session().identity
+    identity.remappings = identity.arguments.resolved_remappings(node_name)
+
+
+def resolve_name_without_node_name(name: str) -> str:
+    """Return the global name of a topic before init_node. Raises ValueError on a private one."""
+    if is_private(name):
+        raise ValueError("~name topics cannot be created before init_node() has been called")
+    return current_session().identity.resolve_topic(name or "")
+
+
+def scoped_name(caller_id: str, name: str) -> str:
+    """Return ``name`` without the namespace of ``caller_id``. Raises ROSException where that is not global."""
+    if not is_global(caller_id):
+        raise ROSException("caller_id must be global")
+    return names.canonicalize(name)[len(names.namespace_of(caller_id)) :]
+
+
+def global_name(param_name: str) -> Validator:
+    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid."""
+
+    def validator(param_value: object, caller_id: str) -> str:
+        text = _text(param_name, param_value)
+        if not is_global(text):
+            raise ParameterInvalid(f"ERROR: parameter [{param_name}] must be a globally referenced name")
+        return text
+
+    return validator
+
+
+def valid_name(param_name: str, resolve: bool = True) -> Validator:
+    """Return a check that the argument ``param_name`` is a name, which it resolves. The check raises ParameterInvalid."""
+    check = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
+    return lambda param_value, caller_id: check(param_name, param_value, caller_id)
+
+
+def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
+    """Return the global name of an argument, not remapped. Raises ParameterInvalid."""
+    return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
+
+
+def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
+    """Return an argument that is a name. Raises ParameterInvalid."""
+    text = _text(param_name, param_value)
+    if ":" in text or " " in text:
+        raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")
+    return text
+
+
+def _text(param_name: str, param_value: object) -> str:
+    if not param_value or not isinstance(param_value, str):
+        raise ParameterInvalid(f"ERROR: parameter [{param_name}] must be a non-empty string")
+    return param_value

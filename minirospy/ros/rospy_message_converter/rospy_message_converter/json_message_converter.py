@@ -1,0 +1,37 @@
+"""rospy_message_converter.json_message_converter: messages as JSON, and back."""
+
+from __future__ import annotations
+
+import json
+
+from minirospy.core.idl.protocols import Message
+from minirospy.ros.rospy_message_converter.rospy_message_converter.message_converter import (
+    convert_dictionary_to_ros_message,
+    convert_ros_message_to_dictionary,
+)
+
+__all__ = ["convert_json_to_ros_message", "convert_ros_message_to_json"]
+
+
+def convert_json_to_ros_message(
+    message_type: str,
+    json_message: str,
+    strict_mode: bool = True,
+    check_missing_fields: bool = False,
+    check_types: bool = True,
+    log_level: str = "error",
+) -> object:
+    """Return a message of a type with the values of a JSON object. Raises ValueError, TypeError, NotFoundError."""
+    return convert_dictionary_to_ros_message(
+        message_type,
+        json.loads(json_message),
+        strict_mode=strict_mode,
+        check_missing_fields=check_missing_fields,
+        check_types=check_types,
+        log_level=log_level,
+    )
+
+
+def convert_ros_message_to_json(message: Message, binary_array_as_bytes: bool = True) -> str:
+    """Return the fields of a message as a JSON object."""
+    return json.dumps(convert_ros_message_to_dictionary(message, binary_array_as_bytes))

@@ -1,0 +1,172 @@
+"""The lines to a device: serial ports (by pyserial), sockets, and files of a program's own."""
+
+from __future__ import annotations
+
+import select
+import socket
+import time
+from typing import Any, Protocol, runtime_checkable
+
+from minirospy.base.errors import MinirospyError
+from minirospy.base.installation import install_command
+
+__all__ = ["File", "FilePort", "Port", "PortError", "SerialPort", "SocketPort"]
+
+_LOOK_SECONDS = 0.1
+_WRITE_SECONDS = 10
+_CHUNK = 4096
+
+
+class PortError(MinirospyError):
+    """A line cannot be opened, or has broken: one line with the reason."""
+
+
+class Port(Protocol):
+    """A line to a device."""
+
+    def read(self) -> bytes:
+        """Return what has come, nothing after a moment. Raises PortError where the line has broken."""
+
+    def write(self, data: bytes) -> None:
+        """Write all of it. Raises PortError."""
+
+    def flush_input(self) -> None:
+        """Forget what has come and is not read."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+@runtime_checkable
+class File(Protocol):
+    """A program's own line: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is called where there is one."""
+
+    def read(self, count: int, /) -> bytes:
+        """Return bytes of the device."""
+
+    def write(self, data: bytes, /) -> object:
+        """Write bytes to the device."""
+
+    def inWaiting(self) -> int:
+        """Return how many bytes have come."""
+
+
+class SerialPort:
+    """A serial port. Raises PortError where it cannot be opened, ImportError without pyserial."""
+
+    def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
+        try:
+            import serial  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        except ImportError as error:
+            raise ImportError(
+                f"serial ports need pyserial: {install_command('minirospy[serial]')}"
+            ) from error
+
+        self._errors: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
+        try:
+            self._serial: Any = serial.Serial(
+                path,
+                baud,
+                timeout=_LOOK_SECONDS,
+                write_timeout=_WRITE_SECONDS,
+                rtscts=uses_handshake,
+                dsrdtr=uses_handshake,
+            )
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise PortError(str(error)) from error
+
+    def read(self) -> bytes:
+        """Return what has come, nothing after a moment. Raises PortError where the line has broken."""
+        try:
+            first = bytes(self._serial.read(1))
+            waiting = self._serial.in_waiting if first else 0
+            return first + bytes(self._serial.read(waiting) if waiting else b"")
+        except self._errors as error:
+            raise PortError(f"Serial Port read failure: {error}") from error
+
+    def write(self, data: bytes) -> None:
+        """Write all of it. Raises PortError."""
+        try:
+            self._serial.write(data)
+        except self._errors as error:
+            raise PortError(f"Serial Port write failure: {error}") from error
+
+    def flush_input(self) -> None:
+        """Forget what has come and is not read."""
+        try:
+            self._serial.reset_input_buffer()
+        except Exception as error:
+            raise PortError(str(error)) from error
+
+    def close(self) -> None:
+        """Close it."""
+        self._serial.close()
+
+
+class SocketPort:
+    """A connection of TCP."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
+        connection.settimeout(_WRITE_SECONDS)
+
+    def read(self) -> bytes:
+        """Return what has come, nothing after a moment. Raises PortError where the connection is closed."""
+        try:
+            ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
+            if not ready:
+                return b""
+            data = self._socket.recv(_CHUNK)
+        except (OSError, ValueError) as error:
+            raise PortError(str(error)) from error
+        if not data:
+            raise PortError("the device has closed the connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Write all of it. Raises PortError."""
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise PortError(str(error)) from error
+
+    def flush_input(self) -> None:
+        """Do nothing: what a connection delivers is whole."""
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()
+
+
+class FilePort:
+    """An object of a program's own with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient takes it."""
+
+    def __init__(self, file: File) -> None:
+        self._file = file
+
+    def read(self) -> bytes:
+        """Return what has come, nothing after a moment. Raises PortError for what the object raises."""
+        try:
+            waiting = int(self._file.inWaiting())
+            if waiting < 1:
+                time.sleep(0.001)
+                return b""
+            return bytes(self._file.read(waiting))
+        except (OSError, RuntimeError) as error:
+            raise PortError(str(error)) from error
+
+    def write(self, data: bytes) -> None:
+        """Write all of it. Raises PortError."""
+        try:
+            self._file.write(data)
+        except (OSError, RuntimeError) as error:
+            raise PortError(str(error)) from error
+
+    def flush_input(self) -> None:
+        """Forget what has come and is not read."""
+        flush = getattr(self._file, "flushInput", None)
+        if flush is not None:
+            flush()
+
+    def close(self) -> None:
+        """Leave it open: it is the program's."""

@@ -1,0 +1,186 @@
+"""rosservice: queries about services, and calls. Source: http://wiki.ros.org/rosservice."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from minirospy.base.errors import (
+    MasterUnreachableError,
+    MessageException,
+    MinirospyError,
+    NodeUnreachableError,
+    NotFoundError,
+    ServiceException,
+)
+from minirospy.client.params import check_sendable
+from minirospy.introspect import services
+from minirospy.introspect.graph import Graph
+from minirospy.ros.rosgraph.rosgraph import masterapi
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.protocols import Message, ServiceClass
+
+__all__ = [
+    "NAME",
+    "ROSServiceException",
+    "ROSServiceIOException",
+    "call_service",
+    "get_service_args",
+    "get_service_class_by_name",
+    "get_service_headers",
+    "get_service_list",
+    "get_service_node",
+    "get_service_type",
+    "get_service_uri",
+    "has_service_args",
+    "rosservice_find",
+    "rosservicemain",
+]
+
+NAME = "rosservice"
+
+
+class ROSServiceException(Exception):
+    """A request about a service failed."""
+
+
+class ROSServiceIOException(ROSServiceException):
+    """The master or the service does not answer."""
+
+
+def get_service_list(
+    node: str | None = None, namespace: str | None = None, include_nodes: bool = False
+) -> list[Any]:
+    """Return the names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
+    with _graph() as graph:
+        found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
+        owner = _resolved(graph, node) if node else None
+    found = [each for each in found if owner is None or owner in each.nodes]
+    return [[each.name, list(each.nodes)] if include_nodes else each.name for each in found]
+
+
+def get_service_type(service_name: str) -> str | None:
+    """Return the type of a service; None where it does not exist. Raises ROSServiceIOException where it does not answer."""
+    with _graph() as graph:
+        try:
+            return services.service_type(graph, _sent(graph, service_name))
+        except NotFoundError:
+            return None
+
+
+def get_service_uri(service_name: str) -> str | None:
+    """Return the URI of a service; None where it does not exist."""
+    with _graph() as graph:
+        try:
+            return services.service_uri(graph, _sent(graph, service_name))
+        except NotFoundError:
+            return None
+
+
+def get_service_node(service_name: str) -> str | None:
+    """Return the node that offers a service; None where it does not exist."""
+    with _graph() as graph:
+        nodes = graph.state().services.get(_resolved(graph, service_name))
+    return nodes[0] if nodes else None
+
+
+def get_service_args(service_name: str) -> str:
+    """Return the names of the fields of a service's request, with spaces between. Raises ROSServiceException."""
+    with _graph() as graph:
+        return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
+
+
+def get_service_class_by_name(service_name: str) -> ServiceClass:
+    """Return the class of a running service. Raises ROSServiceException where it does not exist or is not installed."""
+    from minirospy.core.idl.load import service_class
+
+    with _graph() as graph:
+        return service_class(services.service_type(graph, _sent(graph, service_name)))
+
+
+def rosservice_find(service_type: str) -> list[str]:
+    """Return the services of a type."""
+    with _graph() as graph:
+        if service_type:
+            return services.find_services_of_type(graph, service_type)
+        # No service has it; as ROS's, it raises where no master answers.
+        services.list_services(graph)
+        return []
+
+
+def call_service(
+    service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
+) -> tuple[Message, Any]:
+    """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
+    with _graph() as graph:
+        name = _sent(graph, service_name)
+        type_ = service_class._type if service_class else services.service_type(graph, name)
+        request = services.fill_request(type_, service_args)
+        return request, services.call_service(graph, name, type_, request)
+
+
+def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
+    """Return the connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    if not isinstance(service_uri, str):
+        raise ROSServiceException(
+            f"Unable to communicate with service [{service_name}], address [{service_uri}]"
+        )
+    with _graph() as graph:
+        return services.service_header(graph, _resolved(graph, service_name), service_uri)
+
+
+def has_service_args(service_name: str, service_class: ServiceClass | None = None) -> bool:
+    """Return whether a service's request has fields."""
+    return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
+
+
+def rosservicemain(argv: Sequence[str] | None = None) -> None:
+    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
+    from minirospy.ros.rosservice.commands.rosservice import main
+
+    if status := main(list(sys.argv if argv is None else argv)[1:]):
+        sys.exit(status)
+
+
+# Of ROS's private functions those that programs call.
+
+_rosservice_cmd_args = _rosservice_cmd_call = _rosservice_cmd_find = _rosservice_cmd_info = rosservicemain
+_rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice_cmd_uri = rosservicemain
+
+
+def _fullusage() -> None:
+    """Print the commands, and exit with the status of a usage error."""
+    rosservicemain([NAME])
+
+
+def _resolved(graph: Graph, name: str) -> str:
+    """Return the global name; what is not text as its text, which is the name of nothing, as in ROS."""
+    return graph.resolve(name) if isinstance(name, str) else str(name)
+
+
+def _sent(graph: Graph, name: str) -> str:
+    """Return the same of a name that is sent to the master. Raises TypeError where XML-RPC has no type for it."""
+    check_sendable(name)
+    return _resolved(graph, name)
+
+
+def _get_master() -> masterapi.Master:
+    """Return the master as rosservice calls it."""
+    return masterapi.Master("/rosservice")
+
+
+@contextmanager
+def _graph() -> Iterator[Graph]:
+    try:
+        with Graph.open("rosservice") as graph:
+            yield graph
+    except (MasterUnreachableError, NodeUnreachableError) as error:
+        raise ROSServiceIOException(str(error)) from error
+    except NotFoundError as error:
+        text = f"Service [{error.name}] is not available." if error.kind == "service" else str(error)
+        raise ROSServiceException(text) from error
+    except (MinirospyError, MessageException, ServiceException) as error:
+        raise ROSServiceException(str(error)) from error

@@ -1,0 +1,53 @@
+"""rostest.rostestutil: what the command `rostest` prints, for programs that run tests. Source: http://wiki.ros.org/rostest."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from typing import TYPE_CHECKING
+
+from minirospy.ros.rostest.runner.unit import (
+    create_xml_runner,
+    print_runner_summary,
+    print_unittest_summary,
+    xml_results_file,
+)
+
+if TYPE_CHECKING:
+    import unittest
+
+    from minirospy.ros.rostest.runner.junit import Result
+
+__all__ = [
+    "createXMLRunner",
+    "printRostestSummary",
+    "printSummary",
+    "printlog",
+    "printlogerr",
+    "xmlResultsFile",
+]
+
+createXMLRunner = create_xml_runner
+printSummary = print_unittest_summary
+xmlResultsFile = xml_results_file
+
+_logger = logging.getLogger("rostest")
+
+
+def printlog(msg: str, *args: object) -> None:
+    """Print a line, its ``%s`` filled with ``args``, and log it."""
+    text = msg % args if args else msg
+    _logger.info("%s", text)
+    print("[ROSTEST]" + text)
+
+
+def printlogerr(msg: str, *args: object) -> None:
+    """Print a line on standard error, its ``%s`` filled with ``args``, and log it as an error."""
+    text = msg % args if args else msg
+    _logger.error("%s", text)
+    print("[ROSTEST]" + text, file=sys.stderr)
+
+
+def printRostestSummary(result: unittest.TestResult, rostest_results: Result) -> None:
+    """Print the summary of a run: what the runner found, and the results of its nodes."""
+    print_runner_summary(result, rostest_results, "ROSTEST")

@@ -1,0 +1,47 @@
+"""roswtf.rules: from what a check returns to the errors and warnings of a context.
+
+A rule is a pair of a check and a text; a check returns what is wrong, or nothing. A list is written item by item.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from minirospy.ros.roswtf.roswtf.model import WtfError, WtfWarning
+
+__all__ = ["error_rule", "warning_rule"]
+
+
+class Context(Protocol):
+    """The subject of the rules of roswtf."""
+
+    errors: list[WtfError]
+    warnings: list[WtfError]
+
+    def as_dictionary(self) -> Mapping[str, object]:
+        """Return the values that a rule's text may name."""
+
+
+Rule = tuple[Callable[..., object], str]
+
+
+def error_rule(rule: Rule, ret: object, ctx: Context) -> None:
+    """Add an error to the context where the check of a rule returned something."""
+    _add(rule, ret, ctx, ctx.errors, WtfError)
+
+
+def warning_rule(rule: Rule, ret: object, ctx: Context) -> None:
+    """Add a warning to the context where the check of a rule returned something."""
+    _add(rule, ret, ctx, ctx.warnings, WtfWarning)
+
+
+def _add(rule: Rule, ret: object, ctx: Context, found: list[WtfError], kind: type[WtfError]) -> None:
+    if not ret:
+        return
+    text = rule[1] % ctx.as_dictionary()
+    if isinstance(ret, (list, tuple)):
+        text += "\n" + "".join(f" * {item}\n" for item in ret)
+    elif isinstance(ret, str):
+        text += ret
+    found.append(kind(text, rule[1], ret))

@@ -1,0 +1,290 @@
+"""The container that executes its states at the same time, each in a thread."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from minirospy.ros.smach.smach.container import Container
+from minirospy.ros.smach.smach.exceptions import (
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+)
+from minirospy.ros.smach.smach.log import logdebug, logerr, loginfo, logwarn
+from minirospy.ros.smach.smach.state import State
+from minirospy.ros.smach.smach.user_data import Remapper, UserData, Values
+from minirospy.ros.smach.smach.util import is_shutdown
+
+__all__ = ["Concurrence"]
+
+_SHUTDOWN_CHECK = 0.1
+"""Seconds between two looks for a shutdown."""
+
+
+class Concurrence(Container):
+    """Executes all of its states in parallel, and ends when all of them have ended.
+
+    Its outcome is what ``outcome_cb`` returns, else the outcome of ``outcome_map`` that most states agree with, else
+    ``default_outcome``; "preempted" where the states ended because the container was requested to.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: Mapping[str, Mapping[str, str]] | None = None,
+        outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
+        child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
+    ) -> None:
+        """``outcome_map``: outcome -> (label -> outcome of that state).
+
+        ``child_termination_cb`` gets the outcomes so far, None of those that execute, each time a state ends; where it
+        returns a true value, the other states are requested to end.
+        """
+        known = list(outcomes)
+        super().__init__(known, input_keys, output_keys)
+        self._states: dict[str, State] = {}
+        self._remappings: dict[str, Mapping[str, str]] = {}
+        self._default_outcome = default_outcome
+        self._outcome_map = outcome_map or {}
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+        self._check_policy(known)
+
+        self._is_running = False
+        self._threads: dict[str, threading.Thread] = {}
+        self._child_outcomes: dict[str, str | None] = {}
+        # Guards what follows, and is notified when the states that still execute are to end.
+        self._done_cond = threading.Condition()
+        self._is_ending = False
+        self._user_code_exception = False
+
+    def _check_policy(self, outcomes: Sequence[str]) -> None:
+        default = self._default_outcome
+        if not (default or self._outcome_map or self._outcome_cb):
+            raise InvalidStateError("Concurrence requires an outcome policy")
+        errors = ""
+        if default != str(default):
+            errors += f"\n\tDefault outcome '{default}' does not appear to be a string."
+        if default not in outcomes:
+            errors += f"\n\tDefault outcome '{default}' is unregistered."
+        for outcome in self._outcome_map:
+            if outcome not in outcomes:
+                errors += f"\n\tUnregistered outcome '{outcome}' in and_outcome_map."
+        if self._outcome_cb and not callable(self._outcome_cb):
+            errors += f"\n\tOutcome callback '{self._outcome_cb}' is not callable."
+        if self._child_termination_cb and not callable(self._child_termination_cb):
+            errors += f"\n\tChild termination callback '{self._child_termination_cb}' is not callable."
+        if errors:
+            raise InvalidStateError(f"Errors specifying outcome policy of concurrence: {errors}")
+
+    # Construction.
+
+    @staticmethod
+    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
+        """Add a state to the open container, and return it; ``remapping``: the state's key -> the container's."""
+        concurrence = Concurrence._currently_opened_container()
+        concurrence._states[label] = state
+        concurrence._remappings[label] = remapping or {}
+        return state
+
+    def check_consistency(self) -> None:
+        """Raise InvalidTransitionError where the outcome map names a state or an outcome that is not there."""
+        for outcomes in self._outcome_map.values():
+            for label, outcome in outcomes.items():
+                if label not in self._states:
+                    raise InvalidTransitionError(
+                        f"Outcome map in SMACH Concurrence references a state that does not exist: '{label}'"
+                    )
+                registered = self._states[label].get_registered_outcomes()
+                if outcome not in registered:
+                    raise InvalidTransitionError(
+                        "Outcome map in SMACH Concurrence references a state outcome that does not exist. Requested state "
+                        f"outcome: '{outcome}', but state '{label}' only has outcomes {registered}"
+                    )
+
+    # Execution.
+
+    def execute(self, parent_ud: Values | None = None) -> str | None:
+        """Execute all states; return the outcome. Raises InvalidStateError where one of them fails."""
+        if not self._states:
+            raise InvalidStateError("No states was added to concurrence")
+        self._copy_input_keys(parent_ud, self.userdata)
+        loginfo(f"Concurrence starting with userdata: \n\t{self.userdata.keys()}")
+        self.call_start_cbs()
+
+        self._is_running = True
+        self._executing_thread = threading.get_ident()
+        try:
+            self._run_states()
+            outcome = self._outcome()
+        finally:
+            self._is_running = False
+            self._threads, self._child_outcomes = {}, {}
+        self.call_termination_cbs(list(self._states), outcome)
+        self._copy_output_keys(self.userdata, parent_ud)
+        return outcome
+
+    def _run_states(self) -> None:
+        """Start a thread for each state, wait until they are to end, and until they have."""
+        self._is_ending = self._user_code_exception = False
+        self._child_outcomes = dict.fromkeys(self._states)
+        self._threads = {
+            label: threading.Thread(name=f"concurrent_split:{label}", target=self._run_state, args=(label,))
+            for label in self._states
+        }
+        for thread in self._threads.values():
+            thread.start()
+
+        with self._done_cond:
+            while not self._is_ending and not self.preempt_requested() and not is_shutdown():
+                self._done_cond.wait(_SHUTDOWN_CHECK)
+        logdebug("SMACH Concurrence preempting running states.")
+        for label, state in self._states.items():
+            if self._child_outcomes[label] is None:
+                state.request_preempt()
+        for thread in self._threads.values():
+            while thread.is_alive() and not is_shutdown():
+                thread.join(_SHUTDOWN_CHECK)
+
+        if self._user_code_exception:
+            raise InvalidStateError("A concurrent state raised an exception during execution.")
+
+    def _run_state(self, label: str) -> None:
+        self.call_transition_cbs()
+        try:
+            self._child_outcomes[label] = self._execute_state(label)
+            with self._done_cond:
+                self.call_transition_cbs()
+                if self._is_last_needed():
+                    self._is_ending = True
+                    self._done_cond.notify_all()
+        except Exception:  # noqa: BLE001 - each error has been logged; execute() raises
+            with self._done_cond:
+                self._user_code_exception = self._is_ending = True
+                self._done_cond.notify_all()
+
+    def _execute_state(self, label: str) -> str:
+        state = self._states[label]
+        userdata = Remapper(
+            self.userdata,
+            state.get_registered_input_keys(),
+            state.get_registered_output_keys(),
+            self._remappings[label],
+        )
+        try:
+            outcome = state.execute(userdata)
+        except Exception as error:
+            raise InvalidStateError(
+                f"Could not execute child state '{label}': {traceback.format_exc()}"
+            ) from error
+        if outcome is None:
+            raise InvalidStateError(f"Concurrent state '{label}' returned no outcome on termination.")
+        loginfo(f"Concurrent state '{label}' returned outcome '{outcome}' on termination.")
+        return outcome
+
+    def _is_last_needed(self) -> bool:
+        """Return whether no other state need go on, now that one has ended."""
+        others_end = False
+        if self._child_termination_cb:
+            try:
+                others_end = bool(self._child_termination_cb(self._child_outcomes))
+            except Exception as error:
+                raise InvalidUserCodeError(
+                    f"Could not execute child termination callback: {traceback.format_exc()}"
+                ) from error
+        return others_end or None not in self._child_outcomes.values()
+
+    def _outcome(self) -> str:
+        if self.preempt_requested() and self._are_preempts_serviced():
+            loginfo("Concurrence serviced preempt.")
+            self.service_preempt()
+            return "preempted"
+
+        loginfo(f"Concurrent Outcomes: {self._child_outcomes}")
+        outcome = self._mapped_outcome()
+        if self._outcome_cb:
+            try:
+                chosen = self._outcome_cb(dict(self._child_outcomes))
+            except Exception as error:
+                raise InvalidUserCodeError(
+                    f"Could not execute outcome callback '{self._outcome_cb}': {traceback.format_exc()}"
+                ) from error
+            if not chosen:
+                logwarn(f"Outcome callback returned None, using outcome '{outcome}'")
+            elif chosen != str(chosen):
+                logerr(
+                    f"Outcome callback returned a non-string '{chosen}', using default outcome '{self._default_outcome}'"
+                )
+            else:
+                outcome = chosen
+        return outcome
+
+    def _are_preempts_serviced(self) -> bool:
+        are_serviced = True
+        for label, state in self._states.items():
+            if state.preempt_requested():
+                logwarn(f"State '{label}' in concurrence did not service preempt.")
+                state.recall_preempt()
+                are_serviced = False
+        return are_serviced
+
+    def _mapped_outcome(self) -> str:
+        outcome, most = self._default_outcome, 0
+        for candidate, expected in self._outcome_map.items():
+            if all(self._child_outcomes[label] == expected[label] for label in expected):
+                if len(expected) > most:
+                    logdebug("Terminating concurrent split with mapped outcome.")
+                    outcome, most = candidate, len(expected)
+                else:
+                    logdebug(f"Skipping mapped outcome '{candidate}' with fewer constraints.")
+        return outcome
+
+    def is_running(self) -> bool:
+        """Return whether the container executes."""
+        return self._is_running
+
+    def request_preempt(self) -> None:
+        """Request the container to end, and its states."""
+        with self._done_cond:
+            super().request_preempt()
+            self._done_cond.notify_all()
+
+    # The interface of containers.
+
+    def get_children(self) -> Mapping[str, State]:
+        """Return the states by label."""
+        return self._states
+
+    def __getitem__(self, key: str) -> State:
+        """Return the state of a label."""
+        return self._states[key]
+
+    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
+        """Add to the userdata; all states start, whatever ``initial_states`` are."""
+        if 0 < len(initial_states) < len(self._states):
+            logwarn(
+                "Attempting to set initial states in Concurrence container, but Concurrence children are always all "
+                "executed initially, ignoring call."
+            )
+        self.userdata.update(userdata)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of all states."""
+        return list(self._states)
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the states that execute."""
+        return [label for label, outcome in self._child_outcomes.items() if outcome is None]
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return what the outcome map says: outcome, label, outcome of the container."""
+        return [
+            (outcome, label, target)
+            for target, outcomes in self._outcome_map.items()
+            for label, outcome in outcomes.items()
+        ]

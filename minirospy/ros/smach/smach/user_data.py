@@ -1,0 +1,165 @@
+"""The data that states share: of a container (UserData), and what one state may see of it (Remapper)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from minirospy.ros.smach.smach.exceptions import InvalidUserCodeError
+from minirospy.ros.smach.smach.log import logdebug, logerr
+
+__all__ = ["Const", "Remapper", "UserData", "Values", "get_const"]
+
+
+class UserData:
+    """Values by key, as attributes or items. A missing key is logged, and raises KeyError."""
+
+    def __init__(self) -> None:
+        self._data: dict[str, object] = {}
+
+    def update(self, other_userdata: UserData) -> None:
+        """Take all values of another one."""
+        self._data.update(other_userdata._data)
+
+    def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
+        """Return copies of some values, under the names that ``remapping`` maps to theirs."""
+        names = {outer: inner for inner, outer in remapping.items()}
+        if len(names) != len(remapping):
+            logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")
+        extracted = UserData()
+        for key in keys:
+            extracted[names.get(key, key)] = copy.copy(self[key])
+        return extracted
+
+    def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
+        """Take copies of some values of another one, under the names that ``remapping`` maps theirs to."""
+        for key in keys:
+            self[remapping.get(key, key)] = copy.copy(ud[key])
+
+    def keys(self) -> list[str]:
+        """Return the keys."""
+        return list(self._data)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._data
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self._data:
+            return self._data[key]
+        logerr(f"Userdata key '{key}' not available. Available keys are: {list(self._data)}")
+        raise KeyError(key)
+
+    def __setitem__(self, key: str, item: object) -> None:
+        self._data[key] = item
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name.startswith("_"):
+            object.__setattr__(self, name, value)
+        else:
+            self._data[name] = value
+
+
+def get_const(obj: object) -> object:
+    """Return an object that has attributes of its own as read-only, any other as it is."""
+    if not hasattr(obj, "__dict__"):
+        return obj
+    logdebug(f"Making const '{obj}'")
+    return Const(obj)
+
+
+class Const:
+    """An object whose attributes can be read; those that are set are set here alone, and logged as an error."""
+
+    def __init__(self, obj: object) -> None:
+        object.__setattr__(self, "_obj", obj)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_obj":
+            raise AttributeError(name)
+        return get_const(getattr(self._obj, name))
+
+    def __getitem__(self, name: object) -> object:
+        return get_const(self._obj[name])
+
+    def __setattr__(self, name: str, value: object) -> None:
+        logerr(f"Attempting to set '{name}' but this member is read-only.")
+        object.__setattr__(self, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        text = f"Attempting to delete '{name}' but this member is read-only."
+        logerr(text)
+        raise TypeError(text)
+
+
+class Remapper:
+    """A state's view of a container's userdata: the keys that it declared, under its own names.
+
+    A value of an input key that is not an output key is read-only (``get_const``). Writing a key that is not an output key is
+    logged and has no effect; reading one that is not an input key raises InvalidUserCodeError.
+    """
+
+    def __init__(
+        self,
+        ud: Values,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        remapping: Mapping[str, str] | None = None,
+    ) -> None:
+        object.__setattr__(self, "_ud", ud)
+        object.__setattr__(self, "_input", input_keys)
+        object.__setattr__(self, "_output", output_keys)
+        object.__setattr__(self, "_map", dict(remapping or {}))
+
+    def _remap(self, key: str) -> str:
+        mapped: str = self._map.get(key, key)
+        return mapped
+
+    def update(self, other_userdata: UserData) -> None:
+        """Give the userdata all values of another one."""
+        self._ud.update(other_userdata)
+
+    def keys(self) -> list[str]:
+        """Return the keys that can be read and are there."""
+        return [self._remap(key) for key in list(self._ud.keys()) if key in self._input]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._input and self._remap(str(key)) in self._ud
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in self._input:
+            raise InvalidUserCodeError(
+                f"Reading from SMACH userdata key '{key}' but the only keys that were declared as input to this state were: "
+                f"{self._input}. This key needs to be declared as input to this state. "
+            )
+        value = self._ud[self._remap(key)]
+        return value if key in self._output else get_const(value)
+
+    def __setitem__(self, key: str, item: object) -> None:
+        if key in self._output:
+            self._ud[self._remap(key)] = item
+        else:
+            logerr(
+                f"Writing to SMACH userdata key '{key}' but the only keys that were declared as output from this state "
+                f"were: {self._output}."
+            )
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name.startswith("_"):
+            object.__setattr__(self, name, value)
+        else:
+            self[name] = value
+
+
+Values = UserData | Remapper
+"""Userdata as a state gets it: of the container itself, or the keys that the state declared."""

@@ -1,0 +1,78 @@
+"""A state that goes on until a message of a topic does not meet a condition."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+
+from minirospy import client as rospy
+from minirospy.core.idl.protocols import Message
+from minirospy.ros.smach.smach.state import State
+from minirospy.ros.smach.smach.user_data import Values
+
+__all__ = ["MonitorState"]
+
+_SHUTDOWN_CHECK = 0.1
+"""Seconds between two looks for a shutdown."""
+
+
+class MonitorState(State):
+    """Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first that does not."""
+
+    def __init__(
+        self,
+        topic: str,
+        msg_type: type[Message],
+        cond_cb: Callable[[Values, Message], object],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
+        """``cond_cb`` gets the userdata and a message; -1 checks: until a message does not meet the condition."""
+        super().__init__(
+            outcomes=["valid", "invalid", "preempted"], input_keys=input_keys, output_keys=output_keys
+        )
+        self._topic = topic
+        self._msg_type = msg_type
+        self._cond_cb = cond_cb
+        self._max_checks = max_checks
+        self._n_checks = 0
+        self._trigger_event = threading.Event()
+
+    def execute(self, ud: Values) -> str:
+        """Check the messages of the topic until an outcome is certain; "preempted" at a shutdown, too."""
+        if self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+
+        self._n_checks = 0
+        self._trigger_event.clear()
+        subscriber = rospy.Subscriber(self._topic, self._msg_type, self._check, callback_args=ud)
+        try:
+            while not self._trigger_event.wait(_SHUTDOWN_CHECK):
+                if rospy.is_shutdown():
+                    return "preempted"
+        finally:
+            subscriber.unregister()
+
+        if self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+        return "valid" if 0 < self._max_checks <= self._n_checks else "invalid"
+
+    def _check(self, message: Message, ud: Values) -> None:
+        if self._trigger_event.is_set():
+            return
+        try:
+            is_met = bool(self._cond_cb(ud, message))
+        except Exception as error:  # noqa: BLE001 - the user's condition
+            rospy.logerr(f"Error thrown while executing condition callback {self._cond_cb}: {error}")
+            is_met = False
+        self._n_checks += is_met
+        if not is_met or 0 < self._max_checks <= self._n_checks:
+            self._trigger_event.set()
+
+    def request_preempt(self) -> None:
+        """Request the state to end, which it does without another message."""
+        super().request_preempt()
+        self._trigger_event.set()

@@ -1,0 +1,1 @@
+"""The ROS package teleop_twist_keyboard."""

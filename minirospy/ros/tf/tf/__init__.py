@@ -1,0 +1,22 @@
+"""tf, the older API: transformers, listeners and broadcasters, on the buffer of tf2.
+
+A leading slash of a frame's name is dropped, where tf2 refuses it. Source: http://wiki.ros.org/tf.
+"""
+
+from __future__ import annotations
+
+from minirospy.base.errors import ConnectivityException, ExtrapolationException, LookupException
+from minirospy.base.errors import TransformException as Exception
+from minirospy.ros.tf.tf.broadcaster import TransformBroadcaster
+from minirospy.ros.tf.tf.listener import Transformer, TransformerROS, TransformListener
+
+__all__ = [
+    "ConnectivityException",
+    "Exception",
+    "ExtrapolationException",
+    "LookupException",
+    "TransformBroadcaster",
+    "TransformListener",
+    "Transformer",
+    "TransformerROS",
+]

@@ -1,0 +1,1 @@
+"""The ROS package tf2_geometry_msgs."""

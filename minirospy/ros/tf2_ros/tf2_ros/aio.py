@@ -1,0 +1,246 @@
+"""Transforms for asyncio programs: the twins of tf2_ros's buffer, listener and broadcasters, on a `minirospy.Node`.
+
+::
+
+    async with Buffer(node) as buffer:
+        found = await buffer.lookup("map", "laser", timeout=2.0)
+        async for pose in buffer.changes("map", "base"):
+            print(pose.transform.translation.x)
+
+Everything belongs to the event loop of the node. Source: http://wiki.ros.org/tf2_ros. Examples: docs/tf.md.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time as clocks
+from collections.abc import AsyncIterator, Callable, Coroutine
+from types import TracebackType
+from typing import Literal, TypeVar
+
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from minirospy import Node
+from minirospy.aio import Publisher, Subscription
+from minirospy.base import times
+from minirospy.base.errors import (
+    DeserializationError,
+    InvalidArgumentException,
+    ROSInterruptException,
+    TransformException,
+)
+from minirospy.core.tf2.buffer import StampedTransform, TransformBuffer
+from minirospy.core.tf2.insertion import RefusalLog
+from minirospy.core.tf2.listing import frames_as_yaml
+from minirospy.ros.tf2_ros.tf2_ros.messages import LazyTFMessage, Moment, nanoseconds, transform_stamped
+
+__all__ = ["Broadcaster", "Buffer"]
+
+_T = TypeVar("_T")
+_LATEST = times.Time()
+_MOST_WAITING = 1000
+"""So many messages wait while the program is busy; older ones are dropped."""
+
+
+class Buffer:
+    """The frames that are published on /tf and /tf_static, over the last ``cache_time`` seconds.
+
+    It listens inside ``async with Buffer(node) as buffer:``. Where time jumps back, what is not static is forgotten.
+    """
+
+    def __init__(self, node: Node, cache_time: float = 10.0) -> None:
+        self._node = node
+        refusals = RefusalLog(self._log, clocks.monotonic)
+        self._tree = TransformBuffer(int(cache_time * 1e9), refusals)
+        self._changed = asyncio.Event()
+        self._last = 0
+        self._listening: list[asyncio.Task[None]] = []
+
+    async def __aenter__(self) -> Buffer:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def start(self) -> None:
+        """Listen from now on; what ``async with`` does first."""
+        for topic, is_static in (("/tf", False), ("/tf_static", True)):
+            subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MOST_WAITING)
+            self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
+
+    async def close(self) -> None:
+        """Stop listening; what has come can still be looked up. Idempotent."""
+        listening, self._listening = self._listening, []
+        for task in listening:
+            task.cancel()
+        await asyncio.gather(*listening, return_exceptions=True)
+
+    # --- lookups
+
+    async def lookup(
+        self, target: str, source: str, time: Moment = _LATEST, *, timeout: float | None = 0.0
+    ) -> TransformStamped:
+        """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; by default the latest.
+
+        Wait for it for ``timeout`` seconds of the node's time (None: for as long as the node runs). Raise
+        LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException, and
+        ROSInterruptException where the node ends meanwhile.
+        """
+        stamp = nanoseconds(time)
+        found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
+        return transform_stamped(target, source, found)
+
+    async def lookup_full(
+        self,
+        target: str,
+        target_time: Moment,
+        source: str,
+        source_time: Moment,
+        fixed: str,
+        *,
+        timeout: float | None = 0.0,
+    ) -> TransformStamped:
+        """Return where ``source`` was at ``source_time``, seen from ``target`` at ``target_time``.
+
+        The frame ``fixed`` does not move meanwhile. Wait and raise as :meth:`lookup` does.
+        """
+        stamps = nanoseconds(target_time), nanoseconds(source_time)
+        found = await self._wait_for(
+            lambda: self._tree.lookup_full(target, stamps[0], source, stamps[1], fixed), timeout
+        )
+        return transform_stamped(target, source, found)
+
+    def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
+        """Return None where :meth:`lookup` would succeed now, else why it would not."""
+        try:
+            return self._tree.why_not(target, source, nanoseconds(time))
+        except InvalidArgumentException as error:
+            return str(error)
+
+    async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
+        """Yield the latest pose of ``source`` in ``target``, and each later one; while the program is busy, the newest.
+
+        Ends where the node ends. Raise InvalidArgumentException.
+        """
+        # Refuses names that no frame can have.
+        self._tree.why_not(target, source, 0)
+        end = asyncio.ensure_future(self._node.spin())
+        last: StampedTransform | None = None
+        try:
+            while not self._node.is_shutdown:
+                changed = self._changed
+                with contextlib.suppress(TransformException):
+                    found = self._tree.lookup(target, source, 0)
+                    if found != last:
+                        last = found
+                        yield transform_stamped(target, source, found)
+                        continue
+                await _first_of(changed, end)
+        finally:
+            end.cancel()
+
+    def frames_as_yaml(self) -> str:
+        """Return parent, broadcaster, rate and times of each frame, as view_frames reads them."""
+        return frames_as_yaml(self._tree)
+
+    # --- within
+
+    async def _wait_for(self, look: Callable[[], _T], timeout: float | None) -> _T:
+        try:
+            return look()
+        except InvalidArgumentException:
+            raise
+        except TransformException:
+            if timeout is not None and timeout <= 0:
+                raise
+
+        pause = self._node.spin() if timeout is None else self._node.sleep(timeout)
+        deadline = asyncio.ensure_future(_quietly(pause))
+        try:
+            while True:
+                changed = self._changed
+                try:
+                    return look()
+                except TransformException:
+                    if self._node.is_shutdown:
+                        raise ROSInterruptException("rospy shutdown") from None
+                    if deadline.done():
+                        raise
+                await _first_of(changed, deadline)
+        finally:
+            deadline.cancel()
+
+    async def _take(self, subscription: Subscription[LazyTFMessage], is_static: bool) -> None:
+        async with subscription:
+            async for message in subscription:
+                self._check_for_jump()
+                who = message._connection_header.get("callerid", "default_authority")
+                try:
+                    self._tree.insert_message(message.raw or b"", who, is_static=is_static)
+                except DeserializationError as error:
+                    self._node.log.error("a message of %s is not a tf2_msgs/TFMessage: %s", who, error)
+                    continue
+                self._changed.set()
+                self._changed = asyncio.Event()
+
+    def _check_for_jump(self) -> None:
+        now = self._node.now().to_nsec()
+        if now < self._last:
+            jump = (self._last - now) / 1e9
+            self._node.log.warning("Detected jump back in time of %fs. Clearing TF buffer.", jump)
+            self._tree.clear()
+        self._last = now
+
+    def _log(self, text: str, is_error: bool) -> None:
+        (self._node.log.error if is_error else self._node.log.warning)("%s", text)
+
+
+class Broadcaster:
+    """Publishes transforms on /tf, and those that hold at every time on /tf_static."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._moving: Publisher[TFMessage] | None = None
+        self._static: Publisher[TFMessage] | None = None
+        self._kept: dict[str, TransformStamped] = {}
+
+    async def send(self, *transforms: TransformStamped) -> None:
+        """Publish transforms in one message on /tf."""
+        if self._moving is None:
+            self._moving = self._node.advertise("/tf", TFMessage, queue_size=100)
+        await self._moving.publish(TFMessage(list(transforms)))
+
+    async def send_static(self, *transforms: TransformStamped) -> None:
+        """Publish transforms on /tf_static, latched, with all that were sent before; of a child frame the last counts."""
+        if self._static is None:
+            self._static = self._node.advertise("/tf_static", TFMessage, queue_size=100, latch=True)
+        self._kept |= {each.child_frame_id: each for each in transforms}
+        await self._static.publish(TFMessage(list(self._kept.values())))
+
+    async def close(self) -> None:
+        """Stop publishing. Idempotent."""
+        publishers, self._moving, self._static = (self._moving, self._static), None, None
+        for publisher in publishers:
+            if publisher is not None:
+                await publisher.close()
+
+
+async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
+    """Return when the event is set, or the future is done."""
+    arrival = asyncio.ensure_future(changed.wait())
+    waits: list[asyncio.Future[Literal[True]] | asyncio.Future[None]] = [arrival, end]
+    try:
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        arrival.cancel()
+
+
+async def _quietly(pause: Coroutine[object, object, None]) -> None:
+    """Wait, and let the end of the node or a jump of its time end the wait."""
+    with contextlib.suppress(ROSInterruptException):
+        await pause

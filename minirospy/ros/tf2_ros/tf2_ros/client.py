@@ -1,0 +1,149 @@
+"""tf2_ros.BufferClient: lookups in the buffer of a buffer_server node. Source: http://wiki.ros.org/tf2_ros."""
+
+from __future__ import annotations
+
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import LookupTransformAction, LookupTransformGoal, LookupTransformResult, TF2Error
+
+from minirospy import client as rospy
+from minirospy.base import times
+from minirospy.base.errors import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    TimeoutException,
+    TransformException,
+)
+from minirospy.ros.actionlib import actionlib
+from minirospy.ros.tf2_ros.tf2_ros.interface import NO_WAIT, BufferInterface
+from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
+
+__all__ = ["BufferClient"]
+
+_PADDING = rospy.Duration(2)
+_ERRORS: dict[int, type[TransformException]] = {
+    TF2Error.LOOKUP_ERROR: LookupException,
+    TF2Error.CONNECTIVITY_ERROR: ConnectivityException,
+    TF2Error.EXTRAPOLATION_ERROR: ExtrapolationException,
+    TF2Error.INVALID_ARGUMENT_ERROR: InvalidArgumentException,
+    TF2Error.TIMEOUT_ERROR: TimeoutException,
+}
+
+
+class BufferClient(BufferInterface):
+    """Looks transforms up at the buffer server in the namespace ``ns``: no /tf comes to this node.
+
+    ``timeout_padding`` (a Duration) is waited in addition to a lookup's own timeout. ``check_frequency`` has no effect.
+    """
+
+    def __init__(
+        self, ns: str, check_frequency: float | None = None, timeout_padding: Moment = _PADDING
+    ) -> None:
+        super().__init__()
+        self.client = actionlib.SimpleActionClient(ns, LookupTransformAction)
+        self.timeout_padding = timeout_padding
+        if check_frequency is not None:
+            rospy.logwarn("Argument check_frequency is deprecated and should not be used.")
+
+    def wait_for_server(self, timeout: times.Duration = NO_WAIT) -> bool:
+        """Return whether the server is connected, within ``timeout`` (a zero Duration: whenever)."""
+        return self.client.wait_for_server(timeout)
+
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
+    ) -> TransformStamped:
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; wait for it for ``timeout``.
+
+        Raise the server's LookupException, ..., and TimeoutException where it does not answer.
+        """
+        goal = LookupTransformGoal(
+            target_frame=target_frame,
+            source_frame=source_frame,
+            source_time=_time(time),
+            timeout=_duration(timeout),
+        )
+        return self._answer(goal)
+
+    def lookup_transform_full(
+        self,
+        target_frame: str,
+        target_time: Moment,
+        source_frame: str,
+        source_time: Moment,
+        fixed_frame: str,
+        timeout: Moment = NO_WAIT,
+    ) -> TransformStamped:
+        """Return where ``source_frame`` was at ``source_time``, seen from ``target_frame`` at ``target_time``.
+
+        Raise as :meth:`lookup_transform` does.
+        """
+        goal = LookupTransformGoal(
+            target_frame=target_frame,
+            source_frame=source_frame,
+            source_time=_time(source_time),
+            timeout=_duration(timeout),
+            target_time=_time(target_time),
+            fixed_frame=fixed_frame,
+            advanced=True,
+        )
+        return self._answer(goal)
+
+    def can_transform(
+        self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
+    ) -> bool:
+        """Return whether the server has the transform."""
+        try:
+            self.lookup_transform(target_frame, source_frame, time, timeout)
+        except TransformException:
+            return False
+        return True
+
+    def can_transform_full(
+        self,
+        target_frame: str,
+        target_time: Moment,
+        source_frame: str,
+        source_time: Moment,
+        fixed_frame: str,
+        timeout: Moment = NO_WAIT,
+    ) -> bool:
+        """Return whether the server has the transform between two times."""
+        try:
+            self.lookup_transform_full(
+                target_frame, target_time, source_frame, source_time, fixed_frame, timeout
+            )
+        except TransformException:
+            return False
+        return True
+
+    def _answer(self, goal: LookupTransformGoal) -> TransformStamped:
+        self.client.send_goal(goal)
+        if not self.client.wait_for_result(goal.timeout + _duration(self.timeout_padding)):
+            raise TimeoutException(
+                "The LookupTransform goal sent to the BufferServer did not come back in the specified time. Something is "
+                "likely wrong with the server"
+            )
+        if self.client.get_state() != GoalStatus.SUCCEEDED:
+            raise TimeoutException(
+                "The LookupTransform goal sent to the BufferServer did not come back with SUCCEEDED status. Something is "
+                "likely wrong with the server."
+            )
+
+        result: LookupTransformResult | None = self.client.get_result()
+        if result is None:
+            raise TransformException(
+                "The BufferServer returned None for result!  Something is likely wrong with the server."
+            )
+        if result.error.error != TF2Error.NO_ERROR:
+            raise _ERRORS.get(result.error.error, TransformException)(result.error.error_string)
+        return result.transform
+
+
+def _time(time: Moment) -> times.Time:
+    return times.Time(*divmod(nanoseconds(time), 1_000_000_000))
+
+
+def _duration(span: Moment) -> times.Duration:
+    return times.Duration(*divmod(nanoseconds(span), 1_000_000_000))

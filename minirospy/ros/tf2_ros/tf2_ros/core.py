@@ -1,0 +1,220 @@
+"""tf2_py: the buffer on the level of messages, safe for threads. Source: http://wiki.ros.org/tf2_py."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time as clocks
+from collections.abc import Callable
+
+from geometry_msgs.msg import TransformStamped
+
+from minirospy.base.errors import InvalidArgumentException
+from minirospy.client.time import Time
+from minirospy.core.tf2.buffer import DEFAULT_CACHE_TIME, TransformBuffer
+from minirospy.core.tf2.insertion import Refusal, RefusalLog
+from minirospy.core.tf2.listing import frames_as_dot, frames_as_yaml
+from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds, transform_stamped
+
+__all__ = ["BufferCore"]
+
+_BILLION = 1_000_000_000
+_NO_TIME = Time()
+_log = logging.getLogger("rosout")
+
+
+def _write(text: str, is_error: bool) -> None:
+    _log.log(logging.ERROR if is_error else logging.WARNING, "%s", text)
+
+
+class BufferCore:
+    """The tree of frames over the last ``cache_time`` (a Duration; 10 s).
+
+    Stamps are exact; those of the real tf2_py are rounded to what a float of seconds holds (about 0.2 us today).
+    What cannot be taken is logged, of each frame and fault at most once a second, with a count.
+    """
+
+    def __init__(self, cache_time: Moment | None = None) -> None:
+        self._lock = threading.RLock()
+        self._refused: list[Refusal] = []
+        self._refusals = RefusalLog(_write, clocks.monotonic)
+        self._tree = TransformBuffer(
+            DEFAULT_CACHE_TIME if cache_time is None else nanoseconds(cache_time), self._refused.append
+        )
+        self._changed: tuple[Callable[[], object], ...] = ()
+
+    # --- transforms in
+
+    def set_transform(self, transform: TransformStamped, authority: str) -> None:
+        """Take a transform, from the node ``authority``."""
+        self._insert(transform, authority, False)
+
+    def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
+        """Take a transform that holds at every time."""
+        self._insert(transform, authority, True)
+
+    def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
+        """Take a serialised TFMessage; of those that came in the same form before, without decoding it now.
+
+        Not in the real tf2_py. Raise DeserializationError.
+        """
+        with self._lock:
+            self._tree.insert_message(data, authority, is_static=is_static)
+        self._after_insertion()
+
+    def clear(self) -> None:
+        """Forget all transforms but the static ones."""
+        with self._lock:
+            self._tree.clear()
+
+    # --- lookups out
+
+    def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest that all have.
+
+        Raise LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException.
+        """
+        stamp = nanoseconds(time)
+        _check_names(target_frame, source_frame)
+        with self._lock:
+            found = self._tree.lookup(target_frame, source_frame, stamp)
+        if self._refused:
+            self._report()
+        return transform_stamped(target_frame, source_frame, found)
+
+    def lookup_transform_full_core(
+        self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
+    ) -> TransformStamped:
+        """Return where ``source_frame`` was at ``source_time``, seen from ``target_frame`` at ``target_time``.
+
+        ``fixed_frame`` does not move meanwhile. Raise as :meth:`lookup_transform_core` does.
+        """
+        stamps = nanoseconds(target_time), nanoseconds(source_time)
+        _check_names(target_frame, source_frame, fixed_frame)
+        with self._lock:
+            found = self._tree.lookup_full(target_frame, stamps[0], source_frame, stamps[1], fixed_frame)
+        if self._refused:
+            self._report()
+        return transform_stamped(target_frame, source_frame, found)
+
+    def can_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> tuple[int, str]:
+        """Return whether a lookup would succeed (1 or 0), and why not."""
+        stamp = nanoseconds(time)
+        _check_names(target_frame, source_frame)
+        return self._possible(lambda: self._tree.why_not(target_frame, source_frame, stamp))
+
+    def can_transform_full_core(
+        self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
+    ) -> tuple[int, str]:
+        """Return whether a lookup with a fixed frame would succeed (1 or 0), and why not."""
+        stamps = nanoseconds(target_time), nanoseconds(source_time)
+        _check_names(target_frame, source_frame, fixed_frame)
+        return self._possible(
+            lambda: self._tree.why_not_full(target_frame, stamps[0], source_frame, stamps[1], fixed_frame)
+        )
+
+    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
+        """Return the newest time at which a lookup succeeds; zero where all between the frames is static.
+
+        Raise LookupException, InvalidArgumentException; TransformException where they are not connected.
+        """
+        _check_names(target_frame, source_frame)
+        with self._lock:
+            return Time(*divmod(self._tree.latest_common_time(target_frame, source_frame), _BILLION))
+
+    # --- what there is
+
+    def all_frames_as_yaml(self, time: Moment | float = 0.0) -> str:
+        """Return parent, broadcaster, rate and times of each frame; ``time`` has no effect, as with the real one."""
+        with self._lock:
+            return frames_as_yaml(self._tree)
+
+    def all_frames_as_string(self) -> str:
+        """Return a line for each frame that has a parent."""
+        with self._lock:
+            return self._tree.frames_as_string()
+
+    def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
+        """Return the tree as a graph for graphviz, with each frame's age where a time is given."""
+        stamp = nanoseconds(time)
+        with self._lock:
+            return frames_as_dot(self._tree, stamp)
+
+    def _chain(
+        self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
+    ) -> list[str]:
+        stamps = nanoseconds(target_time), nanoseconds(source_time)
+        with self._lock:
+            return self._tree.chain(target_frame, stamps[0], source_frame, stamps[1], fixed_frame)
+
+    def _frameExists(self, frame_id: str) -> bool:
+        with self._lock:
+            return self._tree.frame_exists(frame_id)
+
+    def _getFrameStrings(self) -> list[str]:
+        with self._lock:
+            return self._tree.frame_names()
+
+    # --- within
+
+    def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
+        """Call ``function`` after each insertion, in the thread that inserts; return what ends it."""
+        with self._lock:
+            self._changed = (*self._changed, function)
+
+        def end() -> None:
+            with self._lock:
+                self._changed = tuple(each for each in self._changed if each is not function)
+
+        return end
+
+    def _insert(self, message: TransformStamped, authority: str, is_static: bool) -> None:
+        header, where, turn = message.header, message.transform.translation, message.transform.rotation
+        parent, child = header.frame_id, message.child_frame_id
+        _check_names(parent, child)
+        if not isinstance(authority, str):
+            kind = None if authority is None else type(authority).__name__
+            raise TypeError(f"argument 2 must be str, not {kind}")
+        with self._lock:
+            self._tree.insert(
+                parent,
+                child,
+                nanoseconds(header.stamp),
+                # A lookup gives floats, whatever was set: integers, or numpy's numbers.
+                (float(where.x), float(where.y), float(where.z)),
+                (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
+                authority,
+                is_static=is_static,
+            )
+        self._after_insertion()
+
+    def _after_insertion(self) -> None:
+        if self._refused:
+            self._report()
+        for function in self._changed:
+            function()
+
+    def _possible(self, why_not: Callable[[], str | None]) -> tuple[int, str]:
+        try:
+            with self._lock:
+                why = why_not()
+        except InvalidArgumentException as error:
+            self._refusals(Refusal("", str(error), str(error), False))
+            return 0, ""
+        if self._refused:
+            self._report()
+        return int(why is None), why or ""
+
+    def _report(self) -> None:
+        """Log what was refused. Without the lock: a handler of log lines may look something up."""
+        with self._lock:
+            refused = self._refused[:]
+            del self._refused[: len(refused)]
+        for refusal in refused:
+            self._refusals(refusal)
+
+
+def _check_names(*names: str) -> None:
+    for number, name in enumerate(names, 1):
+        if not isinstance(name, str):
+            raise TypeError(f"argument {number} must be str, not {type(name).__name__}")

@@ -1,0 +1,116 @@
+"""tf2_ros.TransformListener: what comes on /tf and /tf_static -> a buffer. Source: http://wiki.ros.org/tf2_ros."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Mapping
+from typing import Protocol
+
+from geometry_msgs.msg import TransformStamped
+
+from minirospy import client as rospy
+from minirospy.base.errors import DeserializationError
+from minirospy.ros.tf2_ros.tf2_ros.core import BufferCore
+from minirospy.ros.tf2_ros.tf2_ros.messages import LazyTFMessage
+
+__all__ = ["TransformListener"]
+
+
+class TransformSink(Protocol):
+    """The target of a listener's transforms: a Buffer, or a program's own object."""
+
+    def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
+        """Take a transform."""
+
+    def set_transform_static(self, transform: TransformStamped, authority: str, /) -> object:
+        """Take a transform that holds at every time."""
+
+    def clear(self) -> object:
+        """Forget all."""
+
+
+class TransformListener:
+    """Puts every transform of /tf and /tf_static into ``buffer``; a time that jumps back clears the buffer.
+
+    ``queue_size``, ``buff_size`` and ``tcp_nodelay`` are those of the Subscribers.
+    """
+
+    def __init__(
+        self,
+        buffer: TransformSink,
+        queue_size: int | None = None,
+        buff_size: int = 65536,
+        tcp_nodelay: bool = False,
+    ) -> None:
+        self.buffer = buffer
+        self.last_update_lock = threading.Lock()
+        self._last = rospy.get_time()
+        self._takes_bytes = _takes_bytes(buffer)
+        self.tf_sub = rospy.Subscriber(
+            "/tf", LazyTFMessage, self.callback, None, queue_size, buff_size, tcp_nodelay
+        )
+        self.tf_static_sub = rospy.Subscriber(
+            "/tf_static", LazyTFMessage, self.static_callback, None, queue_size, buff_size, tcp_nodelay
+        )
+
+    def __del__(self) -> None:
+        # In a constructor that failed, or at the end of the interpreter.
+        with contextlib.suppress(Exception):
+            self.unregister()
+
+    def unregister(self) -> None:
+        """Stop listening."""
+        self.tf_sub.unregister()
+        self.tf_static_sub.unregister()
+
+    def check_for_reset(self) -> None:
+        """Clear the buffer where time has jumped back since the last message."""
+        # The time is taken within the lock: else a thread that is overtaken sees a jump.
+        with self.last_update_lock:
+            now = rospy.get_time()
+            jump, self._last = self._last - now, now
+            if jump > 0:
+                rospy.logwarn("Detected jump back in time of %fs. Clearing TF buffer.", jump)
+                self.buffer.clear()
+
+    @property
+    def last_update(self) -> rospy.Time:
+        """When the last message came."""
+        return rospy.Time.from_sec(self._last)
+
+    def callback(self, data: LazyTFMessage) -> None:
+        """Take a message of /tf."""
+        self._take(data, is_static=False)
+
+    def static_callback(self, data: LazyTFMessage) -> None:
+        """Take a message of /tf_static."""
+        self._take(data, is_static=True)
+
+    def _take(self, data: LazyTFMessage, *, is_static: bool) -> None:
+        self.check_for_reset()
+        header: Mapping[str, str] = data._connection_header
+        who = header.get("callerid", "default_authority")
+
+        raw = getattr(data, "raw", None)
+        if self._takes_bytes and raw is not None:
+            assert isinstance(self.buffer, BufferCore)
+            try:
+                self.buffer.insert_message(raw, who, is_static)
+            except DeserializationError as error:
+                rospy.logerr_throttle(1.0, f"a message of {who} is not a tf2_msgs/TFMessage: {error}")
+            return
+
+        insert = self.buffer.set_transform_static if is_static else self.buffer.set_transform
+        for transform in data.transforms:
+            insert(transform, who)
+
+
+def _takes_bytes(buffer: TransformSink) -> bool:
+    """Return whether a buffer takes messages undecoded: ours, unless a subclass sees to each transform itself."""
+    kind = type(buffer)
+    return (
+        issubclass(kind, BufferCore)
+        and kind.set_transform is BufferCore.set_transform
+        and kind.set_transform_static is BufferCore.set_transform_static
+    )

@@ -1,0 +1,78 @@
+"""tf_conversions.posemath: PyKDL's frames <-> tuples of tf, Pose messages and 4x4 matrices.
+
+Source: http://wiki.ros.org/tf_conversions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+from minirospy.ros.python_orocos_kdl.PyKDL import Frame, Rotation, Vector
+
+if TYPE_CHECKING:
+    import numpy
+    from numpy.typing import NDArray
+
+    class _OpenCV(Protocol):
+        """The (old) module cv."""
+
+        def Rodrigues2(self, src: NDArray[numpy.floating], dst: NDArray[numpy.floating]) -> object: ...
+
+
+__all__ = ["fromCameraParams", "fromMatrix", "fromMsg", "fromTf", "toMatrix", "toMsg", "toTf"]
+
+Tuples = tuple[Sequence[float], Sequence[float]]
+
+
+def fromTf(tf: Tuples) -> Frame:
+    """Return what lookupTransform returns, (x, y, z) and (x, y, z, w), as a Frame."""
+    (x, y, z), (qx, qy, qz, qw) = tf
+    return Frame(Rotation.Quaternion(qx, qy, qz, qw), Vector(x, y, z))
+
+
+def toTf(f: Frame) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """Return a Frame as (x, y, z) and (x, y, z, w)."""
+    return (f.p[0], f.p[1], f.p[2]), f.M.GetQuaternion()
+
+
+def fromMsg(p: Pose) -> Frame:
+    """Return a Pose as a Frame."""
+    position, orientation = p.position, p.orientation
+    return fromTf(
+        (
+            (position.x, position.y, position.z),
+            (orientation.x, orientation.y, orientation.z, orientation.w),
+        )
+    )
+
+
+def toMsg(f: Frame) -> Pose:
+    """Return a Frame as a Pose."""
+    return Pose(Point(f.p[0], f.p[1], f.p[2]), Quaternion(*f.M.GetQuaternion()))
+
+
+def fromMatrix(m: NDArray[numpy.floating]) -> Frame:
+    """Return a 4x4 matrix as a Frame."""
+    rotation = [float(m[row, column]) for row in range(3) for column in range(3)]
+    return Frame(Rotation(*rotation), Vector(float(m[0, 3]), float(m[1, 3]), float(m[2, 3])))
+
+
+def toMatrix(f: Frame) -> NDArray[numpy.float64]:
+    """Return a Frame as a 4x4 matrix."""
+    import numpy
+
+    return numpy.array([*([f[row, column] for column in range(4)] for row in range(3)), [0.0, 0.0, 0.0, 1.0]])
+
+
+def fromCameraParams(cv: _OpenCV, rvec: NDArray[numpy.floating], tvec: NDArray[numpy.floating]) -> Frame:
+    """Return the Frame of OpenCV's rotation and translation vectors; ``cv`` is its (old) module."""
+    import numpy
+
+    matrix = numpy.zeros((4, 4), dtype=numpy.float32)
+    matrix[:3, 3] = tvec[0, 0], tvec[1, 0], tvec[2, 0]
+    matrix[3, 3] = 1.0
+    cv.Rodrigues2(rvec, matrix[:3, :3])
+    return fromMatrix(matrix)

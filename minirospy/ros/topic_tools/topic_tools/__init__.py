@@ -1,0 +1,97 @@
+"""topic_tools: the class for lazy nodes, and its programs that evaluate expressions of Python.
+
+Those that pass bytes on are in minirospy.ros.topic_tools.programs. Source: http://wiki.ros.org/topic_tools.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from minirospy import client as rospy
+from minirospy.client.topics import Publisher, SubscribeListener
+from minirospy.core.idl.protocols import Message
+
+__all__ = ["LazyTransport", "MetaLazyTransport"]
+
+_WARN_SECONDS = 5
+
+
+class MetaLazyTransport(type):
+    """Calls ``_post_init`` after the constructors of all derived classes, whose publishers are there then."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        made = super().__call__(*args, **kwargs)
+        made._post_init()
+        return made
+
+
+class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
+    """Base of nodes that subscribe only while their own topics have subscribers.
+
+    Derive from it, make publishers by ``advertise``, and write ``subscribe`` and ``unsubscribe``. With the parameter
+    ``~lazy`` false it subscribes when it is made, and stays subscribed.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._publishers: list[Publisher[Message]] = []
+        self._connection_status: bool | None = None
+        """Whether it is subscribed; None: it has never been."""
+        self._changing = threading.RLock()
+        rospy.Timer(rospy.Duration(_WARN_SECONDS), self._warn_never_subscribed_cb, oneshot=True)
+
+    def _post_init(self) -> None:
+        if not rospy.get_param("~lazy", True):
+            self._subscribe_once()
+
+    def _warn_never_subscribed_cb(self, timer_event: object) -> None:
+        if self._connection_status is None:
+            rospy.logwarn(
+                f"[{rospy.get_name()}] subscribes topics only with child subscribers. Set '~lazy' as False to have it "
+                "always transport message."
+            )
+
+    def subscribe(self) -> None:
+        """Subscribe to the inputs. A derived class writes it."""
+        raise NotImplementedError("Please overwrite this method")
+
+    def unsubscribe(self) -> None:
+        """Unregister the subscribers of the inputs. A derived class writes it."""
+        raise NotImplementedError("Please overwrite this method")
+
+    def peer_subscribe(self, *args: object, **kwargs: object) -> None:
+        """Subscribe when one of its topics gets a subscriber."""
+        rospy.logdebug(f"[{args[0]}] is subscribed")
+        self._subscribe_once()
+
+    def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
+        """Unsubscribe when none of its topics has a subscriber left."""
+        rospy.logdebug(f"[{args[0]}] is unsubscribed")
+        if not rospy.get_param("~lazy", True):
+            return
+
+        with self._changing:
+            if self._connection_status and not any(pub.get_num_connections() for pub in self._publishers):
+                self.unsubscribe()
+                self._connection_status = False
+
+    def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Message]:
+        """Return a publisher, with the arguments of ``rospy.Publisher`` but ``subscriber_listener``, which is this object."""
+        assert len(args) < 3 or args[2] is None, "subscriber_listener is this object"
+        assert kwargs.get("subscriber_listener") is None, "subscriber_listener is this object"
+        if len(args) < 3:
+            kwargs["subscriber_listener"] = self
+        else:
+            args = (*args[:2], self, *args[3:])
+
+        publisher: Publisher[Message] = Publisher(*args, **kwargs)
+        self._publishers.append(publisher)
+        return publisher
+
+    def _subscribe_once(self) -> None:
+        # The constructor's thread and that of the listener's events may come together.
+        with self._changing:
+            if self._connection_status is not True:
+                self.subscribe()
+                self._connection_status = True

@@ -1,0 +1,243 @@
+"""The turtles' world: commands, teleports, pens -> poses, colours, walls. Pure: no socket, no clock.
+
+Lengths are metres, angles radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and how turtlesim
+0.10.2 behaves.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple
+
+from minirospy.base.errors import MinirospyError
+from minirospy.base.names import is_legal_name
+from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
+
+__all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]
+
+BACKGROUND = Color(69, 86, 255)
+"""The background where no parameter sets another."""
+
+STEP_SECONDS = 0.016
+"""The time between two steps."""
+
+_COMMAND_SECONDS = 1.0
+"""How long a velocity is obeyed."""
+
+_PIXELS_PER_METRE = 45.0
+
+
+def _float32(value: float) -> float:
+    """Return the number that a field float32 has."""
+    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+
+
+SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
+"""Width and height of the world, in metres: 11.088889."""
+
+
+class WorldError(MinirospyError):
+    """A request that the world refuses."""
+
+
+class Velocity(NamedTuple):
+    """Metres a second forward and to the left, radians a second to the left."""
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+
+
+class Pen(NamedTuple):
+    """What a turtle draws with; its width in pixels."""
+
+    color: Color = Color(179, 184, 255)
+    width: int = 3
+
+
+class Pose(NamedTuple):
+    """Metres from the left and lower walls, and the direction: 0 to the right, pi / 2 up."""
+
+    x: float
+    y: float
+    theta: float
+
+
+class Reading(NamedTuple):
+    """What a turtle publishes after a step."""
+
+    name: str
+    pose: Pose
+    linear: float
+    """Metres a second."""
+    angular: float
+    """Radians a second."""
+    color: Color
+    """The colour of the paper under it, before it drew."""
+    warning: str
+    """The line about a wall that it hit, or ""."""
+
+
+class _Teleport(NamedTuple):
+    is_relative: bool
+    x: float
+    """Or the distance forward."""
+    y: float
+    theta: float
+
+
+class _Turtle:
+    """One turtle. Its ``y`` is the distance from the upper wall, as on the paper."""
+
+    def __init__(self, x: float, y: float, theta: float) -> None:
+        self.x, self.y, self.theta = x, y, theta
+        self.velocity = Velocity()
+        self.command_time = -math.inf
+        self.pen = Pen()
+        self.is_drawing = True
+        self.teleports: list[_Teleport] = []
+
+    @property
+    def pose(self) -> Pose:
+        return Pose(self.x, SIZE - self.y, self.theta)
+
+    def teleport(self, target: _Teleport) -> None:
+        if target.is_relative:
+            self.theta += target.theta
+            self.x += math.cos(self.theta) * target.x
+            self.y -= math.sin(self.theta) * target.x
+        else:
+            self.x, self.y, self.theta = target.x, max(0.0, SIZE - target.y), target.theta
+
+    def move(self, seconds: float) -> None:
+        """Turn first, then go."""
+        forward, left, turn = self.velocity
+        self.theta += turn * seconds
+        # From -pi up to pi.
+        self.theta -= 2 * math.pi * math.floor((self.theta + math.pi) / (2 * math.pi))
+        ahead, aside = math.cos(self.theta), math.sin(self.theta)
+        self.x += (ahead * forward - aside * left) * seconds
+        self.y -= (ahead * left + aside * forward) * seconds
+
+    def stop_at_walls(self) -> str:
+        """Come back into the world; return the warning, or ""."""
+        x, y = self.x, self.y
+        self.x, self.y = (min(max(value, 0.0), SIZE) for value in (x, y))
+        if (x, y) == (self.x, self.y):
+            return ""
+        return f"Oh no! I hit the wall! (Clamping from [x={x:f}, y={y:f}])"
+
+
+class World:
+    """Turtles by name, and the paper that they draw on. At first there is one, turtle1, in the middle."""
+
+    def __init__(self, background: Color = BACKGROUND) -> None:
+        self.canvas = Canvas(background)
+        self._turtles: dict[str, _Turtle] = {}
+        self._last_number = 0
+
+    @property
+    def names(self) -> list[str]:
+        """The turtles, by name."""
+        return sorted(self._turtles)
+
+    def pose(self, name: str) -> Pose:
+        """Return where a turtle is. Raises WorldError where there is none."""
+        return self._turtle(name).pose
+
+    def clear(self, background: Color) -> None:
+        """Wipe the paper out; turtles stay."""
+        self.canvas.fill(background)
+
+    def remove_all(self) -> None:
+        """Remove the turtles; the next one without a name is turtle1 again."""
+        self._turtles.clear()
+        self._last_number = 0
+
+    def spawn(self, name: str, x: float, y: float, theta: float) -> str:
+        """Add a turtle; return its name, a new one where it is empty. Raises WorldError on a name in use or not legal."""
+        _check_finite(x=x, y=y, theta=theta)
+        if not is_legal_name(name):
+            raise WorldError(f"[{name}] is not a legal name of a turtle: letters, digits, _ and /")
+        if name in self._turtles:
+            raise WorldError(f"A turtled named [{name}] already exists")
+        while not name or name in self._turtles:
+            self._last_number += 1
+            name = f"turtle{self._last_number}"
+        self._turtles[name] = _Turtle(_float32(x), _float32(SIZE - y), _float32(theta))
+        return name
+
+    def spawn_first(self) -> str:
+        """Add a turtle without a name in the middle; return its name."""
+        return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
+
+    def kill(self, name: str) -> None:
+        """Remove a turtle. Raises WorldError where there is none."""
+        if name not in self._turtles:
+            raise WorldError(f"Tried to kill turtle [{name}], which does not exist")
+        del self._turtles[name]
+
+    def set_pen(self, name: str, color: Color, width: int, *, is_off: bool) -> None:
+        """Take another pen; 0 is the thinnest, one pixel wide. A pen that is off keeps what it was."""
+        turtle = self._turtle(name)
+        turtle.is_drawing = not is_off
+        if not is_off:
+            turtle.pen = Pen(color, width or 1)
+
+    def teleport_absolute(self, name: str, x: float, y: float, theta: float) -> None:
+        """Move a turtle with the next step; its pen draws."""
+        _check_finite(x=x, y=y, theta=theta)
+        self._turtle(name).teleports.append(_Teleport(False, x, y, theta))
+
+    def teleport_relative(self, name: str, linear: float, angular: float) -> None:
+        """Turn a turtle and move it forward with the next step; its pen draws."""
+        _check_finite(linear=linear, angular=angular)
+        self._turtle(name).teleports.append(_Teleport(True, linear, 0.0, angular))
+
+    def command(self, name: str, velocity: Velocity, now: float) -> None:
+        """Set a turtle's velocity for one second after ``now`` (seconds). Raises WorldError on one that is not finite."""
+        _check_finite(**velocity._asdict())
+        turtle = self._turtle(name)
+        turtle.velocity, turtle.command_time = velocity, now
+
+    def step(self, now: float) -> list[Reading]:
+        """Let 16 ms pass; return what each turtle publishes, by name. ``now``: seconds on the clock of the commands."""
+        return [self._step(name, self._turtles[name], now) for name in self.names]
+
+    def _step(self, name: str, turtle: _Turtle, now: float) -> Reading:
+        for target in turtle.teleports:
+            before = turtle.x, turtle.y
+            turtle.teleport(target)
+            self._draw(turtle, before)
+        turtle.teleports.clear()
+
+        if now - turtle.command_time > _COMMAND_SECONDS:
+            turtle.velocity = Velocity()
+        before = turtle.x, turtle.y
+        turtle.move(STEP_SECONDS)
+        warning = turtle.stop_at_walls()
+        color = self.canvas.color_at(turtle.x * _PIXELS_PER_METRE, turtle.y * _PIXELS_PER_METRE)
+        if (turtle.x, turtle.y) != before:
+            self._draw(turtle, before)
+        forward, left, turn = turtle.velocity
+        return Reading(name, turtle.pose, math.hypot(forward, left), turn, color, warning)
+
+    def _draw(self, turtle: _Turtle, before: tuple[float, float]) -> None:
+        if turtle.is_drawing:
+            (x0, y0), (x1, y1) = before, (turtle.x, turtle.y)
+            scale = _PIXELS_PER_METRE
+            self.canvas.stroke(
+                (x0 * scale, y0 * scale), (x1 * scale, y1 * scale), turtle.pen.color, turtle.pen.width
+            )
+
+    def _turtle(self, name: str) -> _Turtle:
+        if name not in self._turtles:
+            raise WorldError(f"There is no turtle [{name}]")
+        return self._turtles[name]
+
+
+def _check_finite(**numbers: float) -> None:
+    for name, value in numbers.items():
+        if not math.isfinite(value):
+            raise WorldError(f"[{name}] is {value}: a turtle needs a finite number")

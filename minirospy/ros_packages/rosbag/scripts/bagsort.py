@@ -1,8 +1,0 @@
-#!/usr/bin/env python3
-"""`rosrun rosbag bagsort.py`, as ROS's package has it; see http://wiki.ros.org/rosbag."""
-
-import sys
-
-from minirospy.cli.ros.rosbag_scripts import main
-
-sys.exit(main("bagsort.py"))

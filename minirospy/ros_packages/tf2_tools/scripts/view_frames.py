@@ -1,8 +1,0 @@
-#!/usr/bin/env python3
-"""`rosrun tf2_tools view_frames.py`; see http://wiki.ros.org/tf2_tools."""
-
-import sys
-
-from minirospy.frames.tools.view import main_tf2 as main
-
-sys.exit(main())

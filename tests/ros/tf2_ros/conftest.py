@@ -1,0 +1,7 @@
+"""The fixture that starts programs of packages."""
+
+from __future__ import annotations
+
+from tests.ros.robot_state_publisher.conftest import start
+
+__all__ = ["start"]

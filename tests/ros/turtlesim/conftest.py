@@ -1,0 +1,3 @@
+from tests.ros.robot_state_publisher.conftest import start
+
+__all__ = ["start"]

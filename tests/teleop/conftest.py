@@ -1,3 +1,0 @@
-from tests.robots.conftest import start
-
-__all__ = ["start"]
