@@ -108,7 +108,7 @@ clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Made again when the project file or a definition changes; an interrupted install leaves no stamp.
-$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/core/idl/*.py msgs/*/*/* msgs/*/package.xml)
+$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py minirospy/cli/windows.py minirospy/core/idl/*.py msgs/*/*/* msgs/*/package.xml)
 	@$(PYTHON) -c "import sys; v = sys.version_info; v >= (3, 10) or sys.exit('minirospy needs Python 3.10 or newer, this is %d.%d: make PYTHON=python3.x' % v[:2])"
 	@echo "Making the environment $(VENV) ..."
 	@$(PYTHON) -m venv $(VENV)

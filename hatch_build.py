@@ -1,4 +1,4 @@
-"""Build hooks: the project's addresses and what PyPI shows of the README; ``msgs/`` as modules, and the wheel's other files.
+"""Build hooks: addresses, console scripts and PyPI's README; ``msgs/`` as modules, rqt's packages, and the wheel's other files.
 
 An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
 checkout, where everything else already is.
@@ -123,12 +123,13 @@ def _recorded(line: str, changed: dict[str, bytes]) -> str:
 
 
 class DescribeProject(MetadataHookInterface):
-    """Writes the addresses of the project, where one is given, and the README, whose links lead there."""
+    """Writes the console scripts, the addresses of the project, if one is given, and the README, whose links lead there."""
 
     PLUGIN_NAME = "custom"
 
     def update(self, metadata: dict[str, Any]) -> None:
-        """Set ``urls`` and the readme; those of an unpacked sdist, which hatchling has read already, stay."""
+        """Set ``scripts``, ``urls`` and the readme; the last two of an unpacked sdist, which hatchling has read already, stay."""
+        metadata["scripts"] = self._scripts()
         address = os.environ.get(ADDRESS_VARIABLE, "").strip()
         if "readme" in metadata:
             return
@@ -138,9 +139,18 @@ class DescribeProject(MetadataHookInterface):
         files = urls["Changelog"].rpartition("/")[0] if urls else ""
         metadata["readme"] = {"content-type": "text/markdown", "text": readme_of_wheel(text, files)}
 
+    def _scripts(self) -> dict[str, str]:
+        """Return the console scripts, which the registry of commands lists."""
+        sys.path.insert(0, self.root)
+        try:
+            from minirospy.cli.registry import console_scripts
+        finally:
+            sys.path.remove(self.root)
+        return console_scripts()
+
 
 class CompileDefinitions(BuildHookInterface[BuilderConfig]):
-    """Compiles the definitions before each build of a wheel."""
+    """Compiles the definitions, and writes the packages of rqt's windows, before each build of a wheel."""
 
     PLUGIN_NAME = "custom"
 
@@ -151,6 +161,7 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         root = Path(self.root)
         sys.path.insert(0, self.root)
         try:
+            from minirospy.cli.windows import write_packages
             from minirospy.core.idl.load import Catalogue, write_package
             from minirospy.core.idl.own_packages import COMPILED_AHEAD
         finally:
@@ -159,8 +170,10 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         catalogue = Catalogue.below(root / "msgs")
         for package in catalogue.packages:
             write_package(catalogue, package, overlay, on_demand=package not in COMPILED_AHEAD)
+        windows = write_packages(root / "minirospy" / "ros")
         if version == "editable":
             return
+        build_data["artifacts"] += [f"minirospy/ros/{package}/**" for package in windows]
         for package in catalogue.packages:
             build_data["artifacts"] += [
                 f"minirospy/overlay/{package}/**/*.py",

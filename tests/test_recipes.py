@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import yaml
+
+from minirospy.cli.registry import console_scripts
 
 ROOT = Path(__file__).parents[1]
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
@@ -59,8 +63,19 @@ def test_conda_recipe_requires_what_the_wheel_requires() -> None:
 
 
 def test_conda_recipe_has_every_command() -> None:
-    scripts = re.findall(r'^(\S+) = "(.*)"$', _section("project.scripts"), flags=re.MULTILINE)
-    assert _recipe()["build"]["entry_points"] == [f"{name} = {target}" for name, target in scripts]
+    expected = [f"{name} = {target}" for name, target in console_scripts().items()]
+    assert _recipe()["build"]["entry_points"] == expected
+
+
+def test_lists_of_commands_are_those_of_the_registry() -> None:
+    done = subprocess.run(
+        [sys.executable, "tools/commands.py", "--check"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_dockerfile_installs_the_wheel_of_a_release() -> None:

@@ -6,8 +6,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from minirospy.cli.windows import WINDOWS, view_of_plugin
 from minirospy.command.parser import Misuse, Parser
 from minirospy.command.verbs import Command
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from minirospy.web.dashboard.codes import Codes
     from minirospy.web.tokens import Tokens
 
-__all__ = ["DASHBOARD", "WINDOWS", "dashboard"]
+__all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
 Fields = Mapping[str, Sequence[str]]
 """The settings of a view, as its link has them."""
@@ -27,9 +28,9 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
     return _main(DASHBOARD, argv)
 
 
-def __getattr__(name: str) -> object:
-    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``): both are in WINDOWS."""
-    command = WINDOWS.get(name.lower())
+def __getattr__(name: str) -> Any:
+    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``): both are in COMMANDS."""
+    command = COMMANDS.get(name.lower())
     if command is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return command if name.isupper() else partial(_main, command)
@@ -227,8 +228,6 @@ def _dashboard(
 
 
 def _plugin(standalone: str) -> tuple[str, Fields]:
-    from minirospy.web.dashboard.views import view_of_plugin
-
     return view_of_plugin(standalone), {}
 
 
@@ -450,28 +449,20 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
 
 DASHBOARD = Command("minirospy dashboard", _dashboard_parser, _dashboard)
 
-WINDOWS = {
-    command.name: command
-    for command in (
-        _window("rqt", "topics", "Shows the graph", _add_plugin, _plugin),
-        _window("rqt_bag", "bag", "Records topics, and shows and plays bags", _add_bags, _bags),
-        _window("rqt_console", "console", "Shows the log lines of all nodes"),
-        _window("rqt_graph", "graph", "Shows nodes and topics"),
-        _window("rqt_image_view", "image", "Shows images of a topic", _add_topic, _image),
-        _window("rqt_launch", "launch", "Starts launch files, and shows their nodes"),
-        _window("rqt_logger_level", "console", "Shows log lines, and sets the levels of loggers"),
-        _window("rqt_plot", "plot", "Plots numbers of messages", _add_plots, _plots),
-        _window("rqt_publisher", "publish", "Publishes messages by forms"),
-        _window("rqt_reconfigure", "reconfigure", "Changes parameters of running nodes", _add_nodes, _nodes),
-        _window("rqt_robot_monitor", "diagnostics", "Shows aggregated diagnostics as a tree"),
-        _window("rqt_robot_steering", "teleop", "Drives a robot"),
-        _window("rqt_runtime_monitor", "diagnostics", "Shows diagnostics"),
-        _window("rqt_service_caller", "services", "Calls services by forms"),
-        _window("rqt_tf_tree", "tf", "Shows the tree of frames"),
-        _window("rqt_top", "nodes", "Shows CPU and memory of nodes", chosen=_top),
-        _window("rqt_topic", "topics", "Shows topics with their values"),
-        Command("rviz", _rviz_parser, _rviz),
-        _window("smach_viewer", "smach", "Shows state machines"),
-    )
+_ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tuple[str, Fields]]]] = {
+    "rqt": (_add_plugin, _plugin),
+    "rqt_bag": (_add_bags, _bags),
+    "rqt_image_view": (_add_topic, _image),
+    "rqt_plot": (_add_plots, _plots),
+    "rqt_reconfigure": (_add_nodes, _nodes),
+    "rqt_top": (None, _top),
 }
-"""The commands of rqt, and rviz, by name. Each has a line in the registry and pyproject.toml, and a package in ros/."""
+"""The commands that have arguments of their own: what adds them, and what makes the view and its settings of them."""
+
+COMMANDS = {
+    window.command: Command("rviz", _rviz_parser, _rviz)
+    if window.command == "rviz"
+    else _window(window.command, window.view, window.what, *_ARGUMENTS.get(window.command, ()))
+    for window in WINDOWS
+}
+"""The commands of rqt, and rviz, by name."""

@@ -1,5 +1,8 @@
 """Every command, in one table: the console scripts, `minirospy VERB` and completion are read from it.
 
+The build makes the console scripts (hatch_build.py); `python tools/commands.py` writes the lists of the shells
+and of the conda recipe.
+
 A command's module is imported when the command is started, or completed.
 """
 
@@ -9,10 +12,12 @@ import importlib
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from minirospy.cli.windows import WINDOWS
+
 if TYPE_CHECKING:
     from minirospy.command.verbs import Command, Family
 
-__all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "find_script", "find_verb"]
+__all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "console_scripts", "find_script", "find_verb"]
 
 
 class Entry(NamedTuple):
@@ -33,7 +38,7 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """Return the console script's function as pyproject.toml names it."""
+        """Return the console script's function as an entry point names it."""
         return f"minirospy.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
@@ -97,25 +102,7 @@ COMMANDS = (
     Entry("ros.rosdep.commands.rosdep", "main", "FAMILY", "rosdep"),
     Entry("ros.rosmsg.commands.rosmsg_proto", "main", "COMMAND", "rosmsg-proto"),
     Entry("ros.roswtf.commands.doctor", "roswtf", "ROSWTF", "roswtf"),
-    Entry("cli.dashboard", "rqt", "RQT", "rqt"),
-    Entry("cli.dashboard", "rqt_bag", "RQT_BAG", "rqt_bag"),
-    Entry("cli.dashboard", "rqt_console", "RQT_CONSOLE", "rqt_console"),
-    Entry("cli.dashboard", "rqt_graph", "RQT_GRAPH", "rqt_graph"),
-    Entry("cli.dashboard", "rqt_image_view", "RQT_IMAGE_VIEW", "rqt_image_view"),
-    Entry("cli.dashboard", "rqt_launch", "RQT_LAUNCH", "rqt_launch"),
-    Entry("cli.dashboard", "rqt_logger_level", "RQT_LOGGER_LEVEL", "rqt_logger_level"),
-    Entry("cli.dashboard", "rqt_plot", "RQT_PLOT", "rqt_plot"),
-    Entry("cli.dashboard", "rqt_publisher", "RQT_PUBLISHER", "rqt_publisher"),
-    Entry("cli.dashboard", "rqt_reconfigure", "RQT_RECONFIGURE", "rqt_reconfigure"),
-    Entry("cli.dashboard", "rqt_robot_monitor", "RQT_ROBOT_MONITOR", "rqt_robot_monitor"),
-    Entry("cli.dashboard", "rqt_robot_steering", "RQT_ROBOT_STEERING", "rqt_robot_steering"),
-    Entry("cli.dashboard", "rqt_runtime_monitor", "RQT_RUNTIME_MONITOR", "rqt_runtime_monitor"),
-    Entry("cli.dashboard", "rqt_service_caller", "RQT_SERVICE_CALLER", "rqt_service_caller"),
-    Entry("cli.dashboard", "rqt_tf_tree", "RQT_TF_TREE", "rqt_tf_tree"),
-    Entry("cli.dashboard", "rqt_top", "RQT_TOP", "rqt_top"),
-    Entry("cli.dashboard", "rqt_topic", "RQT_TOPIC", "rqt_topic"),
-    Entry("cli.dashboard", "rviz", "RVIZ", "rviz"),
-    Entry("cli.dashboard", "smach_viewer", "SMACH_VIEWER", "smach_viewer"),
+    *(Entry("cli.dashboard", each.command, each.command.upper(), each.command) for each in WINDOWS),
     Entry("ros.rostest.commands.rostest", "rosunit", "ROSUNIT", "rosunit"),
     Entry("ros.xacro.commands.xacro", "main", "", "xacro", completer="files"),
     Entry("ros.urdf.commands.urdf", "check_urdf", "CHECK", "check_urdf"),
@@ -142,6 +129,11 @@ SHELL_FUNCTIONS = {
     "rosmv": "package_file_and_target",
 }
 """What `minirospy shell` defines: the function of minirospy.cli.completion.completers for each."""
+
+
+def console_scripts() -> dict[str, str]:
+    """Return the console scripts, with the function of each: ``project.scripts`` of the project's metadata."""
+    return {entry.script: entry.target for entry in COMMANDS if entry.script}
 
 
 def find_script(name: str) -> Entry | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import re
 import shlex
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib.metadata import distribution
 from pathlib import Path
 from types import FunctionType
 
@@ -18,7 +18,7 @@ import yaml
 from minirospy.base.environment import Environment
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.complete import candidates, main
-from minirospy.cli.registry import COMMANDS, Entry
+from minirospy.cli.registry import COMMANDS, Entry, console_scripts
 from minirospy.command.parser import completer_of
 from minirospy.command.verbs import Command, Family, Verb
 from minirospy.core.idl.load import Catalogue, message_class
@@ -114,13 +114,9 @@ def test_the_small_commands(workspace: Path) -> None:
     assert tab("rosmsg-proto msg std_msgs/Boo") == ["std_msgs/Bool"]
 
 
-_PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
-
-
-def test_registry_equals_the_console_scripts() -> None:
-    section = _PYPROJECT.read_text(encoding="utf-8").partition("[project.scripts]")[2].partition("\n[")[0]
-    scripts = dict(re.findall(r'^([\w-]+) = "([\w.]+:\w+)"$', section, re.MULTILINE))
-    assert scripts == {entry.script: entry.target for entry in COMMANDS if entry.script}
+def test_console_scripts_that_are_installed_are_those_of_the_registry() -> None:
+    installed = distribution("minirospy").entry_points.select(group="console_scripts")
+    assert {each.name: each.value for each in installed} == console_scripts()
 
 
 def leaves(grammar: Command | Family | Verb, typed: str) -> Iterator[tuple[str, Command | Verb]]:

@@ -24,6 +24,7 @@ from roscpp.srv import GetLoggers, GetLoggersResponse
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 
+from minirospy.cli.registry import console_scripts
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc import master_proxy
@@ -32,7 +33,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import Result, Robot, without_ros_words
 
-PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
+ROOT = Path(__file__).parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, signals and devices of Unix")
 
 
@@ -151,11 +152,8 @@ GRAPH = [name for name, row in ROWS.items() if row.uses_master]
 
 def scripts() -> dict[str, tuple[str, str]]:
     """Return the commands that are installed -> module and function."""
-    section = PYPROJECT.read_text(encoding="utf-8").partition("[project.scripts]")[2].partition("\n[")[0]
-    return {
-        name: (module, function)
-        for name, module, function in re.findall(r'^(\S+) = "(.*):(.*)"', section, re.M)
-    }
+    found = {name: target.partition(":") for name, target in console_scripts().items()}
+    return {name: (module, function) for name, (module, _, function) in found.items()}
 
 
 class Recorded(io.StringIO):
@@ -357,7 +355,7 @@ ROS_OUTPUT = {
     "rosnode ping": "rosnode: node is [/nope]\n",
     "rosnode info": f"{RULE}Node [/nope]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n\n",
     "rosversion": "Cannot locate [nope]\n",
-    "rosrun": f"[rosrun] Couldn't find executable named nope below {PYPROJECT.parent / 'msgs' / 'std_msgs'}\n",
+    "rosrun": f"[rosrun] Couldn't find executable named nope below {ROOT / 'msgs' / 'std_msgs'}\n",
 }
 """What the real commands print to stdout about a name that nothing has."""
 

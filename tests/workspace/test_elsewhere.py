@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.errors import NotFoundError
-from minirospy.web.dashboard import views
+from minirospy.cli.windows import WINDOWS
 from minirospy.workspace import elsewhere
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 from minirospy.workspace.packages import Packages, built_in_roots
@@ -36,8 +36,9 @@ def test_advice_is_one_line_that_names_what_to_type(name: str) -> None:
 
 
 def test_plug_ins_with_a_view_have_programs() -> None:
-    assert set(views._PLUGINS) <= set(Packages.below(*built_in_roots()).names())
-    assert not set(views._PLUGINS) & set(elsewhere._QT_PLUGINS)
+    plug_ins = {each.package or each.command for each in WINDOWS}
+    assert plug_ins <= set(Packages.below(*built_in_roots()).names())
+    assert plug_ins & {*elsewhere._QT_PLUGINS, *elsewhere._QT_LIBRARIES} <= {"rqt_gui"}
 
 
 def test_unknown_names_have_no_advice() -> None:

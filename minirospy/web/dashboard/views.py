@@ -10,7 +10,7 @@ from urllib.parse import quote, urlencode
 
 from minirospy.base.errors import UsageError
 
-__all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields", "view_of_plugin"]
+__all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields"]
 
 VIEWS = (
     "topics",
@@ -41,38 +41,6 @@ VIEWS = (
 
 LAYOUTS = ("workshop", "console", "rviz", "teleop", "classroom")
 """The layouts that come with the page: several views side by side."""
-
-_PLUGINS = {
-    "rqt_topic": "topics",
-    "rqt_console": "console",
-    "rqt_logger_level": "console",
-    "rqt_plot": "plot",
-    "rqt_graph": "graph",
-    "rqt_bag": "bag",
-    "rqt_launch": "launch",
-    "rqt_image_view": "image",
-    "rqt_robot_steering": "teleop",
-    "rqt_robot_monitor": "diagnostics",
-    "rqt_runtime_monitor": "diagnostics",
-    "rqt_publisher": "publish",
-    "rqt_service_caller": "services",
-    "rqt_reconfigure": "reconfigure",
-    "rqt_tf_tree": "tf",
-    "rqt_top": "nodes",
-}
-"""rqt's plug-ins -> the view that shows the same."""
-
-
-def view_of_plugin(plugin: str) -> str:
-    """Return the view for a name that `rqt --standalone` takes. Raise UsageError where there is none."""
-    name = plugin.rpartition("/")[0] or plugin
-    for known, view in _PLUGINS.items():
-        # rqt itself accepts a part of the name.
-        if name.lower().replace(".", "/").split("/")[0] == known:
-            return view
-    if name in VIEWS:
-        return name
-    raise UsageError(f"there is no view for the plug-in '{plugin}': there are {', '.join(_PLUGINS)}")
 
 
 def link(

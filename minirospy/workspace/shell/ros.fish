@@ -213,13 +213,13 @@ function _ros_complete --description 'print what can stand at the cursor'
     command minirospy complete --one-line (count $before) $before "$current" 2>/dev/null | string unescape
 end
 
-for name in roscd rosls rosed roscat roscp rosmv rospd rosrun roslaunch roslaunch-deps roslaunch-logs \
-        roscore rosmaster rostopic rosnode rosservice rosparam rosmsg rossrv rosmsg-proto rospack rosstack rosdep \
-        rosconsole rosgraph rosbag rosclean rosversion roswtf rostest rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_make catkin_make_isolated catkin \
-        catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
-        catkin_topological_order rqt rqt_bag rqt_console rqt_graph rqt_image_view rqt_launch rqt_logger_level rqt_plot \
-        rqt_publisher rqt_reconfigure rqt_robot_monitor rqt_robot_steering rqt_runtime_monitor \
-        rqt_service_caller rqt_tf_tree rqt_top rqt_topic rviz smach_viewer minirospy
+for name in roscd rospd rosls rosed roscat roscp rosmv minirospy rosrun roslaunch rostopic rosnode rosservice rosparam \
+        rosmsg rossrv rosbag rosconsole rosgraph rosclean rosversion rospack rostest catkin_make roscore rosmaster \
+        roslaunch-deps roslaunch-logs rosstack rosdep rosmsg-proto roswtf rqt rqt_bag rqt_console rqt_graph \
+        rqt_image_view rqt_launch rqt_logger_level rqt_plot rqt_publisher rqt_reconfigure rqt_robot_monitor \
+        rqt_robot_steering rqt_runtime_monitor rqt_service_caller rqt_tf_tree rqt_top rqt_topic rviz smach_viewer \
+        rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_test_results catkin_make_isolated catkin \
+        catkin_create_pkg catkin_init_workspace catkin_find catkin_find_pkg catkin_topological_order
     complete --command $name --erase
     complete --command $name --no-files --arguments '(_ros_complete)'
 end

@@ -254,7 +254,7 @@ def test_words_of_rqt_plot_that_are_not_paths_are_usage_errors(capsys: pytest.Ca
 
 def test_rosrun_finds_the_programs_of_rqt() -> None:
     packages = Packages()
-    for name in (*command.WINDOWS, "rqt_gui"):
+    for name in (*command.COMMANDS, "rqt_gui"):
         if name == "rqt":
             continue
         found = packages.find_executable(name, name)

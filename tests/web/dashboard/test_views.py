@@ -9,7 +9,7 @@ import pytest
 from minirospy.base.errors import UsageError
 from minirospy.cli.dashboard import _dashboard_parser
 from minirospy.web.dashboard.files import FOLDER
-from minirospy.web.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields, view_of_plugin
+from minirospy.web.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields
 
 
 def test_page_has_the_views_that_links_name() -> None:
@@ -60,15 +60,3 @@ def test_words_of_rqt_plot_become_paths(words: list[str], paths: list[str]) -> N
 def test_word_that_is_not_a_path_is_refused(word: str) -> None:
     with pytest.raises(UsageError, match=re.escape(word)):
         plotted_fields([word])
-
-
-def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
-    assert view_of_plugin("topics") == "topics"
-    assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
-    assert view_of_plugin("rqt_top") == view_of_plugin("rqt_top/Top") == "nodes"
-    assert view_of_plugin("rqt_robot_steering") == "teleop"
-    assert view_of_plugin("rqt_robot_monitor") == view_of_plugin("rqt_runtime_monitor") == "diagnostics"
-    with pytest.raises(
-        UsageError, match=r"there is no view for the plug-in 'rqt_moveit': there are .*rqt_topic"
-    ):
-        view_of_plugin("rqt_moveit")
