@@ -45,14 +45,15 @@ def test_contributing_names_files_that_exist() -> None:
     assert f"def {example[1]}(" in (ROOT / example[0]).read_text(encoding="utf-8")
 
 
-def test_named_functions_exist() -> None:
+def test_named_functions_and_tables_exist() -> None:
     """`_hz` in `ros/rostopic/commands/rostopic_rates.py`, `Node.close` in `runtime/node/node.py`."""
     named = re.findall(r"`([\w.]+)` in `([\w/]+/\w+\.py)`", TEXT)
     assert len(named) >= 5
     for name, path in named:
         text = (PACKAGE / path).read_text(encoding="utf-8")
         for part in name.split("."):
-            assert re.search(rf"^ *(?:async )?(?:def|class) {part}\b", text, re.MULTILINE), (name, path)
+            defined = rf"^ *(?:async )?(?:def|class) {part}\b|^{part}(?:: .*)? = "
+            assert re.search(defined, text, re.MULTILINE), (name, path)
 
 
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md"), ROOT / "tests" / "README.md"])
