@@ -28,16 +28,17 @@ _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
 
 def safe_load(text: str) -> object:
-    """Return the value of a text, as yaml.safe_load does. Raise yaml.YAMLError."""
+    """Return the value of a text, as yaml.safe_load does. Raise yaml.YAMLError; TypeError if it is not a text."""
     import yaml
 
     return load(text, yaml.SafeLoader)
 
 
 def load(text: str, loader: Loader) -> Any:
-    """Return the value of a text, by a class that derives from PyYAML's safe loaders. Raise yaml.YAMLError."""
+    """Return the value of a text, by a class that derives from PyYAML's safe loaders. Raise yaml.YAMLError, TypeError."""
     import yaml
 
+    _require_text(text)
     try:
         check_yaml(text)
         return yaml.load(text, Loader=guarded(loader))  # type: ignore[arg-type]
@@ -46,9 +47,10 @@ def load(text: str, loader: Loader) -> Any:
 
 
 def load_all(text: str, loader: Loader) -> Iterator[Any]:
-    """Yield the values of the documents of a text, likewise. Raise yaml.YAMLError."""
+    """Yield the values of the documents of a text, likewise. Raise yaml.YAMLError, TypeError."""
     import yaml
 
+    _require_text(text)
     try:
         check_yaml(text)
         documents = yaml.load_all(text, Loader=guarded(loader))  # type: ignore[arg-type]
@@ -62,6 +64,12 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
         except _RAISED as error:
             raise yaml.YAMLError(_reason(error)) from error
         yield document
+
+
+def _require_text(text: object) -> None:
+    """Raise TypeError for None, a number and the like: that is the program's mistake, not the text's."""
+    if not isinstance(text, str | bytes):
+        raise TypeError(f"YAML is a text, not {type(text).__name__}")
 
 
 def fast_loader() -> type[yaml.SafeLoader]:

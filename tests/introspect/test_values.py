@@ -223,3 +223,11 @@ def test_a_loader_that_learns_later_is_guarded_too() -> None:
 def test_a_long_integer_is_no_parameter_and_not_shown_in_full() -> None:
     with pytest.raises(ValueTextError, match=r"1{40}\.\.\. is more than a parameter's 32 bits hold$"):
         check_parameter({"a": int("1" * 900)}, "/n")
+
+
+@pytest.mark.parametrize("value", [None, 0.5, object()])
+def test_what_is_not_a_text_is_a_type_error_as_with_pyyaml(value: object) -> None:
+    with pytest.raises(TypeError, match="YAML is a text, not "):
+        yaml_text.safe_load(value)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="YAML is a text, not "):
+        list(parse_documents(value, "file"))  # type: ignore[arg-type]
