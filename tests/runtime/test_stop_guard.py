@@ -69,13 +69,16 @@ def test_deadlines_that_are_moved_or_removed_stop_nothing(guard: StopGuard, cloc
     guard.arm(moved, clock.now + 3000)
     guard.disarm(removed)
     guard.disarm(removed)
-    clock.now += 2000
     # What comes with an earlier deadline does not wait behind the others.
     guard.arm(stops(names, "early"), clock.now)
     wait_until(lambda: names == ["early"])
     clock.now += 2000
-    guard.arm(_nothing, 0.0)
-    wait_until(lambda: names == ["early", "moved"])
+    guard.arm(stops(names, "second"), 0.0)
+    wait_until(lambda: names == ["early", "second"])
+    clock.now += 2000
+    guard.arm(stops(names, "third"), 0.0)
+    wait_until(lambda: len(names) == 4)
+    assert sorted(names) == ["early", "moved", "second", "third"]
 
 
 def test_fault_of_one_leaves_the_others_stopped(
