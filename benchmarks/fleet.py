@@ -28,7 +28,7 @@ SETTLE_SECONDS, QUIET_SECONDS = 8.0, 60.0
 CUT_SECONDS = 15.0
 DELAY, JITTER, LOSS = 20, 5, 1
 """Of the link, in each direction: milliseconds, and percent of the frames."""
-MOST_SECONDS = 300
+MAX_SECONDS = 300
 """How long a cut is waited for, and the recovery from it."""
 PORT = 27447
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
@@ -205,13 +205,13 @@ def request(process, line):
     """Return the answer of a process to a line: seconds, or that they are too many."""
     process.stdin.write(f"{line}\n")
     process.stdin.flush()
-    limit = threading.Timer(MOST_SECONDS, process.kill)
+    limit = threading.Timer(MAX_SECONDS, process.kill)
     limit.start()
     try:
         answer = process.stdout.readline()
     finally:
         limit.cancel()
-    return round(json.loads(answer), 2) if answer else f"more than {MOST_SECONDS}"
+    return round(json.loads(answer), 2) if answer else f"more than {MAX_SECONDS}"
 
 
 def measure(network, count, *, cuts):

@@ -32,8 +32,8 @@ from minirospy.runtime.rpc.client import RpcClient
 NAMES = 500
 LIVE = 200
 SAMPLE_SECONDS = 10.0
-MOST_MB = 2.0
-MOST_FILES = 50
+MAX_MB = 2.0
+MAX_FILES = 50
 
 
 class Sample(NamedTuple):
@@ -206,7 +206,7 @@ def main() -> int:
     mb = [statistics.median(sample.mb for sample in part) for part in (middle, end)]
     files = [statistics.median(sample.files for sample in part) for part in (middle, end)]
     print(f"memory {mb[0]:.2f} -> {mb[1]:.2f} MB, files {files[0]:g} -> {files[1]:g}, {churn.calls:,} calls")
-    return 1 if mb[1] - mb[0] > MOST_MB or files[1] - files[0] > MOST_FILES else 0
+    return 1 if mb[1] - mb[0] > MAX_MB or files[1] - files[0] > MAX_FILES else 0
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from tests.fuzz_readers import peak_megabytes
 
 FINDING = Path("fuzz-bridge-finding.bin")
 INPUTS_PER_BRIDGE = 2000
-MOST_WAITING = 70_000_000
+MAX_WAITING = 70_000_000
 HANDSHAKE = (
     b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
@@ -210,7 +210,7 @@ class Target:
                         pass
             for _ in range(5):
                 await asyncio.sleep(0)
-            assert connection.queue.size + connection.queue.answers < MOST_WAITING
+            assert connection.queue.size + connection.queue.answers < MAX_WAITING
             connection.abort()
 
         assert not self._faults.found, self._faults.found.pop()

@@ -11,7 +11,7 @@ import pytest
 
 from hatch_build import ADDRESS_VARIABLE, project_urls, readme_of_wheel
 from tools import release
-from tools.release import MOST_BYTES, faults_of_metadata, faults_of_wheel
+from tools.release import MAX_BYTES, faults_of_metadata, faults_of_wheel
 
 ROOT = Path(__file__).parents[1]
 
@@ -49,7 +49,7 @@ def contents() -> dict[str, int]:
 
 
 def test_whole_wheel_has_no_faults(contents: dict[str, int]) -> None:
-    assert faults_of_wheel(contents, MOST_BYTES - 1, SOURCES) == []
+    assert faults_of_wheel(contents, MAX_BYTES - 1, SOURCES) == []
 
 
 def test_large_wheel_names_its_largest_files(contents: dict[str, int]) -> None:

@@ -26,7 +26,7 @@ from tools.sbom import SbomError, make_sbom
 
 ROOT = Path(__file__).parents[1]
 
-MOST_BYTES = 3_000_000
+MAX_BYTES = 3_000_000
 
 OLDEST = (3, 10)
 
@@ -91,11 +91,9 @@ def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[
     """Return what is wrong with a wheel of ``size`` bytes: ``contents`` are its files, ``tracked`` those of the sources."""
     sources = set(tracked)
     faults = []
-    if size >= MOST_BYTES:
+    if size >= MAX_BYTES:
         largest = sorted(contents, key=lambda name: -contents[name])[:3]
-        faults.append(
-            f"has {size:,} bytes, not under {MOST_BYTES:,}; the largest files: {', '.join(largest)}"
-        )
+        faults.append(f"has {size:,} bytes, not under {MAX_BYTES:,}; the largest files: {', '.join(largest)}")
 
     faults += [
         f"{name}: not from a file of the sources"

@@ -16,7 +16,7 @@ from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 __all__ = ["Faults", "keep_running"]
 
 PAUSE_SECONDS = 1.0
-_MOST_CHARACTERS = 500
+_MAX_CHARACTERS = 500
 
 
 class Faults:
@@ -33,7 +33,7 @@ class Faults:
         last = traceback.extract_tb(error.__traceback__)[-1:]
         where = "".join(f" at {Path(frame.filename).name}:{frame.lineno}" for frame in last)
         text = " ".join(traceback.format_exception_only(type(error), error)[-1].split())
-        self._lines.error("%s failed%s: %s", self._work, where, text[:_MOST_CHARACTERS])
+        self._lines.error("%s failed%s: %s", self._work, where, text[:_MAX_CHARACTERS])
         self._log.debug("%s failed", self._work, exc_info=error)
 
     def of_task(self, task: asyncio.Future[None]) -> None:

@@ -100,9 +100,9 @@ __all__ = [
     "ROSTimeMovedBackwardsException",
     "RpcError",
     "RpcFault",
-    "RpcLate",
     "RpcProtocolError",
     "RpcRefused",
+    "RpcTimeout",
     "RpcUnreachable",
     "RvizFileError",
     "SerializationError",
@@ -246,15 +246,15 @@ class RpcUnreachable(RpcError):
         return f"no answer from {self.uri}: {self.why}"
 
 
-class RpcLate(RpcUnreachable):
+class RpcTimeout(RpcUnreachable):
     """The peer took the connection, and did not answer in time: its process is stopped, or busy."""
 
     def __init__(self, uri: str, seconds: float) -> None:
         super().__init__(uri, f"timed out after {seconds:g} s")
         self.seconds = seconds
 
-    def __reduce__(self) -> tuple[type[RpcLate], tuple[str, float]]:
-        return RpcLate, (self.uri, self.seconds)
+    def __reduce__(self) -> tuple[type[RpcTimeout], tuple[str, float]]:
+        return RpcTimeout, (self.uri, self.seconds)
 
 
 class WireError(MinirospyError):

@@ -11,7 +11,7 @@ from minirospy.base.errors import BridgeError
 __all__ = ["show_status"]
 
 _SECONDS = 5.0
-_MOST_BYTES = 10_000_000
+_MAX_BYTES = 10_000_000
 _SCHEMES = {"video": "http"}
 _Json = Any
 
@@ -106,7 +106,7 @@ def _fetch(port: int, token: _Token) -> _Json:
             headers = {"Authorization": f"Bearer {token.text}"} if token.text else {}
             connection.request("GET", "/status", headers=headers)
             answer = connection.getresponse()
-            body = answer.read(_MOST_BYTES)
+            body = answer.read(_MAX_BYTES)
         except (OSError, http.client.HTTPException) as error:
             fault = fault or error
             continue

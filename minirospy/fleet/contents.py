@@ -17,12 +17,12 @@ from minirospy.fleet.keys import Claim, ServiceToken, TopicToken, parse_claim, p
 
 _Token = TypeVar("_Token", TopicToken, ServiceToken)
 
-__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "MOST_TOKENS", "FleetContents", "Refused", "Robot"]
+__all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
-MOST_GATEWAYS = 5_000
-MOST_NAMES = 2_000
+MAX_GATEWAYS = 5_000
+MAX_NAMES = 2_000
 """Topics, and as many services, that one gateway may announce."""
-MOST_TOKENS = 200_000
+MAX_TOKENS = 200_000
 """Topics and services of all gateways together: some 100 MiB."""
 
 
@@ -82,8 +82,8 @@ class FleetContents:
         if not self._allows(name):
             return False
         at = (name, token.gateway)
-        if at not in self._gateways and len(self._gateways) >= MOST_GATEWAYS:
-            return self._refuse(f"the fleet has more than {MOST_GATEWAYS} gateways")
+        if at not in self._gateways and len(self._gateways) >= MAX_GATEWAYS:
+            return self._refuse(f"the fleet has more than {MAX_GATEWAYS} gateways")
 
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
@@ -162,12 +162,12 @@ class FleetContents:
 
     def _put(self, table: dict[str, _Token], name: str, token: _Token) -> bool:
         if name not in table:
-            if len(table) >= MOST_NAMES:
+            if len(table) >= MAX_NAMES:
                 return self._refuse(
-                    f"robot [{token.robot}] announces more than {MOST_NAMES} topics or services"
+                    f"robot [{token.robot}] announces more than {MAX_NAMES} topics or services"
                 )
-            if self._count >= MOST_TOKENS:
-                return self._refuse(f"the fleet announces more than {MOST_TOKENS} topics and services")
+            if self._count >= MAX_TOKENS:
+                return self._refuse(f"the fleet announces more than {MAX_TOKENS} topics and services")
             self._count += 1
         changed = table.get(name) != token
         table[name] = token

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["Exporter"]
 
 _log = logging.getLogger(__name__)
-_MOST_IN_FLOWS = 1_000
-_MOST_WANTED, _MOST_READERS = 10_000, 1_000
+_MAX_IN_FLOWS = 1_000
+_MAX_WANTED, _MAX_READERS = 10_000, 1_000
 """Topics that readers may want, and readers of each, which peers choose."""
 
 
@@ -74,7 +74,7 @@ class Exporter:
         self._readers: dict[str, set[str]] = {}
         self._claims = {claim}
         self._rivals = RateLimitedLogger(_log)
-        self._flows = Intake.flows(_MOST_IN_FLOWS)
+        self._flows = Intake.flows(_MAX_IN_FLOWS)
         self._faults = Faults(_log, "the watch of the robot's graph")
         self._watching: asyncio.Task[None] | None = None
         self._declared: list[Later] = []
@@ -136,10 +136,10 @@ class Exporter:
         want = parse_want(key)
         if want is None:
             return
-        if is_there and want.topic not in self._readers and len(self._readers) >= _MOST_WANTED:
+        if is_there and want.topic not in self._readers and len(self._readers) >= _MAX_WANTED:
             return
         readers = self._readers.setdefault(want.topic, set())
-        if is_there and len(readers) < _MOST_READERS:
+        if is_there and len(readers) < _MAX_READERS:
             readers.add(want.reader)
             outbound = self.outbound.get(want.topic)
             if outbound:

@@ -17,7 +17,7 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, MessageSpec
 __all__ = ["FrameRewriter", "prefixed", "stripped"]
 
 _LENGTH = struct.Struct("<I")
-_MOST_ELEMENTS = 1_000_000
+_MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
@@ -169,7 +169,7 @@ def _run(
                     pass
                 case inner:
                     # Each has a length of four bytes at least.
-                    if count * 4 > len(data) - at or count > _MOST_ELEMENTS:
+                    if count * 4 > len(data) - at or count > _MAX_ELEMENTS:
                         raise DeserializationError(f"an array of {count} elements is longer than the message")
                     for _ in range(count):
                         copied, at = _run(inner, data, copied, at, change, pieces)

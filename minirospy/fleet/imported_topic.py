@@ -46,8 +46,8 @@ _log = logging.getLogger(__name__)
 _LINGER_SECONDS = 1.0
 _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
-_MOST_MESSAGE = 256 << 20
-_MOST_OFFERS = 10
+_MAX_MESSAGE = 256 << 20
+_MAX_OFFERS = 10
 MAX_REGISTERING = (
     50  # topics that are registered at a time: each is a call of the master, on a connection of its own
 )
@@ -239,7 +239,7 @@ class ImportedTopic:
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
         """Take a message. In a thread of Zenoh's."""
-        if len(message) > _MOST_MESSAGE:
+        if len(message) > _MAX_MESSAGE:
             self._misfits.error(
                 "a message on %s of %d bytes is left out: it is too large", self.name, len(message)
             )
@@ -316,7 +316,7 @@ class ImportedTopic:
         }
         for key in self._offers.keys() - present:
             self._offers.pop(key).undeclare()
-        for md5sum, is_latched in list(present - self._offers.keys())[:_MOST_OFFERS]:
+        for md5sum, is_latched in list(present - self._offers.keys())[:_MAX_OFFERS]:
             token, shared = self.token, self._shared
             offer = Offer(token.topic, shared.gateway, token.type, md5sum, is_latched)
             self._offers[md5sum, is_latched] = shared.network.declare_token(

@@ -43,18 +43,18 @@ _AGAIN_SECONDS = 5.0
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
-_MOST_PING = 64  # bytes of an answer to a ping, which has 8
+_MAX_PING = 64  # bytes of an answer to a ping, which has 8
 _CALL_SECONDS = 3600.0
 _CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # some 4 MB; links linger until then
-MAX_ROBOT_NAMES = 2_000  # of _MOST_IMPORTED that one robot may take
+MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED that one robot may take
 NAMES_AT_ONCE = 100  # of a robot that are closed together: each is a task, and a call of the master
 MAX_LISTED = 5  # robots that one log line names
 LINES = 5  # log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
 _AT_ONCE = 20
 """Robots that are removed at a time."""
-_MOST_IMPORTED = 9_000
+_MAX_IMPORTED = 9_000
 """Names that the importer registers: a master keeps 10,000 for a node."""
 
 
@@ -280,7 +280,7 @@ class Importer:
                 before,
                 "as the operator has chosen" if is_chosen else f"which has been gone for {HOLD_SECONDS:g} s",
             )
-        if len(self._machines) >= _MOST_IMPORTED:
+        if len(self._machines) >= _MAX_IMPORTED:
             self._machines.clear()
         self._machines[claim.name] = claim.host
 
@@ -377,13 +377,13 @@ class Importer:
             )
             return False
         count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
-        if count < _MOST_IMPORTED:
+        if count < _MAX_IMPORTED:
             return True
         if not self._is_full:
             self._is_full = True
             _log.error(
                 "the fleet has more than %d topics and services: the others are not shown. Give --robots or --topics",
-                _MOST_IMPORTED,
+                _MAX_IMPORTED,
             )
         return False
 
@@ -458,7 +458,7 @@ class Importer:
         """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
         start = f"{ROOT}/ping/"
         try:
-            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MOST_PING)
+            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
             return None

@@ -30,8 +30,8 @@ __all__ = ["InboundTopic", "call_service", "run_on_loop"]
 _log = logging.getLogger(__name__)
 _IDLE_SECONDS = 10.0
 _QUEUE = 100
-_MOST_HELD, _MOST_HELD_BYTES = 100, 16 << 20
-_MOST_OFFERS = 100
+_MAX_HELD, _MAX_HELD_BYTES = 100, 16 << 20
+_MAX_OFFERS = 100
 
 
 async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes:
@@ -86,7 +86,7 @@ class InboundTopic:
         self._is_ready = False
         self._is_closed = False
         self._misfits = RateLimitedLogger(_log)
-        self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
+        self._held: deque[bytes] = deque(maxlen=_MAX_HELD)
         self._stream: CommandStream | None = None
         self._stop_seconds = stop_seconds
 
@@ -106,7 +106,7 @@ class InboundTopic:
         self._last = time.monotonic()
         if not is_there:
             self._offers.discard(offer)
-        elif offer.type == self.token.type and len(self._offers) < _MOST_OFFERS:
+        elif offer.type == self.token.type and len(self._offers) < _MAX_OFFERS:
             self._offers.add(offer)
             self._prepare(offer.md5sum, offer.writer)
 
@@ -125,7 +125,7 @@ class InboundTopic:
         self._prepare(md5sum, writer)
         if md5sum == self._md5sum:
             self._held.append(body)
-            while len(self._held) > 1 and sum(map(len, self._held)) > _MOST_HELD_BYTES:
+            while len(self._held) > 1 and sum(map(len, self._held)) > _MAX_HELD_BYTES:
                 self._held.popleft()
 
     async def close(self) -> None:

@@ -71,7 +71,7 @@ ROOT = "@minirospy/1"
 UNKNOWN_MD5 = "-"
 """The md5sum of a topic that has subscribers only, of a type that is not installed."""
 
-_MOST_NAME = 256
+_MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
 _GATEWAY = re.compile(r"[0-9a-f]{16}")
 _TYPE = re.compile(r"[A-Za-z]\w{0,127}%[A-Za-z]\w{0,127}", re.ASCII)
@@ -175,7 +175,7 @@ def unmangled(chunk: str) -> str | None:
 def is_global_name(name: str) -> bool:
     """Return whether a text is a global graph resource name, not too long."""
     return (
-        len(name) <= _MOST_NAME
+        len(name) <= _MAX_NAME
         and name.startswith("/")
         and not name.endswith("/")
         and "//" not in name

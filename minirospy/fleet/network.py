@@ -59,7 +59,7 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-MOST_TEXT = 16 << 20
+MAX_TEXT = 16 << 20
 """Bytes of a query or a reply that is read at most: a response of a service, a definition."""
 MAX_REPLIES = 10_000  # to one query: peers choose how many; a fleet has at most 5,000 gateways
 EARLY_SHARE = 0.9  # of its seconds: a query that ends before has not waited in vain, its link broke
@@ -323,7 +323,7 @@ class FleetNetwork:
         *,
         seconds: float,
         most: int = MAX_REPLIES,
-        size: int = MOST_TEXT,
+        size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
         """Return the answers by their keys, ``most`` of at most ``size`` bytes; ``options`` of Zenoh's go before ours.
@@ -417,8 +417,8 @@ class FleetNetwork:
         try:
             if refusal:
                 raise QueryFailed(refusal)
-            if payload is not None and len(payload) > MOST_TEXT:
-                raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
+            if payload is not None and len(payload) > MAX_TEXT:
+                raise QueryFailed(f"the request has more than {MAX_TEXT} bytes")
             body = await handler(key, payload.to_bytes() if payload is not None else b"")
             reply = functools.partial(query.reply, own_key or query.key_expr, body)
         except MinirospyError as error:

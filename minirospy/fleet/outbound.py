@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["OutboundTopic"]
 
 _log = logging.getLogger(__name__)
-_MOST_LATCHED = 100
+_MAX_LATCHED = 100
 
 
 class OutboundTopic:
@@ -87,7 +87,7 @@ class OutboundTopic:
         is_latched = header.get("latching") == "1"
         if is_latched:
             self._forget_disconnected()
-            if len(self._latched) < _MOST_LATCHED or id(header) in self._latched:
+            if len(self._latched) < _MAX_LATCHED or id(header) in self._latched:
                 self._latched[id(header)] = body
         self.outflow.send(self._key, body, always=is_latched)
 

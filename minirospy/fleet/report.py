@@ -13,7 +13,7 @@ from minirospy.fleet.keys import Claim
 __all__ = ["Answer", "as_json", "is_shallow", "is_shown", "lines", "parse_answer"]
 
 Json = Mapping[str, object]
-MOST_LEVELS = 50
+MAX_LEVELS = 50
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def parse_answer(data: bytes) -> Json:
     return found if isinstance(found, dict) and is_shallow(found) else {}
 
 
-def is_shallow(value: object, levels: int = MOST_LEVELS) -> bool:
+def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
     """Return whether a value of JSON is nested no deeper than so many levels: what writes it again recurses."""
     if isinstance(value, dict):
         value = list(value.values())

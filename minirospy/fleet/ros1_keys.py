@@ -24,7 +24,7 @@ from minirospy.fleet.keys import UNKNOWN_MD5, TopicToken, is_global_name, is_md5
 __all__ = [
     "EVERY_NAMESPACE",
     "LOST_SECONDS",
-    "MOST_RESOURCES",
+    "MAX_RESOURCES",
     "PERIOD",
     "Beacons",
     "Resource",
@@ -44,13 +44,13 @@ PERIOD = 1.0
 LOST_SECONDS = 5.0
 """Without a beacon for so long a resource is lost: when a bridge ends, another that was silent needs up to three periods. The
 bridge itself needs 3 to 6 s."""
-MOST_RESOURCES = 9_000
+MAX_RESOURCES = 9_000
 """Resources of others that are known: a master keeps 10,000 names of a node."""
 
 _ROOT = "ros1_discovery_info"
 _KINDS = ("pub", "sub", "srv", "cl")
 _ANY = b"*".hex()
-_MOST_KEY = 1_000
+_MAX_KEY = 1_000
 _HEX = re.compile(r"(?:[0-9a-f]{2})+")
 _TYPE = re.compile(r"[A-Za-z]\w{0,127}/[A-Za-z]\w{0,127}", re.ASCII)
 _NAMESPACE = re.compile(r"[A-Za-z0-9_.-]{1,64}")
@@ -127,7 +127,7 @@ def beacon_pattern(namespace: str) -> str:
 
 def parse_beacon(key: str) -> Resource | None:
     """Return the resource of a beacon; None where it has no type, as a subscriber of any. Raise BridgeError with the reason."""
-    if len(key) > _MOST_KEY:
+    if len(key) > _MAX_KEY:
         raise BridgeError(f"its key has {len(key)} characters")
     chunks = key.split("/", 6)
     if len(chunks) < 7 or chunks[0] != _ROOT:
@@ -214,8 +214,8 @@ class Sightings:
     def received(self, resource: Resource, now: float) -> bool:
         """Record a beacon; return whether the resource is new. Raise BridgeError where there are too many."""
         is_new = resource not in self._seen
-        if is_new and len(self._seen) >= MOST_RESOURCES:
-            raise BridgeError(f"there are more than {MOST_RESOURCES} topics and services")
+        if is_new and len(self._seen) >= MAX_RESOURCES:
+            raise BridgeError(f"there are more than {MAX_RESOURCES} topics and services")
         self._seen[resource] = now
         return is_new
 

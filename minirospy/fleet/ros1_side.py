@@ -57,8 +57,8 @@ _BRIDGE = "/ros1_to_zenoh_bridge"
 _AGGREGATE = "/rosout_agg"
 _BEAT_SECONDS = 0.2
 _CALL_SECONDS = 3600.0
-_MOST_REASON = 200
-_MOST_ERROR = 2_000
+_MAX_REASON = 200
+_MAX_ERROR = 2_000
 
 
 class Ros1Side:
@@ -249,7 +249,7 @@ class Ros1Side:
                     self._has_news |= self._sightings.received(resource, time.monotonic())
         except BridgeError as error:
             self.refused += 1
-            self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MOST_REASON])
+            self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MAX_REASON])
 
     def _allows(self, resource: Resource) -> bool:
         if resource.kind != "srv":
@@ -321,8 +321,8 @@ def _error_in(resource: Resource, answer: bytes) -> str:
     """
     from minirospy.core.idl.load import get_service_class
 
-    text = answer[:_MOST_ERROR].decode(errors="replace")
-    if not answer or len(answer) > _MOST_ERROR or not "".join(text.split()).isprintable():
+    text = answer[:_MAX_ERROR].decode(errors="replace")
+    if not answer or len(answer) > _MAX_ERROR or not "".join(text.split()).isprintable():
         return ""
     try:
         found = get_service_class(resource.type)

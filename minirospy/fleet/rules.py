@@ -25,7 +25,7 @@ __all__ = [
     "parse_rates",
 ]
 
-_MOST_HERTZ = 10_000.0
+_MAX_HERTZ = 10_000.0
 _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
@@ -128,7 +128,7 @@ def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
             hertz = float(text)
         except ValueError:
             hertz = -1.0
-        if not 0 < hertz <= _MOST_HERTZ:
+        if not 0 < hertz <= _MAX_HERTZ:
             raise BridgeError(f"--rate {word}: [{text}] is not a rate in Hz, as 5 or 0.2")
         found.append((pattern, hertz))
     return found

@@ -18,10 +18,10 @@ __all__ = ["Intake", "Outflow", "Sender"]
 
 _log = logging.getLogger(__name__)
 _CLOSE_SECONDS = 2.0
-_MOST_WAITING = {Lane.TELEOP: 10, Lane.DATA: 100, Lane.BULK: 2}
-_MOST_BYTES = {Lane.TELEOP: 1 << 20, Lane.DATA: 8 << 20, Lane.BULK: 32 << 20}
+_MAX_WAITING = {Lane.TELEOP: 10, Lane.DATA: 100, Lane.BULK: 2}
+_MAX_BYTES = {Lane.TELEOP: 1 << 20, Lane.DATA: 8 << 20, Lane.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
-_MOST_OUTLETS = 64
+_MAX_OUTLETS = 64
 """Publishers of Zenoh that a flow keeps: its own, and those of readers that got latched messages, least recent first to go."""
 
 
@@ -62,7 +62,7 @@ class Outflow:
         self.throttled = 0
         self._worker = worker
         self._throttle = Throttle(hertz)
-        self._flow: Flow[tuple[str, bytes]] = Flow(_MOST_WAITING[lane], _MOST_BYTES[lane])
+        self._flow: Flow[tuple[str, bytes]] = Flow(_MAX_WAITING[lane], _MAX_BYTES[lane])
         self._outlets: dict[str, Outlet] = {}
         self._numbers: dict[str, int] = {}
 
@@ -139,7 +139,7 @@ class _LaneWorker(_Worker):
     def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
         outlet = outflow._outlets.pop(key, None)
         if outlet is None:
-            while len(outflow._outlets) >= _MOST_OUTLETS:
+            while len(outflow._outlets) >= _MAX_OUTLETS:
                 oldest = next(iter(outflow._outlets))
                 outflow._numbers.pop(oldest, None)
                 outflow._outlets.pop(oldest).undeclare()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MessageClasses", "check", "fill", "serialize", "words_of"]
 
-_MOST_CLASSES = 256
+_MAX_CLASSES = 256
 _M = TypeVar("_M", bound="Message")
 
 
@@ -44,7 +44,7 @@ class MessageClasses:
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
-            if len(self._classes) >= _MOST_CLASSES:
+            if len(self._classes) >= _MAX_CLASSES:
                 # Nobody means so many types: a publisher makes them up.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))

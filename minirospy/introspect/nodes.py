@@ -15,9 +15,9 @@ from minirospy.base.errors import (
     NodeUnreachableError,
     NotFoundError,
     RpcError,
-    RpcLate,
     RpcProtocolError,
     RpcRefused,
+    RpcTimeout,
     RpcUnreachable,
 )
 from minirospy.introspect.graph import Graph, NodeAddress, in_namespace, node_host
@@ -285,7 +285,7 @@ def _named(node: NodeAddress) -> Iterator[None]:
     """Faults of a call to ``node``, named after it."""
     try:
         yield
-    except RpcLate as error:
+    except RpcTimeout as error:
         raise NodeUnreachableError(node.name, error.uri, f"{error.why}; {SUSPENDED}") from error
     except RpcUnreachable as error:
         raise NodeUnreachableError(node.name, error.uri, error.why) from error

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
-_MOST_NAMES = 2_000
+_MAX_NAMES = 2_000
 """Types that are remembered, also those that are not installed: a peer may name any number."""
 _AT_ONCE = 32
 """Publishers that are queried at a time."""
@@ -83,7 +83,7 @@ class TypeTexts:
 
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
-        while len(self._installed) >= _MOST_NAMES:
+        while len(self._installed) >= _MAX_NAMES:
             # The oldest: dictionaries keep their order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from minirospy.ros2.actions import ActionCodec
     from minirospy.ros2.interface import Ros2Handle, Ros2Side
 
-__all__ = ["MOST_GOALS", "GoalsToRos1"]
+__all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 _SERVER_SECONDS = 5.0
 """How long a server of ROS 1 may take to be connected, and to name a goal in its list of statuses."""
-MOST_GOALS = 1_000
+MAX_GOALS = 1_000
 """Goals that are passed on at a time: more are refused."""
 _PENDING_SECONDS = 0.5
 """After this a goal that is still pending counts as accepted: ROS 2 has no such state."""
@@ -138,8 +138,8 @@ class GoalsToRos1:
             accepted.set_exception(BridgeError("it is not bridged any more"))
             return
         # Those that are being accepted, and those that run.
-        if len(self._tasks) + len(self._goals) >= MOST_GOALS:
-            accepted.set_exception(BridgeError(f"the bridge passes on {MOST_GOALS} goals already"))
+        if len(self._tasks) + len(self._goals) >= MAX_GOALS:
+            accepted.set_exception(BridgeError(f"the bridge passes on {MAX_GOALS} goals already"))
             return
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from minirospy.ros2.actions import ActionCodec
     from minirospy.ros2.interface import Ros2Side
 
-__all__ = ["MOST_GOALS", "GoalsToRos2"]
+__all__ = ["MAX_GOALS", "GoalsToRos2"]
 
 _T = TypeVar("_T")
 _STATUS_SECONDS = 0.2
@@ -46,9 +46,9 @@ _ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
 """actionlib in Python drops what comes before its send_goal has returned."""
 _QUEUE = 50
-_MOST_SENT = 4
+_MAX_SENT = 4
 """Goals that wait for their acceptance at a time: a server's queue has 10 places, and those beyond would be lost."""
-MOST_GOALS = 1_000
+MAX_GOALS = 1_000
 """Goals that are kept at a time, also those that ended a moment ago: more are refused."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
@@ -86,7 +86,7 @@ class GoalsToRos2:
         self._goals: dict[str, _Goal] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._number = 0
-        self._turns = asyncio.Semaphore(_MOST_SENT)
+        self._turns = asyncio.Semaphore(_MAX_SENT)
         self._changed = asyncio.Event()
         self._ended = asyncio.Event()
 
@@ -141,7 +141,7 @@ class GoalsToRos2:
             id = GoalId(f"{self._node.name}-{self._number}-{secs}.{nsecs}", id.secs, id.nsecs)
         if id.id in self._goals or self._ended.is_set():
             return
-        if len(self._goals) >= MOST_GOALS:
+        if len(self._goals) >= MAX_GOALS:
             self._refuse(id)
             return
         goal = self._goals[id.id] = _Goal(id)
@@ -150,7 +150,7 @@ class GoalsToRos2:
         task.add_done_callback(self._tasks.discard)
 
     def _refuse(self, id: GoalId) -> None:
-        text = f"the bridge passes on {MOST_GOALS} goals of action {self._link.action} already"
+        text = f"the bridge passes on {MAX_GOALS} goals of action {self._link.action} already"
         self._misfits.error("a goal is refused: %s", text)
         status = Status(id, int(GoalState.REJECTED), text)
         with contextlib.suppress(ROSException):

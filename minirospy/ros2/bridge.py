@@ -26,7 +26,7 @@ from minirospy.core.idl.digest import Lookup, full_text, message_md5
 from minirospy.core.idl.load import Catalogue, specs_of_text
 from minirospy.core.idl.protocols import Message
 from minirospy.core.idl.spec import MessageSpec
-from minirospy.core.tf2.statics import MOST_BYTES, MOST_FRAMES, TF_TYPES, StaticTransforms
+from minirospy.core.tf2.statics import MAX_BYTES, MAX_FRAMES, TF_TYPES, StaticTransforms
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
@@ -288,8 +288,8 @@ class _Passing:
                 "%s (%s): more than %d frames or %d bytes of static transforms: new frames are not passed on",
                 self.link.topic,
                 self.link.direction.value,
-                MOST_FRAMES,
-                MOST_BYTES,
+                MAX_FRAMES,
+                MAX_BYTES,
             )
         return merged
 

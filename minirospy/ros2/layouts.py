@@ -21,7 +21,7 @@ from minirospy.core.idl.cdr import (
 )
 from minirospy.core.idl.digest import Lookup
 from minirospy.core.idl.spec import Field, FieldType, MessageSpec
-from minirospy.core.idl.validate import MOST_LEVELS, check_types
+from minirospy.core.idl.validate import MAX_LEVELS, check_types
 from minirospy.ros2.field_order import Array, Node, Reordered, inverse, reorder
 from minirospy.ros2.field_order import Fixed as Wide
 from minirospy.ros2.field_order import Text as String
@@ -44,7 +44,7 @@ _OF_ROS2 = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "f
 _TIMES = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}
 _TIME = Fixed(4, 2)
 _DUMMY = "structure_needs_at_least_one_member"
-_MOST_ITEMS = 8_000
+_MAX_ITEMS = 8_000
 
 
 def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
@@ -179,7 +179,7 @@ class _Pairing:
         return _repeated(one, type_, side)
 
     def _enter(self, around: tuple[str, ...]) -> None:
-        if len(around) > MOST_LEVELS or self._items > _MOST_ITEMS:
+        if len(around) > MAX_LEVELS or self._items > _MAX_ITEMS:
             raise TypesDiffer(f"[{around[0]}] is too large, or nested too deeply")
 
 

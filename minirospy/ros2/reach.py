@@ -24,7 +24,7 @@ _LOOK_SECONDS = 0.02
 _AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0
 """The wait for servers that have nothing to be reached by."""
-_MOST_SECONDS = 10.0
+_MAX_SECONDS = 10.0
 """A server that is busy may not have answered yet: it gets the requests all the same."""
 
 
@@ -72,10 +72,10 @@ class Reach:
         # Calls that were queued go on while what they belong to is being closed.
         if self._is_closed or self._reaching is None:
             return
-        seconds = min(seconds, _MOST_SECONDS)
+        seconds = min(seconds, _MAX_SECONDS)
         if self._ready_at is not None and self._wanted <= servers:
             spent = asyncio.get_running_loop().time() - self._ready_at
-            seconds = min(seconds, _MOST_SECONDS - spent)
+            seconds = min(seconds, _MAX_SECONDS - spent)
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:

@@ -46,9 +46,9 @@ _QUERY_SECONDS = 1.0
 """After this the services are bridged whose types are known."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
-_MOST_CALLS = 1_000
+_MAX_CALLS = 1_000
 """Calls of a service that are passed to ROS 1 at a time: more are answered with the reason."""
-_MOST_UNDER_WAY = 8
+_MAX_UNDER_WAY = 8
 """Requests that a server of ROS 2 gets at a time: its queue has 10 places, and those beyond would be lost."""
 
 
@@ -200,7 +200,7 @@ class _InRos1:
         self._codec = codec
         self._call_seconds = call_seconds
         self._ended = asyncio.Event()
-        self._turns = asyncio.Semaphore(_MOST_UNDER_WAY)
+        self._turns = asyncio.Semaphore(_MAX_UNDER_WAY)
         self._client: Ros2Client = side.client(link.service, link.ros2_type)
         self._reach = Reach(self._client)
         self._server = RawService(node, link.service, codec.type, self._answer)
@@ -309,8 +309,8 @@ class _InRos2:
         if self._is_closed:
             answered.set_exception(BridgeError("it is not bridged any more"))
             return
-        if len(self._calls) >= _MOST_CALLS:
-            answered.set_exception(BridgeError(f"the bridge passes on {_MOST_CALLS} calls already"))
+        if len(self._calls) >= _MAX_CALLS:
+            answered.set_exception(BridgeError(f"the bridge passes on {_MAX_CALLS} calls already"))
             return
         task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)

@@ -44,7 +44,7 @@ _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
 """Why a cancel has no effect: action_msgs/srv/CancelGoal."""
 _KEPT_SECONDS = 60.0
 """How long the result of a goal can be had after its end."""
-_MOST_GOALS = 2_000
+_MAX_GOALS = 2_000
 _CLOSE_SECONDS = 1.0
 
 
@@ -294,7 +294,7 @@ class ZenohActionServer:
         id, body = _split(request)
         answered: Future[bytes] = Future()
         self._forget()
-        if id in self._goals or len(self._goals) >= _MOST_GOALS:
+        if id in self._goals or len(self._goals) >= _MAX_GOALS:
             answered.set_result(self._decision(None))
             return answered
         goal = self._goals[id] = _Goal(id)

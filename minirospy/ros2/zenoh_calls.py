@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from minirospy.ros2.zenoh_keys import Entity
     from minirospy.zenoh.library import Query, Reply
 
-__all__ = ["MOST_UNDER_WAY", "ZenohClient", "ZenohServer"]
+__all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 
 _log = logging.getLogger(__name__)
 
-MOST_BYTES = 64 << 20
-MOST_UNDER_WAY = 200
+MAX_BYTES = 64 << 20
+MAX_UNDER_WAY = 200
 """Requests of a service whose responses are not written yet."""
-_MOST_OF_ACTION = 2_000
+_MAX_OF_ACTION = 2_000
 """More than goals: a request for a result waits for the goal's end."""
 _LONGEST_SECONDS = 10_000_000
 """The bridge has time limits of its own; those of Zenoh would end a goal that takes long."""
@@ -68,14 +68,14 @@ class ZenohClient:
         name = self._end.name
 
         def arrived(reply: Reply) -> None:
-            if reply.ok is not None and len(reply.ok.payload) <= MOST_BYTES:
+            if reply.ok is not None and len(reply.ok.payload) <= MAX_BYTES:
                 with contextlib.suppress(InvalidStateError):
                     answered.set_result(reply.ok.payload.to_bytes())
             elif reply.err is not None:
                 text = escaped(reply.err.payload.to_bytes()[:500].decode(errors="replace"))
                 _fail(answered, f"service [{name}] of ROS 2: {text}")
             else:
-                _fail(answered, f"the response of service [{name}] has more than {MOST_BYTES} bytes")
+                _fail(answered, f"the response of service [{name}] has more than {MAX_BYTES} bytes")
 
         def ended() -> None:
             _fail(answered, f"service [{name}] of ROS 2 has ended without a response")
@@ -132,7 +132,7 @@ class ZenohServer:
         self._answer = answer
         self._under_way = 0
         self._lock = threading.Lock()
-        self._most = MOST_UNDER_WAY if thread is None else _MOST_OF_ACTION
+        self._most = MAX_UNDER_WAY if thread is None else _MAX_OF_ACTION
         # A reply may block where the network is slow.
         self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
         self._own = None if thread else self._replies
@@ -163,7 +163,7 @@ class ZenohServer:
 
     def _take(self, query: Query) -> None:
         try:
-            if query.payload is None or query.attachment is None or len(query.payload) > MOST_BYTES:
+            if query.payload is None or query.attachment is None or len(query.payload) > MAX_BYTES:
                 raise ValueError("this is not a request of rmw_zenoh, or too large")
             back = reply_attachment(query.attachment.to_bytes(), time.time_ns())
             answered = self._answer(query.payload.to_bytes())

@@ -35,7 +35,7 @@ from minirospy.zenoh.library import (
 
 __all__ = ["Graph", "Handle", "ZenohNode"]
 
-_MOST_ENTITIES = 50_000
+_MAX_ENTITIES = 50_000
 
 
 class Graph:
@@ -55,7 +55,7 @@ class Graph:
             return
         with self._lock:
             kept = self._nodes if entity.kind is Kind.NODE else self._by_name.setdefault(entity.name, {})
-            if is_there and key not in kept and self._count < _MOST_ENTITIES:
+            if is_there and key not in kept and self._count < _MAX_ENTITIES:
                 kept[key] = entity
                 self._count += 1
             elif not is_there and key in kept:

@@ -34,7 +34,7 @@ FASTEST_LOOK = 0.25
 """Seconds from one look at the graph to the next while it changes."""
 
 _QUEUE = 100
-_MOST_WAITING = 32_000_000
+_MAX_WAITING = 32_000_000
 """Bytes of clients' messages that wait for the subscribers of new topics; beyond, each topic's newest alone."""
 
 _QUERY_SECONDS = 2.0
@@ -163,7 +163,7 @@ class Publication:
         self._waiting.append(body)
         self._graph.waiting_bytes += len(body)
         while len(self._waiting) > _QUEUE or (
-            self._graph.waiting_bytes > _MOST_WAITING and len(self._waiting) > 1
+            self._graph.waiting_bytes > _MAX_WAITING and len(self._waiting) > 1
         ):
             self._graph.waiting_bytes -= len(self._waiting.popleft())
 

@@ -19,7 +19,7 @@ __all__ = ["PlayerBridge", "PlayerPlayback"]
 
 _TICK_SECONDS = 1 / 30
 _START_SECONDS = 30.0
-_MOST_RATE = 100.0
+_MAX_RATE = 100.0
 
 
 class PlayerPlayback:
@@ -54,7 +54,7 @@ class PlayerPlayback:
         self._request_id, self._did_seek = control.request_id, control.seek is not None
         self._player.control(
             is_paused=control.command is PlaybackCommand.PAUSE,
-            rate=min(control.speed, _MOST_RATE),
+            rate=min(control.speed, _MAX_RATE),
             seek=control.seek,
         )
 

@@ -12,7 +12,7 @@ import yaml
 
 from minirospy.base.errors import BridgeError
 from minirospy.fleet import inquiry
-from minirospy.fleet.exporter import _MOST_READERS, _MOST_WANTED, Exporter
+from minirospy.fleet.exporter import _MAX_READERS, _MAX_WANTED, Exporter
 from minirospy.fleet.imported_topic import ImportedTopic
 from minirospy.fleet.importer import Importer
 from minirospy.fleet.inbound import InboundTopic
@@ -29,7 +29,7 @@ from minirospy.fleet.keys import (
 from minirospy.fleet.network import _CONTROL_QUERIES, _QUERIES
 from minirospy.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.fleet.rules import GatewayRules, Lane
-from minirospy.fleet.sender import _MOST_OUTLETS, Intake, Sender
+from minirospy.fleet.sender import _MAX_OUTLETS, Intake, Sender
 from tests.waiting import until
 
 MD5 = "0123456789abcdef" * 2
@@ -79,11 +79,11 @@ def test_topics_that_end_together_are_closed_once_each() -> None:
 def test_wants_of_peers_are_limited() -> None:
     spawned: list[Any] = []
     made = exporter(spawned)
-    for number in range(_MOST_WANTED + 5):
+    for number in range(_MAX_WANTED + 5):
         made._want_changed(want_key("robot1", "0" * 16, Want(f"/t{number}", "0" * 16)), True)
-    for number in range(_MOST_READERS + 5):
+    for number in range(_MAX_READERS + 5):
         made._want_changed(want_key("robot1", "0" * 16, Want("/t0", f"{number:016x}")), True)
-    assert (len(made._readers), len(made._readers["/t0"])) == (_MOST_WANTED, _MOST_READERS)
+    assert (len(made._readers), len(made._readers["/t0"])) == (_MAX_WANTED, _MAX_READERS)
     for work in spawned:
         work.close()
 
@@ -113,11 +113,11 @@ def test_readers_that_come_and_go_leave_no_publishers_behind() -> None:
 
     sender = Sender(stub(outlet=outlet))
     flow = sender.flow(Lane.DATA)
-    for number in range(3 * _MOST_OUTLETS):
+    for number in range(3 * _MAX_OUTLETS):
         sender._lanes[Lane.DATA]._put(flow, f"reader{number}", b"")
         sender._lanes[Lane.DATA]._put(flow, "all", b"")
-    assert len(there) == len(flow._outlets) == len(flow._numbers) == _MOST_OUTLETS
-    assert flow._numbers["all"] == 3 * _MOST_OUTLETS
+    assert len(there) == len(flow._outlets) == len(flow._numbers) == _MAX_OUTLETS
+    assert flow._numbers["all"] == 3 * _MAX_OUTLETS
 
 
 def test_a_topic_that_is_closed_while_its_type_is_queried_is_not_published() -> None:
@@ -252,11 +252,11 @@ def test_a_parameter_that_is_nested_deeply_is_one_line() -> None:
 
 def test_an_answer_that_is_too_long_is_named_as_such() -> None:
     zenoh = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
-    from minirospy.fleet.network import MOST_TEXT, FleetNetwork, QueryFailed
+    from minirospy.fleet.network import MAX_TEXT, FleetNetwork, QueryFailed
 
     class Long:
         def __len__(self) -> int:
-            return MOST_TEXT + 1
+            return MAX_TEXT + 1
 
     def get(_: str, handler: Any, **__: object) -> None:
         handler.callback(stub(ok=stub(key_expr="a", payload=Long())))
@@ -342,7 +342,7 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
 def test_names_that_are_left_out_are_reported_in_one_line(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("minirospy.fleet.contents.MOST_TOKENS", 0)
+    monkeypatch.setattr("minirospy.fleet.contents.MAX_TOKENS", 0)
     made = Importer(
         stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), lambda _: None, lambda: 0
     )

@@ -150,7 +150,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
 
 
 def test_resources_of_others_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ros1_keys, "MOST_RESOURCES", 2)
+    monkeypatch.setattr(ros1_keys, "MAX_RESOURCES", 2)
     seen = Sightings()
     for number in range(2):
         assert seen.received(CHAT._replace(name=f"/t{number}"), 0.0)

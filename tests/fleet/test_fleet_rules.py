@@ -18,7 +18,7 @@ from minirospy.base.errors import BridgeError, DefinitionError, DeserializationE
 from minirospy.base.name_filter import NameFilter
 from minirospy.fleet import keys
 from minirospy.fleet.clocks import ClockOffset, Delay, Ping, offset_of
-from minirospy.fleet.contents import MOST_NAMES, FleetContents
+from minirospy.fleet.contents import MAX_NAMES, FleetContents
 from minirospy.fleet.definitions import checked_specs
 from minirospy.fleet.frames import FrameRewriter, prefixed, stripped
 from minirospy.fleet.holders import HOLD_SECONDS
@@ -214,15 +214,15 @@ def test_contents_follow_tokens_in_any_order() -> None:
 
 def test_a_gateway_has_a_limit_of_names() -> None:
     fleet = FleetContents(lambda _: True)
-    for number in range(MOST_NAMES + 10):
+    for number in range(MAX_NAMES + 10):
         fleet.add(keys.topic_key(SCAN._replace(topic=f"/t{number}")))
     fleet.add(keys.claim_key(Claim("robot1", GATEWAY, 10, HOST)))
-    assert len(fleet.robots()["robot1"].topics) == MOST_NAMES
+    assert len(fleet.robots()["robot1"].topics) == MAX_NAMES
     assert fleet.refused == 10
 
 
 def test_all_gateways_together_have_a_limit_of_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.fleet.contents.MOST_TOKENS", 10)
+    monkeypatch.setattr("minirospy.fleet.contents.MAX_TOKENS", 10)
     fleet = FleetContents(lambda _: True)
     tokens = [SCAN._replace(robot=f"robot{number}") for number in range(13)]
     for token in tokens:

@@ -136,7 +136,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Send no request before the server is reached."""
-    monkeypatch.setattr("minirospy.ros2.reach._MOST_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
 
 
 def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
@@ -540,7 +540,7 @@ def test_only_packages_of_interfaces_are_imported(tmp_path: Path, monkeypatch: p
 
 @pytest.mark.usefixtures("master")
 def test_goals_of_ros1_at_a_time_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.action_to_ros2.MOST_GOALS", 2)
+    monkeypatch.setattr("minirospy.ros2.action_to_ros2.MAX_GOALS", 2)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = SEND_GOAL
@@ -564,7 +564,7 @@ def test_goals_of_ros1_at_a_time_are_limited(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.usefixtures("master")
 def test_goals_of_ros2_at_a_time_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.action_to_ros1.MOST_GOALS", 1)
+    monkeypatch.setattr("minirospy.ros2.action_to_ros1.MAX_GOALS", 1)
 
     async def execute(_: Any) -> dict[str, list[int]]:
         await asyncio.sleep(LIMIT)

@@ -631,7 +631,7 @@ def test_a_type_that_only_its_publisher_knows_is_bridged() -> None:
 
 
 def test_static_transforms_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.core.tf2.statics.MOST_FRAMES", 3)
+    monkeypatch.setattr("minirospy.core.tf2.statics.MAX_FRAMES", 3)
     statics = StaticTransforms()
     assert statics.merged(transforms("a", "b")) == transforms("a", "b")
     assert statics.merged(transforms("c", "d", "a")) == transforms("a", "b", "c")
@@ -639,7 +639,7 @@ def test_static_transforms_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     assert statics.merged(transforms("b")) == transforms("a", "b", "c")
     assert statics.left_out == 1
 
-    monkeypatch.setattr("minirospy.core.tf2.statics.MOST_BYTES", 1000)
+    monkeypatch.setattr("minirospy.core.tf2.statics.MAX_BYTES", 1000)
     statics = StaticTransforms()
     long = "x" * 800
     assert statics.merged(transforms(long)) == transforms(long)
@@ -652,7 +652,7 @@ def test_static_transforms_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_static_transforms_over_the_limit_are_reported(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("minirospy.core.tf2.statics.MOST_FRAMES", 1)
+    monkeypatch.setattr("minirospy.core.tf2.statics.MAX_FRAMES", 1)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         link = Link("/tf_static", Direction.TO_ROS2, "tf2_msgs/TFMessage", "tf2_msgs/TFMessage", True)
@@ -667,7 +667,7 @@ def test_static_transforms_over_the_limit_are_reported(
 
 @pytest.mark.usefixtures("master")
 def test_types_that_peers_make_up_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.introspect.type_texts._MOST_NAMES", 10)
+    monkeypatch.setattr("minirospy.introspect.type_texts._MAX_NAMES", 10)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         texts = bridge._texts

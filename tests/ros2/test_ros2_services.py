@@ -70,7 +70,7 @@ def test_renamed_service_types_find_their_partner() -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Send no request before the server is reached."""
-    monkeypatch.setattr("minirospy.ros2.reach._MOST_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
 
 
 def bridged(

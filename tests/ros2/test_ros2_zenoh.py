@@ -20,7 +20,7 @@ from minirospy.ros2.definitions import Definitions
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import Ros2End
 from minirospy.ros2.rules import BUILT_IN
-from minirospy.ros2.zenoh_calls import MOST_UNDER_WAY, ZenohClient, ZenohServer
+from minirospy.ros2.zenoh_calls import MAX_UNDER_WAY, ZenohClient, ZenohServer
 from minirospy.ros2.zenoh_keys import Entity, Kind, attachment, gid_of, parse_token
 from minirospy.ros2.zenoh_node import ZenohNode
 from minirospy.ros2.zenoh_side import ZenohSide
@@ -412,14 +412,14 @@ def test_responses_that_wait_for_a_slow_network_count_as_under_way() -> None:
                                drop=lambda: None)  # fmt: skip
 
     server = ZenohServer(node, end_of(Kind.SERVICE), {}, lambda _: answered)
-    for _ in range(MOST_UNDER_WAY):
+    for _ in range(MAX_UNDER_WAY):
         node.deliver(query())
     assert refused.empty()
     node.deliver(query())
     assert refused.get(timeout=LIMIT) == b"the bridge is answering 200 other requests"
 
     node.released.set()
-    for _ in range(MOST_UNDER_WAY):
+    for _ in range(MAX_UNDER_WAY):
         node.threads.get(timeout=LIMIT)
     server.close()
 
@@ -433,7 +433,7 @@ def test_a_request_is_refused_once_the_loop_has_ended() -> None:
 
     server = ZenohServer(node, end_of(Kind.SERVICE), {}, answer)
     sent = SimpleNamespace(to_bytes=lambda: attachment(1, 1, GID))
-    for _ in range(MOST_UNDER_WAY + 1):
+    for _ in range(MAX_UNDER_WAY + 1):
         node.deliver(
             SimpleNamespace(payload=Payload(), attachment=sent, reply_err=refused.put, drop=lambda: None)
         )

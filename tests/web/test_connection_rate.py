@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.web.server.rate import MOST_ADDRESSES, ConnectionRate
+from minirospy.web.server.rate import MAX_ADDRESSES, ConnectionRate
 
 
 class Clock:
@@ -43,6 +43,6 @@ def test_other_addresses_have_their_own_rate() -> None:
 
 def test_remembered_addresses_are_bounded() -> None:
     rate = ConnectionRate(1, 1, Clock())
-    assert all(rate.admits(str(number)) for number in range(10 * MOST_ADDRESSES))
-    assert len(rate) == MOST_ADDRESSES
-    assert not rate.admits(str(10 * MOST_ADDRESSES - 1))
+    assert all(rate.admits(str(number)) for number in range(10 * MAX_ADDRESSES))
+    assert len(rate) == MAX_ADDRESSES
+    assert not rate.admits(str(10 * MAX_ADDRESSES - 1))

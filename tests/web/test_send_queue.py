@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.web.server.account import LARGE_PIECE, Account
-from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES, MOST_ANSWERS, SendQueue
+from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES, MAX_ANSWERS, SendQueue
 
 LIMIT = 1_000_000
 """Bytes of a queue that a test fills."""
@@ -80,7 +80,7 @@ def test_answers_are_kept_and_their_overrun_is_visible() -> None:
     piece = bytes(1_000_000)
     while not queue.is_overrun:
         queue.put_answer((piece,))
-    assert queue.answers == MOST_ANSWERS + len(piece)
+    assert queue.answers == MAX_ANSWERS + len(piece)
     assert queue.dropped == 0
 
 
@@ -106,7 +106,7 @@ def test_small_answers_that_nobody_reads_are_an_overrun() -> None:
     queue = SendQueue()
     while not queue.is_overrun:
         queue.put_answer((b"1",))
-    assert len(queue) < MOST_ANSWERS / 300
+    assert len(queue) < MAX_ANSWERS / 300
 
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(1, 12)) | st.none()), st.integers(5, 30))
@@ -143,7 +143,7 @@ def test_cleared_queue_holds_nothing() -> None:
 
 
 def test_limits_are_those_that_are_documented() -> None:
-    assert (DEFAULT_LIMIT, MOST_ANSWERS, ENTRY_BYTES) == (10_000_000, 64_000_000, 350)
+    assert (DEFAULT_LIMIT, MAX_ANSWERS, ENTRY_BYTES) == (10_000_000, 64_000_000, 350)
 
 
 def test_messages_may_fill_the_bound_exactly() -> None:

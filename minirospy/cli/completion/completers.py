@@ -34,7 +34,7 @@ __all__ = [
 LIVE_SECONDS = 0.8
 """How long a master, or a node, may take."""
 
-_MOST_LETTERS = 1000
+_MAX_LETTERS = 1000
 """Of a parameter's value on a command line."""
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
@@ -361,7 +361,7 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
     # A list or a table is read from one line as well; nobody changes a robot's whole description there.
-    return [on_one_line(Text(text)) for text in found if len(text) <= _MOST_LETTERS]
+    return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
 def loggers(cursor: Cursor) -> Iterable[str]:

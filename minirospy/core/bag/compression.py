@@ -36,7 +36,7 @@ COMPRESSIONS = (NONE, BZ2, LZ4)
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Bytes of a compressed chunk's data: a message of 1 GiB, the most that a connection can carry, and what is before it."""
 
-_MOST_LZ4 = 256
+_MAX_LZ4 = 256
 """How many times as long as its LZ4 block data can be."""
 _MAX_STREAMS = 20_000  # bz2 streams of a chunk; parallel compressors write one for each 100 kB
 _PIECE = 16 * 1024 * 1024  # bytes that are decompressed at a time, while Ctrl-C waits
@@ -202,7 +202,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
-    if output.size > len(data) * _MOST_LZ4:
+    if output.size > len(data) * _MAX_LZ4:
         # The library allocates what is expected before it looks at the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()

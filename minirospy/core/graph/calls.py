@@ -47,7 +47,7 @@ Answer = list[object]
 _MAX_CHARACTERS = 4096
 """Of a name, a type or a URI."""
 
-_MOST_URIS = 20_000
+_MAX_URIS = 20_000
 """Of a list: to check them takes some milliseconds, in which a node answers nobody. No master has as many for a topic."""
 
 
@@ -249,8 +249,8 @@ def uris(value: object, name: str, caller_id: str) -> list[str]:
     """Return a list of URIs."""
     if not isinstance(value, list):
         raise CallRefused(f"ERROR: param [{name}] must be a list")
-    if len(value) > _MOST_URIS:
-        raise CallRefused(f"ERROR: param [{name}] has more than {_MOST_URIS} URIs")
+    if len(value) > _MAX_URIS:
+        raise CallRefused(f"ERROR: param [{name}] has more than {_MAX_URIS} URIs")
     if not all(isinstance(uri, str) for uri in value):
         raise CallRefused(f"ERROR: param [{name}] must be a list of strings")
     for uri in value:

@@ -28,13 +28,13 @@ _STEP_ITEMS = 1000
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 """What a number, a list without its items, and a dictionary and each entry of it take in memory, about."""
 
-MOST_BYTES = 96 * 1024 * 1024
+MAX_BYTES = 96 * 1024 * 1024
 """What all parameters together may take in memory."""
 
 RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
 """What is left of it to values of no more than SMALL bytes."""
 
-MOST_SUBSCRIPTIONS, MOST_OF_ONE = 20_000, 10_000
+MAX_SUBSCRIPTIONS, MAX_OF_ONE = 20_000, 10_000
 """Subscriptions to parameters, of all nodes and of one host and port."""
 
 FEW_RESERVE, FEW = 5_000, 100
@@ -74,14 +74,14 @@ class ParameterTree:
     parameters. So a dictionary that was returned is copied before it is changed.
     """
 
-    def __init__(self, most: int = MOST_BYTES, reserve: int = RESERVE) -> None:
+    def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
         # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # Their keys, sorted: those below a namespace are next to each other.
         self._keys: list[str] = []
-        self._shares = Shares(MOST_SUBSCRIPTIONS, MOST_OF_ONE, FEW_RESERVE, FEW)
+        self._shares = Shares(MAX_SUBSCRIPTIONS, MAX_OF_ONE, FEW_RESERVE, FEW)
         # URI of a node -> its keys, and under how many names it subscribed to each.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most

@@ -310,8 +310,8 @@ class Registry:
         entry = self._nodes.get(node)
         is_new = entry is None or entry.uri != uri
         kinds = entry.entries.get(name, 0) if entry and not is_new else 0
-        if entry and not is_new and not kinds and len(entry.entries) >= registry_limits.MOST_ENTRIES:
-            most = registry_limits.MOST_ENTRIES
+        if entry and not is_new and not kinds and len(entry.entries) >= registry_limits.MAX_ENTRIES:
+            most = registry_limits.MAX_ENTRIES
             raise RegistryFullError(f"{most} topics, services and parameters of one node")
 
         cost = node_cost(node, uri) if is_new else 0

@@ -23,10 +23,10 @@ __all__ = [
 
 _MIB = 1024 * 1024
 
-MOST_BYTES = 64 * _MIB
+MAX_BYTES = 64 * _MIB
 """What all registrations together may take in memory: about 60,000 nodes of one topic each."""
 
-MOST_OF_ONE = 32 * _MIB
+MAX_OF_ONE = 32 * _MIB
 """The same of one host and port."""
 
 RESERVE = 16 * _MIB
@@ -34,7 +34,7 @@ RESERVE = 16 * _MIB
 
 FEW_OF_ONE = _MIB // 4
 
-MOST_ENTRIES = 10_000
+MAX_ENTRIES = 10_000
 """Topics, services and parameters that one node may register."""
 
 _NODE_BYTES, _NAME_BYTES = 400, 150
@@ -60,7 +60,7 @@ class RegistryFullError(MinirospyError):
 
 def new_shares() -> Shares:
     """Return the bytes that the nodes of each host and port may take, none of them in use."""
-    return Shares(MOST_BYTES, MOST_OF_ONE, RESERVE, FEW_OF_ONE)
+    return Shares(MAX_BYTES, MAX_OF_ONE, RESERVE, FEW_OF_ONE)
 
 
 def describe(excess: Excess, shares: Shares) -> str:

@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import count, islice
 
-__all__ = ["MOST_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
+__all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
-MOST_PUBLISHERS = 1000
+MAX_PUBLISHERS = 1000
 """Publishers of one topic that a node connects to."""
 
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
@@ -52,9 +52,9 @@ class SubscriptionPlan:
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
         """Apply the master's list: the full one, or with ``keep`` one that lacks some publishers that still exist.
 
-        Of a list of more than MOST_PUBLISHERS the others are ignored: anybody may send one.
+        Of a list of more than MAX_PUBLISHERS the others are ignored: anybody may send one.
         """
-        wanted = dict.fromkeys(islice(uris, MOST_PUBLISHERS))
+        wanted = dict.fromkeys(islice(uris, MAX_PUBLISHERS))
         if keep:
             wanted.update(dict.fromkeys(self._failures))
         gone = [uri for uri in self._failures if uri not in wanted]

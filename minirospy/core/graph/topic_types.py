@@ -13,8 +13,8 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-_MOST_OLD = 10_000
-_MOST_OLD_BYTES = 4 * 1024 * 1024
+_MAX_OLD = 10_000
+_MAX_OLD_BYTES = 4 * 1024 * 1024
 """Topics whose types are remembered although nobody registers them any more."""
 
 _TYPE_BYTES = 100
@@ -94,7 +94,7 @@ class TopicTypes:
         self._old[topic] = None
         self._old_bytes += text_cost(topic) + _size_of(type_)
 
-        while len(self._old) > _MOST_OLD or self._old_bytes > _MOST_OLD_BYTES:
+        while len(self._old) > _MAX_OLD or self._old_bytes > _MAX_OLD_BYTES:
             oldest = next(iter(self._old))
             self._remove_old(oldest, self._types.pop(oldest).text)
 

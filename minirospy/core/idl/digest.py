@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from minirospy.base.errors import DefinitionError
 from minirospy.core.idl.spec import MessageSpec, ServiceSpec
-from minirospy.core.idl.validate import MOST_LEVELS
+from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
     # As hashlib without OpenSSL, whose loading takes 2 ms, and whose FIPS mode refuses MD5.
@@ -86,8 +86,8 @@ def _md5_text(
     """``around``: the messages that this one is a part of; ``known``: the md5sums computed so far."""
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
-    if len(around) > MOST_LEVELS:
-        raise DefinitionError(around[0], 1, f"its types are nested deeper than {MOST_LEVELS} levels")
+    if len(around) > MAX_LEVELS:
+        raise DefinitionError(around[0], 1, f"its types are nested deeper than {MAX_LEVELS} levels")
     around += (spec.full_name,)
     known = {} if known is None else known
     lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]

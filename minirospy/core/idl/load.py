@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from minirospy.base.errors import DefinitionError, NotFoundError
 from minirospy.core.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
-from minirospy.core.idl.validate import MOST_TEXT, check_type_name, check_types, is_type_name
+from minirospy.core.idl.validate import MAX_TEXT, check_type_name, check_types, is_type_name
 
 if TYPE_CHECKING:
     from minirospy.core.idl.emit import ClassSource
@@ -292,8 +292,8 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     """Return the specs in a full text: the message's own, and those of all types that it needs. Raise DefinitionError."""
     from minirospy.core.idl.parse import parse_message
 
-    if len(text) > MOST_TEXT:
-        raise DefinitionError(full_name, 1, f"its definition has more than {MOST_TEXT} characters")
+    if len(text) > MAX_TEXT:
+        raise DefinitionError(full_name, 1, f"its definition has more than {MAX_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
     # The newline before a line of "=" belongs to it: a text that ends without one stays so.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):

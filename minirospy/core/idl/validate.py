@@ -18,21 +18,21 @@ from minirospy.base.errors import DefinitionError
 from minirospy.core.idl.source import python_name
 from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
 
-__all__ = ["MOST_LEVELS", "MOST_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
+__all__ = ["MAX_LEVELS", "MAX_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
 
-MOST_TEXT = 1 << 20
+MAX_TEXT = 1 << 20
 """Characters of a full text: the largest of real packages have some 30,000."""
 
-MOST_LEVELS = 50
+MAX_LEVELS = 50
 """How deep messages may be nested in each other."""
 
-_MOST_FIELDS = 4_000
+_MAX_FIELDS = 4_000
 """Fields of a message, those of its inner messages included, as the generated source has them."""
 
-_MOST_FIELDS_IN_ALL = 32_000
+_MAX_FIELDS_IN_ALL = 32_000
 """The same, of all types together that a message needs: the largest of MoveIt's has some 17,000."""
 
-_MOST_BYTES = 1 << 27
+_MAX_BYTES = 1 << 27
 """Memory of a message's arrays of fixed length."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -104,9 +104,9 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     for name in order:
         sizes[name] = _size_of(specs[name], sizes)
         _check_size(spec.full_name, sizes[name])
-    if sum(size.fields for size in sizes.values()) > _MOST_FIELDS_IN_ALL:
+    if sum(size.fields for size in sizes.values()) > _MAX_FIELDS_IN_ALL:
         raise DefinitionError(
-            spec.full_name, 1, f"its types have more than {_MOST_FIELDS_IN_ALL} fields in all"
+            spec.full_name, 1, f"its types have more than {_MAX_FIELDS_IN_ALL} fields in all"
         )
     return order
 
@@ -135,14 +135,12 @@ def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
 
 
 def _check_size(where: str, size: _Size) -> None:
-    if size.fields > _MOST_FIELDS:
-        raise DefinitionError(
-            where, 1, f"it has more than {_MOST_FIELDS} fields, those of its types included"
-        )
-    if size.levels > MOST_LEVELS:
-        raise DefinitionError(where, 1, f"its types are nested deeper than {MOST_LEVELS} levels")
-    if size.bytes > _MOST_BYTES:
-        raise DefinitionError(where, 1, f"its arrays of fixed length take more than {_MOST_BYTES >> 20} MiB")
+    if size.fields > _MAX_FIELDS:
+        raise DefinitionError(where, 1, f"it has more than {_MAX_FIELDS} fields, those of its types included")
+    if size.levels > MAX_LEVELS:
+        raise DefinitionError(where, 1, f"its types are nested deeper than {MAX_LEVELS} levels")
+    if size.bytes > _MAX_BYTES:
+        raise DefinitionError(where, 1, f"its arrays of fixed length take more than {_MAX_BYTES >> 20} MiB")
 
 
 def _shown(text: str) -> str:

@@ -16,7 +16,7 @@ _JPEG_FRAMES = {0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD
 """Markers of a JPEG that have the size behind them."""
 _JPEG_PLAIN = {0x01, 0xFF, *range(0xD0, 0xD9)}
 """Markers without a length: a fill byte, restarts, the start of the image."""
-_MOST_MARKERS = 10_000
+_MAX_MARKERS = 10_000
 _TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
 _TIFF_SHORT, _TIFF_LONG = 3, 4
 
@@ -52,7 +52,7 @@ def _bmp(data: bytes) -> tuple[int, int]:
 
 def _jpeg(data: bytes) -> tuple[int, int] | None:
     at = 2
-    for _ in range(_MOST_MARKERS):
+    for _ in range(_MAX_MARKERS):
         if data[at] != 0xFF:
             return None
         marker = data[at + 1]

@@ -23,7 +23,7 @@ from minirospy.core.tf2.tree import DEFAULT_CACHE_TIME, FrameTree
 
 __all__ = ["DEFAULT_CACHE_TIME", "StampedTransform", "TransformBuffer"]
 
-_MOST_HOPS = 1000
+_MAX_HOPS = 1000
 _FOREVER = 1 << 62
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -198,7 +198,7 @@ class TransformBuffer(FrameTree):
                 return _Walk(time, from_source, [])
             from_source.append(sample)
             frame = sample[0]
-            if len(from_source) > _MOST_HOPS:
+            if len(from_source) > _MAX_HOPS:
                 raise self._loop()
         top = frame
 
@@ -214,7 +214,7 @@ class TransformBuffer(FrameTree):
                 return _Walk(time, [], from_target)
             from_target.append(sample)
             frame = sample[0]
-            if len(from_target) > _MOST_HOPS:
+            if len(from_target) > _MAX_HOPS:
                 raise self._loop()
 
         if frame is not top:
@@ -245,7 +245,7 @@ class TransformBuffer(FrameTree):
             if frame is target:
                 return common % _FOREVER
             above_source.append(latest)
-            if len(above_source) > _MOST_HOPS:
+            if len(above_source) > _MAX_HOPS:
                 raise self._loop()
 
         known = {id(parent) for _, parent in above_source}
@@ -273,7 +273,7 @@ class TransformBuffer(FrameTree):
             yield latest
             frame = latest[1]
             depth += 1
-            if depth > _MOST_HOPS:
+            if depth > _MAX_HOPS:
                 raise self._loop()
 
     def _path(self, target: str, source: str, time: int) -> list[str]:

@@ -17,7 +17,7 @@ __all__ = ["Refusal", "RefusalLog", "faults_of", "misfit_refusal"]
 _TOLERANCE = 0.01
 """How far the squared length of a quaternion may be from 1."""
 _PAUSE = 1.0
-_MOST_KEYS = 1000
+_MAX_KEYS = 1000
 
 
 class Refusal(NamedTuple):
@@ -99,7 +99,7 @@ class RefusalLog:
             self._written[key] = last, held_back + 1
             return
 
-        if len(self._written) >= _MOST_KEYS:
+        if len(self._written) >= _MAX_KEYS:
             self._written.clear()
         self._written[key] = now, 0
         times = f" ({held_back} more like it in {now - last:.0f} s)" if held_back else ""

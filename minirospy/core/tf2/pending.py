@@ -24,9 +24,9 @@ _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
 _BLOCK = 64
 """After so many messages a layout drops what has expired, so many at a time."""
-_MOST_MESSAGES = 16_384
-_MOST_LAYOUTS = 16_384
-_MOST_SAME_LENGTH = 8
+_MAX_MESSAGES = 16_384
+_MAX_LAYOUTS = 16_384
+_MAX_SAME_LENGTH = 8
 
 
 class TransformSample(NamedTuple):
@@ -128,7 +128,7 @@ class Layout:
         del self._arrivals[:count]
         self._dropped += count
 
-        is_full = len(self._arrivals) >= _MOST_MESSAGES
+        is_full = len(self._arrivals) >= _MAX_MESSAGES
         return [
             offsets.child
             for offsets, moves in zip(self._offsets, moves_on, strict=True)
@@ -169,7 +169,7 @@ class Layouts:
         """Make the layout of a message; None where it has no frame, one twice, or there are too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
-        if not found or len(children) < len(found) or self._count >= _MOST_LAYOUTS:
+        if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:
             return None
 
         layout = Layout(found)
@@ -177,7 +177,7 @@ class Layouts:
             self._single[data[16:-56]] = layout
         else:
             same_length = self._several.setdefault(len(data), [])
-            if len(same_length) >= _MOST_SAME_LENGTH:
+            if len(same_length) >= _MAX_SAME_LENGTH:
                 return None
             mask = bytearray(b"\xff" * len(data))
             for offsets in found:

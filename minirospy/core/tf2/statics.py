@@ -10,7 +10,7 @@ import struct
 
 from minirospy.base.errors import DeserializationError
 
-__all__ = ["MOST_BYTES", "MOST_FRAMES", "TF_TYPES", "StaticTransforms"]
+__all__ = ["MAX_BYTES", "MAX_FRAMES", "TF_TYPES", "StaticTransforms"]
 
 TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
@@ -18,12 +18,12 @@ _LENGTH = struct.Struct("<I")
 _STAMP = 12
 _NUMBERS = 56
 """Bytes of a header's number and time, and of a translation and rotation."""
-MOST_FRAMES = 10_000
-MOST_BYTES = 8 << 20
+MAX_FRAMES = 10_000
+MAX_BYTES = 8 << 20
 
 
 class StaticTransforms:
-    """Keeps the newest transform to each frame, as bytes: at most :data:`MOST_FRAMES`, of :data:`MOST_BYTES` together."""
+    """Keeps the newest transform to each frame, as bytes: at most :data:`MAX_FRAMES`, of :data:`MAX_BYTES` together."""
 
     def __init__(self) -> None:
         self.left_out = 0
@@ -55,7 +55,7 @@ class StaticTransforms:
     def _keep(self, child: bytes, transform: bytes) -> None:
         before = self._by_child.get(child)
         size = self._bytes + len(transform) - (len(before) if before else 0)
-        if size > MOST_BYTES or (before is None and len(self._by_child) >= MOST_FRAMES):
+        if size > MAX_BYTES or (before is None and len(self._by_child) >= MAX_FRAMES):
             self.left_out += 1
             return
         self._by_child[child] = transform

@@ -19,8 +19,8 @@ from urllib.parse import urlsplit
 from minirospy.base.errors import (
     MasterUnreachableError,
     MinirospyError,
-    RpcLate,
     RpcProtocolError,
+    RpcTimeout,
     RpcUnreachable,
     WireError,
 )
@@ -56,8 +56,8 @@ RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues
 LOOK_UP_SECONDS = 2.0
 """The same of a name server."""
 
-_MOST_THREADS = 32
-_MOST_BYTES = 1024 * 1024
+_MAX_THREADS = 32
+_MAX_BYTES = 1024 * 1024
 _A = TypeVar("_A")
 _R = TypeVar("_R")
 
@@ -111,7 +111,7 @@ def trouble_of(error: Exception) -> Trouble:
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
 
-    if isinstance(error, RpcLate):
+    if isinstance(error, RpcTimeout):
         return Trouble(Fault.LATE, error.why)
     if isinstance(error, RpcUnreachable):
         text = error.why
@@ -228,7 +228,7 @@ def read_topic(
         sock.sendall(serialize_header(fields))
         header = parse_header(_receive(sock, MAX_HEADER))
         check_publisher(header, topic, InterfaceType(ANY, ANY))
-        return header, _receive(sock, _MOST_BYTES) if wait else b""
+        return header, _receive(sock, _MAX_BYTES) if wait else b""
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
@@ -274,7 +274,7 @@ def in_parallel(
             except (MinirospyError, OSError, EOFError, TypeError, ValueError) as error:
                 done.put((number, error))
 
-    for _ in range(min(len(waiting), _MOST_THREADS)):
+    for _ in range(min(len(waiting), _MAX_THREADS)):
         threading.Thread(target=run, name="minirospy-doctor", daemon=True).start()
     end = time.monotonic() + timeout
     for _ in waiting:

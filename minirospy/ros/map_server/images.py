@@ -18,9 +18,9 @@ from minirospy.base.installation import install_command
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["MOST_CELLS", "ImageError", "Pixels", "read_image"]
+__all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
-MOST_CELLS = 2**30
+MAX_CELLS = 2**30
 """Cells of the largest map: a message holds at most 4 GiB, and 2**30 pixels of four channels are as many."""
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
@@ -65,7 +65,7 @@ def _read_pnm(data: bytes) -> NDArray[np.uint8]:
         raise ImageError("Unable to read image width and height")
     if not 0 < largest < 256:
         raise ImageError(f"unsupported PNM format: values up to {largest}, where a map has up to 255")
-    if width * height > MOST_CELLS:
+    if width * height > MAX_CELLS:
         raise ImageError(f"{width} x {height} pixels are more than a map can have")
 
     channels = _CHANNELS[kind]
@@ -113,7 +113,7 @@ def _read_by_pillow(data: bytes) -> Pixels:
         ) from None
     try:
         with Image.open(BytesIO(data)) as image:
-            if image.width * image.height > MOST_CELLS:
+            if image.width * image.height > MAX_CELLS:
                 raise ImageError(f"{image.width} x {image.height} pixels are more than a map can have")
             return _pixels_of(image)
     except UnidentifiedImageError:

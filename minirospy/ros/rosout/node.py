@@ -40,13 +40,13 @@ _log = logging.getLogger(__name__)
 
 _LOG_BYTES = 100 * 1024 * 1024
 
-_MOST_BYTES = 256 * 1024
+_MAX_BYTES = 256 * 1024
 """Longer messages are left out: a node that floods the topic must not fill the memory of the master's process."""
 
-_MOST_SUBSCRIBERS = 200
+_MAX_SUBSCRIBERS = 200
 """Of /rosout_agg: each may keep a message of that size waiting."""
 
-_LARGE, _MOST_LARGE = 16 * 1024, 100
+_LARGE, _MAX_LARGE = 16 * 1024, 100
 """A subscriber that keeps so many messages waiting gets none that are larger than this, until it has read some."""
 
 _STEP_LETTERS = 1024
@@ -90,7 +90,7 @@ class RosoutNode:
             self.node.make_subscription(
                 "/rosout",
                 type_,
-                InTurns(self._on_message, self._turns.start, _MOST_BYTES, self._on_left_out),
+                InTurns(self._on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
             )
         )
         await self._serve_loggers()
@@ -146,7 +146,7 @@ class RosoutNode:
         body = bytes(frame)
         whole = serialize_frame(body)
         for link in self._aggregated.links:
-            if len(whole) <= _LARGE or link.waiting < _MOST_LARGE:
+            if len(whole) <= _LARGE or link.waiting < _MAX_LARGE:
                 link.send(whole)
             # There may be many, and a large message takes its time.
             yield None
@@ -157,7 +157,7 @@ class RosoutNode:
         self._limited_log.warning(
             "a log message of %s was left out: it is longer than %d KiB",
             header.get("callerid") or "a node without a name",
-            _MOST_BYTES // 1024,
+            _MAX_BYTES // 1024,
         )
 
     def _write(self, file: LogFile, body: bytes) -> Steps[None]:

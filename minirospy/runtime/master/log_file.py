@@ -20,7 +20,7 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
-_MOST_PENDING = 64 * 1024
+_MAX_PENDING = 64 * 1024
 """Characters that are collected at most: to write megabytes in one go would stop the master for as long."""
 
 
@@ -59,7 +59,7 @@ class LogFile(LogFileHandler):
     def text(self, text: str) -> None:
         """Add a line that has its time and level already (on the loop)."""
         self._add(text + "\n")
-        if self._pending > _MOST_PENDING:
+        if self._pending > _MAX_PENDING:
             self._write_out()
         elif self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)

@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 _MASTER = "/master"
 _CALLS_AT_ONCE = 200
 _CALLS_TO_SUSPECTS = 50
-_MOST_SUSPECTS = 10000
+_MAX_SUSPECTS = 10000
 _LONG_LIST = 200
 _SECONDS_PER_PUBLISHER = 50e-6
 _TICK = 0.001
@@ -38,7 +38,7 @@ _HOLD_TICK = 0.01
 _SECONDS_PER_TURN = 0.003
 """Of the loop, for starting calls."""
 
-_MOST_PARAMETERS = 32
+_MAX_PARAMETERS = 32
 """Parameters of which a node is still to be notified; beyond that, those that it has subscribed to are one each."""
 
 _LARGE_BYTES = 32 * 1024 * 1024
@@ -156,7 +156,7 @@ class Notifier:
             node.parameters += 1
         node.notices[key] = notice
 
-        if node.parameters > _MOST_PARAMETERS:
+        if node.parameters > _MAX_PARAMETERS:
             self._summarize(node)
         if is_idle:
             self._go_on(node)
@@ -289,7 +289,7 @@ class Notifier:
             self._last_large = ("", None, [])
 
         if isinstance(answer, RpcUnreachable):
-            if len(self._suspects) > _MOST_SUSPECTS:
+            if len(self._suspects) > _MAX_SUSPECTS:
                 self._suspects.clear()
             self._suspects.add(node.uri)
         else:

@@ -31,7 +31,7 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_MOST_IDLE = 200
+_MAX_IDLE = 200
 """Idle connections to the Slave API; a graph has about as many as this node has peers."""
 
 _STALE_SECONDS = 5.0
@@ -127,7 +127,7 @@ class Node:
             bind_host=host,
             port=xmlrpc_port,
             ports=ports,
-            most_idle=_MOST_IDLE,
+            most_idle=_MAX_IDLE,
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )

@@ -22,13 +22,13 @@ from minirospy.base.errors import (
     SUSPENDED,
     HandshakeRefused,
     RpcError,
-    RpcLate,
+    RpcTimeout,
     RpcUnreachable,
     ThreadLimitError,
     WireError,
 )
 from minirospy.base.steps import Steps
-from minirospy.core.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
+from minirospy.core.graph.subscription import MAX_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.core.wire.header import Header, serialize_header
 from minirospy.core.wire.tcpros import (
@@ -348,7 +348,7 @@ class Subscription:
         if self._closed:
             return
         self.lists += 1
-        self._named = list(islice(uris, MOST_PUBLISHERS))
+        self._named = list(islice(uris, MAX_PUBLISHERS))
         for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
             if isinstance(action, Disconnect):
                 self._leave(action.uri)
@@ -606,7 +606,7 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
     """Return whose address is wrong, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
-    if isinstance(error, RpcLate):
+    if isinstance(error, RpcTimeout):
         return SUSPENDED[0].upper() + SUSPENDED[1:]
     try:
         host = split_uri(uri)[0]

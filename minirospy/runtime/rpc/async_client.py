@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcProtocolError, RpcTimeout, RpcUnreachable
 from minirospy.core.wire.http import (
     MAX_BODY,
     Body,
@@ -284,7 +284,7 @@ class Call:
         if not isinstance(error, TimeoutError | asyncio.TimeoutError):
             unreachable = RpcUnreachable(self._uri, explain(error) or "the connection was closed")
         elif self._connection and not self._left:
-            unreachable = RpcLate(self._uri, self._timeout)
+            unreachable = RpcTimeout(self._uri, self._timeout)
         else:
             unreachable = RpcUnreachable(self._uri, f"timed out after {self._timeout:g} s")
         unreachable.__cause__ = error

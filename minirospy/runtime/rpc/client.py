@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from minirospy.base.environment import split_uri
-from minirospy.base.errors import RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcProtocolError, RpcTimeout, RpcUnreachable
 from minirospy.core.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.core.wire.xmlrpc import parse_response, serialize_call
 from minirospy.runtime.transport import local, sockets
@@ -70,7 +70,7 @@ class RpcClient:
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)
         except TimeoutError as error:
-            raise RpcLate(self.uri, self._timeout) from error
+            raise RpcTimeout(self.uri, self._timeout) from error
         except (OSError, EOFError) as error:
             why = explain(error) if is_file_limit(error) else getattr(error, "strerror", None) or str(error)
             why = why or "the connection was closed"

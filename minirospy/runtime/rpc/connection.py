@@ -27,7 +27,7 @@ from minirospy.core.wire.http import (
 from minirospy.core.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
 from minirospy.core.wire.xmlrpc import serialize_response as serialize_value
 from minirospy.core.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
-from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
+from minirospy.runtime.rpc.outbox import MAX_UNREAD, Outbox
 
 if TYPE_CHECKING:
     from minirospy.runtime.rpc.server import RpcServer
@@ -475,7 +475,7 @@ class Connection:
             self._loop.add_writer(self._fd, self._writable)
         self._count_unread(kept)
         self._set_deadline()
-        if self._state is _OPEN and self._out.size > MOST_UNREAD:
+        if self._state is _OPEN and self._out.size > MAX_UNREAD:
             # The client does not read its answers: it gets no more of them, and is not read from.
             self._state = _FULL
             self._stop_reading()

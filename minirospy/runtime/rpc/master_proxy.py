@@ -10,7 +10,7 @@ import socket
 from typing import Any, NamedTuple
 
 from minirospy.base.environment import split_uri
-from minirospy.base.errors import SUSPENDED, MasterUnreachableError, RpcLate, RpcRefused, RpcUnreachable
+from minirospy.base.errors import SUSPENDED, MasterUnreachableError, RpcRefused, RpcTimeout, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.transport.limits import is_file_limit
 
@@ -51,7 +51,7 @@ def unwrap(method: str, answer: object) -> Any:
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
     """Return the error of a master that cannot be called: it does not answer, or this process has no socket left."""
     cause = error.__cause__
-    if isinstance(error, RpcLate):
+    if isinstance(error, RpcTimeout):
         return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")
     if isinstance(cause, socket.gaierror):
         host = split_uri(error.uri)[0]

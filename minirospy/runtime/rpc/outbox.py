@@ -6,9 +6,9 @@ import socket
 from collections import deque
 from collections.abc import Sequence
 
-__all__ = ["MOST_UNREAD", "Outbox"]
+__all__ = ["MAX_UNREAD", "Outbox"]
 
-MOST_UNREAD = 256 * 1024
+MAX_UNREAD = 256 * 1024
 """Bytes of answers that wait for a client to read them, before it gets no more."""
 
 
@@ -52,8 +52,8 @@ class Outbox:
         """Send what the socket takes of the queue; return how many bytes it took. Raises OSError."""
         sent = 0
         try:
-            while self._pieces and sent < MOST_UNREAD:
-                piece = self._pieces[0][:MOST_UNREAD]
+            while self._pieces and sent < MAX_UNREAD:
+                piece = self._pieces[0][:MAX_UNREAD]
                 count = self._sock.send(piece)
                 sent += count
                 if count < len(self._pieces[0]):

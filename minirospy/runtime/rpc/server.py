@@ -32,11 +32,11 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-_MOST_HELD = 72 * 1024 * 1024
+_MAX_HELD = 72 * 1024 * 1024
 _LARGE = 32 * 1024
 """Bytes of requests that are incomplete or being read, of all clients; beyond that the largest are refused."""
 
-_MOST_UNREAD_OF_ALL = 72 * 1024 * 1024
+_MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 """Bytes of answers that wait for all clients; beyond that those that read nothing for longest are hung up on."""
 
 _BACKLOG = 4096
@@ -55,7 +55,7 @@ _ACCEPTS_BETWEEN = 64
 _READS_AT_ONCE = 16
 """Connections that are read from before new ones are accepted, some 1 ms: thousands may have data, or end, at a time."""
 
-_MOST_READS, _READS_SECONDS = 256, 0.01
+_MAX_READS, _READS_SECONDS = 256, 0.01
 """Connections in one iteration of the loop, and how long that may take; the others come first in the next one."""
 
 
@@ -209,7 +209,7 @@ class RpcServer:
         for sock in list(self._listening):
             if sock not in self._resting:
                 self._accept(sock, _ACCEPTS_BETWEEN)
-        self._reads_over = self._reads >= _MOST_READS or time.perf_counter() >= self._reads_end
+        self._reads_over = self._reads >= _MAX_READS or time.perf_counter() >= self._reads_end
         return not self._reads_over
 
     def _start_iteration(self) -> None:
@@ -282,7 +282,7 @@ class RpcServer:
 
     def limit_held(self, connection: Connection) -> bool:
         """Refuse the largest requests where all together hold too much; return whether ``connection`` remains."""
-        while self.held > _MOST_HELD:
+        while self.held > _MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= _LARGE:
                 break
@@ -291,7 +291,7 @@ class RpcServer:
 
     def limit_unread(self) -> None:
         """Hang up on the slowest clients where too many answers wait."""
-        while self.unread > _MOST_UNREAD_OF_ALL and len(self.slow) > 1:
+        while self.unread > _MAX_UNREAD_OF_ALL and len(self.slow) > 1:
             slowest = next(iter(self.slow))
             slowest.log_refusal("its answers were not read")
             slowest.end()

@@ -22,7 +22,7 @@ from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 __all__ = [
-    "MOST_HANDSHAKES",
+    "MAX_HANDSHAKES",
     "HeaderMemory",
     "Listener",
     "bind",
@@ -31,12 +31,12 @@ __all__ = [
     "send_header",
 ]
 
-MOST_HANDSHAKES = 200
+MAX_HANDSHAKES = 200
 """Handshakes under way at a time: one more ends the oldest, since a genuine one takes milliseconds."""
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-_MOST_LONG_HEADERS = 16 * 1024 * 1024
+_MAX_LONG_HEADERS = 16 * 1024 * 1024
 """Bytes of headers that are longer than that and incomplete, of all peers of a node."""
 
 _REFUSALS_LOGGED = 10
@@ -88,7 +88,7 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
 class HeaderMemory:
     """The memory that long headers take while they are received, of many peers."""
 
-    def __init__(self, most: int = _MOST_LONG_HEADERS) -> None:
+    def __init__(self, most: int = _MAX_LONG_HEADERS) -> None:
         self.held = 0
         """Bytes that are reserved."""
         self._most = most
@@ -209,8 +209,8 @@ class Listener:
             )
             peer.close()
             return
-        if len(self._handshakes) >= MOST_HANDSHAKES:
-            self._end_oldest(f"it sent nothing, and {MOST_HANDSHAKES} others are waiting")
+        if len(self._handshakes) >= MAX_HANDSHAKES:
+            self._end_oldest(f"it sent nothing, and {MAX_HANDSHAKES} others are waiting")
         # A peer at a Unix socket has no address.
         where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))

@@ -44,9 +44,9 @@ SUBPROTOCOL = "minirospy.core.bag.v1"
 
 _PLAYING_SECONDS = 0.05
 _RECORDING_SECONDS = 0.25
-_MOST_BINS = 4000
-_MOST_THUMBNAILS = 60
-_LEAST_RATE, _MOST_RATE = 0.1, 10.0
+_MAX_BINS = 4000
+_MAX_THUMBNAILS = 60
+_LEAST_RATE, _MAX_RATE = 0.1, 10.0
 _HEAD = struct.Struct("<BHd")
 _MOMENT, _THUMBNAIL = 1, 2
 _SECOND = 10**9
@@ -221,8 +221,8 @@ class BagSession(JsonSession):
         bag = self._opened()
         rate = fields.get("rate")
         seek = fields.get("seek")
-        if rate is not None and not _LEAST_RATE <= number(rate) <= _MOST_RATE:
-            raise UsageError(f"the speed is between {_LEAST_RATE:g} and {_MOST_RATE:g}")
+        if rate is not None and not _LEAST_RATE <= number(rate) <= _MAX_RATE:
+            raise UsageError(f"the speed is between {_LEAST_RATE:g} and {_MAX_RATE:g}")
         bag.player.control(
             is_paused=_flag(fields, "paused"),
             rate=None if rate is None else number(rate),
@@ -266,7 +266,7 @@ class BagSession(JsonSession):
 
     async def _density(self, fields: Fields) -> Fields:
         bag = self._opened()
-        bins = min(max(int(number(fields["bins"])), 1), _MOST_BINS)
+        bins = min(max(int(number(fields["bins"])), 1), _MAX_BINS)
         start, end = (self._time(bag, fields[name]) for name in ("start", "end"))
 
         def count() -> dict[str, list[int]]:
@@ -284,7 +284,7 @@ class BagSession(JsonSession):
         if topic not in bag.timeline.topics or not isinstance(times, list):
             raise UsageError(f"'{topic[:200]}' is not a topic of this bag")
         self._thumbnails = deque(each for each in self._thumbnails if each[0] != topic)
-        self._thumbnails += [(topic, self._time(bag, each)) for each in times[:_MOST_THUMBNAILS]]
+        self._thumbnails += [(topic, self._time(bag, each)) for each in times[:_MAX_THUMBNAILS]]
 
     async def _follow_bag(self, bag: OpenBag) -> None:
         state = bag.state

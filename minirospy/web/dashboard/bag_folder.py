@@ -17,8 +17,8 @@ from minirospy.base.errors import BagError, UsageError
 __all__ = ["BagFolder", "FoundBag"]
 
 _SUFFIXES = (".bag", ".mcap")
-_MOST_BAGS = 1000
-_MOST_ENTRIES = 50_000
+_MAX_BAGS = 1000
+_MAX_ENTRIES = 50_000
 """Files and folders that are looked at: the command may have been started in a home folder."""
 
 _DEEPEST = 8
@@ -63,7 +63,7 @@ class BagFolder:
             except OSError:
                 continue
             found.setdefault(name, FoundBag(name, status.st_size, status.st_mtime))
-            if len(found) >= _MOST_BAGS:
+            if len(found) >= _MAX_BAGS:
                 break
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
@@ -105,7 +105,7 @@ class BagFolder:
 
     def _entries(self) -> Iterator[os.DirEntry[str]]:
         """Yield the bags of the folder and below, level by level."""
-        left = _MOST_ENTRIES
+        left = _MAX_ENTRIES
         level = [self.root]
         for _ in range(_DEEPEST):
             below: list[Path] = []

@@ -28,7 +28,7 @@ __all__ = ["GraphStage", "OpenBag"]
 _log = logging.getLogger(__name__)
 
 _SECOND = 10**9
-_MOST_WAITING = 200
+_MAX_WAITING = 200
 """Messages that wait for the loop; then the player waits, too."""
 
 
@@ -41,7 +41,7 @@ class GraphStage:
         self._loop = asyncio.get_running_loop()
         self._publications: dict[str, Publication] = {}
         self._clock: Publication | None = None
-        self._free = threading.BoundedSemaphore(_MOST_WAITING)
+        self._free = threading.BoundedSemaphore(_MAX_WAITING)
         self._is_closed = threading.Event()
 
     # --- on the loop

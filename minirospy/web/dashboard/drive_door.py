@@ -49,8 +49,8 @@ SILENT_SECONDS = 0.5
 
 _log = logging.getLogger(__name__)
 
-_MOST_TOPICS = 20
-_MOST_VALUES = 100
+_MAX_TOPICS = 20
+_MAX_VALUES = 100
 _LONGEST = 20_000
 """Characters of a command."""
 
@@ -139,8 +139,8 @@ def _topic(value: object) -> str:
 
 
 def _numbers(values: object) -> tuple[float, ...]:
-    if not isinstance(values, list) or len(values) > _MOST_VALUES:
-        raise ValueError(f"numbers are an array, of {_MOST_VALUES} at most")
+    if not isinstance(values, list) or len(values) > _MAX_VALUES:
+        raise ValueError(f"numbers are an array, of {_MAX_VALUES} at most")
     try:
         numbers = tuple(float(each) for each in values if isinstance(each, int | float))
     except OverflowError:
@@ -214,8 +214,8 @@ class DriveSession:
         if command.held is None:
             return
         if driven is None:
-            if len(self._driven) >= _MOST_TOPICS:
-                raise BridgeError(f"a client may drive {_MOST_TOPICS} topics")
+            if len(self._driven) >= _MAX_TOPICS:
+                raise BridgeError(f"a client may drive {_MAX_TOPICS} topics")
             driven = _Driven(self._graph, self._guard, command.topic, command.held, self._stopped)
             self._driven[command.topic] = driven
         driven.hold(command.held)

@@ -34,8 +34,8 @@ _LOG_SECONDS = 0.2
 """A file that grows reports nothing: it is looked at so often while a page shows it."""
 
 _STOPPING_SECONDS = 0.2
-_MOST_RUNS = 50
-_MOST_ENDED = 20
+_MAX_RUNS = 50
+_MAX_ENDED = 20
 """Launches that are kept when they have ended, with their last lines."""
 
 _TAIL_BYTES = 64 * 1024
@@ -57,8 +57,8 @@ class LaunchDoor(JsonDoor["LaunchSession"]):
         """Start a launch file. Raise UsageError."""
         if self.is_closed:
             raise UsageError("the dashboard is shut down")
-        if sum(not run.is_ended for run in self.runs.values()) >= _MOST_RUNS:
-            raise UsageError(f"{_MOST_RUNS} launch files run already")
+        if sum(not run.is_ended for run in self.runs.values()) >= _MAX_RUNS:
+            raise UsageError(f"{_MAX_RUNS} launch files run already")
         on_change = self.post_change
         run = LaunchRun(file.package, file.path, path, args, self.environment, self.packages, on_change)
         self.runs[run.id] = run
@@ -83,7 +83,7 @@ class LaunchDoor(JsonDoor["LaunchSession"]):
     def changed(self) -> None:
         """See :meth:`JsonDoor.changed`; of the launches that have ended only the newest are kept."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
-        for number in ended[:-_MOST_ENDED]:
+        for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
         super().changed()
 

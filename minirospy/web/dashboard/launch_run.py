@@ -24,7 +24,7 @@ __all__ = ["LaunchRun", "NodeState", "RunState"]
 
 _log = logging.getLogger(__name__)
 
-_MOST_LINES = 2000
+_MAX_LINES = 2000
 
 
 class NodeState(NamedTuple):
@@ -61,7 +61,7 @@ class _Lines(Output):
         super().__init__(title=False)
         self._on_change = on_change
         self._lock = threading.Lock()
-        self._lines: deque[str] = deque(maxlen=_MOST_LINES)
+        self._lines: deque[str] = deque(maxlen=_MAX_LINES)
         self._count = 0
 
     def since(self, count: int) -> tuple[list[str], int]:

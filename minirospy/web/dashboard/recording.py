@@ -26,7 +26,7 @@ _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
 _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """No file is open yet: an interpreter that starts may lose a SIGINT, where it comes while a callback of importlib runs."""
 
-_MOST_LINES = 20
+_MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
                 ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
 """Words of `rosbag record` for each kind of file."""
@@ -63,7 +63,7 @@ class Recording:
         self._paths = (path.with_name(f"{path.name}.active"), path)
         self._master_uri = master_uri
         self._topics = tuple(topics)
-        self._lines: deque[str] = deque(maxlen=_MOST_LINES)
+        self._lines: deque[str] = deque(maxlen=_MAX_LINES)
         self._started = time.monotonic()
         self._seconds: float | None = None
         self._guardian = Guardian(_TIMEOUTS, master_uri)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 from minirospy.base.errors import BridgeError, RvizFileError
 from minirospy.base.private_files import create_file
 from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
-from minirospy.web.dashboard.rviz_file import MOST_CHARACTERS, format_rviz, parse_rviz
+from minirospy.web.dashboard.rviz_file import MAX_CHARACTERS, format_rviz, parse_rviz
 
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
@@ -37,7 +37,7 @@ def read_file(path: Path) -> dict[str, object] | None:
     """Return the contents of a .rviz file, None where there is none. Raise RvizFileError."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            text = file.read(MOST_CHARACTERS + 1)
+            text = file.read(MAX_CHARACTERS + 1)
     except FileNotFoundError:
         return None
     except OSError as error:

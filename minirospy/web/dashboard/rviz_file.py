@@ -18,13 +18,13 @@ from minirospy.base.errors import RvizFileError
 if TYPE_CHECKING:
     from yaml.events import Event
 
-__all__ = ["MOST_CHARACTERS", "format_rviz", "parse_rviz"]
+__all__ = ["MAX_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MOST_CHARACTERS = 200_000
+MAX_CHARACTERS = 200_000
 """RViz's own files have some ten thousand."""
 
 _MANAGER = "Visualization Manager"
-_MOST_DEPTH = 50
+_MAX_DEPTH = 50
 _TEXT_TAGS = (None, "!", "tag:yaml.org,2002:str")
 _LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -42,8 +42,8 @@ _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     """Return the contents of a .rviz file, of values that JSON has. Raise RvizFileError with ``name`` and the line."""
-    if len(text) > MOST_CHARACTERS:
-        raise RvizFileError(name, 0, f"more than {MOST_CHARACTERS} characters")
+    if len(text) > MAX_CHARACTERS:
+        raise RvizFileError(name, 0, f"more than {MAX_CHARACTERS} characters")
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
@@ -78,7 +78,7 @@ def _built(events: Iterator[Event], name: str) -> object:
                 value = _scalar(event)
             case yaml.CollectionStartEvent():
                 stack.append(([] if isinstance(event, yaml.SequenceStartEvent) else {}, []))
-                if len(stack) > _MOST_DEPTH:
+                if len(stack) > _MAX_DEPTH:
                     raise RvizFileError(name, line, "nested too deeply")
                 continue
             case yaml.CollectionEndEvent():
@@ -120,7 +120,7 @@ def format_rviz(config: Mapping[str, object]) -> str:
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
     """Yield the lines of a map or a list that is not empty, with ``depth - 1`` others around it."""
     # Each line passes through all of these, and is indented by them.
-    if depth >= _MOST_DEPTH:
+    if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):
         for each in value:

@@ -44,7 +44,7 @@ _log = logging.getLogger(__name__)
 _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
-_MOST_PREVIEW = 200
+_MAX_PREVIEW = 200
 """Characters of a value that are shown while it is typed."""
 
 _REPORT_SECONDS = 2.0
@@ -283,7 +283,7 @@ class ToolsSession(JsonSession):
     async def _value(self, fields: Fields) -> Fields:
         """Return the type and the text of the value that `rosparam set` makes of ``text``."""
         value = await self._parsed(fields)
-        return {"type": _type_name(value), "text": format_value(value)[:_MOST_PREVIEW]}
+        return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 
     async def _set(self, fields: Fields) -> Fields:
         """Set the parameter ``name`` to the value of ``text``, as `rosparam set` does."""

@@ -14,12 +14,12 @@ from minirospy.base.errors import BridgeError, NotFoundError
 if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
 
-__all__ = ["ALLOWED", "MOST_BYTES", "Assets"]
+__all__ = ["ALLOWED", "MAX_BYTES", "Assets"]
 
 ALLOWED = r"^package://(?:[-\w%]+/)*[-\w%.]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff|urdf|webp|xacro)$"
 """The URIs that foxglove_bridge allows: matched as the whole, whatever the case."""
 
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 """A larger file is refused."""
 
 
@@ -27,7 +27,7 @@ class Assets:
     """Reads files by ``package://`` URIs. Blocking."""
 
     def __init__(
-        self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MOST_BYTES
+        self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MAX_BYTES
     ) -> None:
         """Read from ``packages`` what a regular expression of ``allowed`` matches. Raise BridgeError on a bad one."""
         self._packages = packages

@@ -41,7 +41,7 @@ __all__ = [
 _Fields = Mapping[str, Any]
 """An operation as JSON gives it."""
 
-_MOST_ITEMS = 100_000
+_MAX_ITEMS = 100_000
 """Entries of one array of a client."""
 
 _MAX_VALUES = 1_000_000
@@ -207,8 +207,8 @@ def _entries(fields: _Fields, key: str) -> list[object]:
     found = fields.get(key)
     if not isinstance(found, list):
         raise BridgeProtocolError(f"'{key}' is not an array")
-    if len(found) > _MOST_ITEMS:
-        raise BridgeProtocolError(f"'{key}' has {len(found)} entries, {_MOST_ITEMS} are allowed")
+    if len(found) > _MAX_ITEMS:
+        raise BridgeProtocolError(f"'{key}' has {len(found)} entries, {_MAX_ITEMS} are allowed")
     return found
 
 

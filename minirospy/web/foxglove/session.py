@@ -30,13 +30,13 @@ __all__ = ["FoxgloveSession"]
 
 _log = logging.getLogger(__name__)
 
-_MOST_CALLS = 200
+_MAX_CALLS = 200
 """Calls and requests of one client that may be under way."""
 
-_MOST_CHANNELS = 1000
+_MAX_CHANNELS = 1000
 """Topics that one client may publish, and its subscriptions: each of them gets each message."""
 
-_MOST_PARAMETERS = 10_000
+_MAX_PARAMETERS = 10_000
 """Names of parameters whose changes one client may subscribe to."""
 
 _MAX_STATUSES = 100  # about one message of a client: it may name thousands of channels that do not exist
@@ -178,9 +178,9 @@ class FoxgloveSession:
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
         """Start the request that was received, which keeps the content of its message."""
-        if len(self._calls) >= _MOST_CALLS:
+        if len(self._calls) >= _MAX_CALLS:
             work.close()
-            raise BridgeError(f"{_MOST_CALLS} requests are under way: wait for an answer")
+            raise BridgeError(f"{_MAX_CALLS} requests are under way: wait for an answer")
         task = self._graph.spawn(work)
         self._calls.add(task)
         size = self._operation_size
@@ -209,8 +209,8 @@ class FoxgloveSession:
                     StatusLevel.WARNING,
                     f"Channel {channel_id} is not available; ignoring subscription {subscription_id}",
                 )
-            elif len(self._subscriptions) >= _MOST_CHANNELS:
-                raise BridgeError(f"a client may have {_MOST_CHANNELS} subscriptions")
+            elif len(self._subscriptions) >= _MAX_CHANNELS:
+                raise BridgeError(f"a client may have {_MAX_CHANNELS} subscriptions")
             else:
                 listener = partial(
                     self._arrived, subscription_id, channel, self._door.channels.type_of(channel_id).md5sum
@@ -251,8 +251,8 @@ class FoxgloveSession:
                     f"Unsupported encoding '{channel.encoding}' of channel {channel.id}. Only 'ros1' encoding is "
                     "supported at the moment.",
                 )
-            elif len(self._publications) >= _MOST_CHANNELS:
-                raise BridgeError(f"a client may publish {_MOST_CHANNELS} topics")
+            elif len(self._publications) >= _MAX_CHANNELS:
+                raise BridgeError(f"a client may publish {_MAX_CHANNELS} topics")
             else:
                 self._advertise_topic(channel)
 
@@ -321,9 +321,9 @@ class FoxgloveSession:
 
     def _subscribe_parameters(self, event: protocol.SubscribeParameterUpdates) -> None:
         self._require("parametersSubscribe", "subscribing to parameters")
-        if self._door.parameters.count(self) + len(event.names) > _MOST_PARAMETERS:
+        if self._door.parameters.count(self) + len(event.names) > _MAX_PARAMETERS:
             raise BridgeError(
-                f"a client may subscribe to {_MOST_PARAMETERS} parameters, or to all without names"
+                f"a client may subscribe to {_MAX_PARAMETERS} parameters, or to all without names"
             )
         self._door.parameters.subscribe(self, event.names)
 

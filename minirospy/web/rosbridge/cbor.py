@@ -29,7 +29,7 @@ TYPED_ARRAYS = {
 }
 """Tag and format character of an array of each type."""
 
-_MOST_VALUES = 1_000_000
+_MAX_VALUES = 1_000_000
 """Of a client's message; an array with a tag is one."""
 
 _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
@@ -74,8 +74,8 @@ def _check_heads(data: bytes) -> None:
         elif major == 6 and argument not in _FORMATS:
             raise ValueError(f"CBOR tag {argument} is not one of a message's")
         count += 1
-        if count > _MOST_VALUES:
-            raise ValueError(f"more than {_MOST_VALUES} values")
+        if count > _MAX_VALUES:
+            raise ValueError(f"more than {_MAX_VALUES} values")
 
 
 def typed_array(type_: str, values: Sequence[float]) -> object:

@@ -15,7 +15,7 @@ from minirospy.base.errors import BridgeProtocolError
 
 __all__ = ["decode", "encode"]
 
-_MOST_PIXELS = 5_600_000
+_MAX_PIXELS = 5_600_000
 """Of a client's image: 17 MB of text, with wide characters four times as much memory."""
 
 
@@ -35,7 +35,7 @@ def decode(data: str) -> str:
     pillow = _pillow()
     try:
         picture = pillow.open(BytesIO(base64.b64decode(data, validate=True)), formats=("PNG",))
-        if picture.width * picture.height > _MOST_PIXELS:
+        if picture.width * picture.height > _MAX_PIXELS:
             raise BridgeProtocolError(f"a PNG of {picture.width}x{picture.height} pixels is too large")
         text: str = picture.tobytes().decode().rstrip("\n")
     except pillow.UnidentifiedImageError as error:

@@ -51,7 +51,7 @@ Id = str | int | float | None
 Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
-_MOST_FRAGMENTS = 2_000
+_MAX_FRAGMENTS = 2_000
 """Of a message to a client: it may want fragments of one character, each of which is a message."""
 
 _LONGEST_ID = 1000
@@ -465,7 +465,7 @@ def fragments(text: str, size: int, id_: Id) -> list[str]:
 
     They are longer where there would be too many.
     """
-    size = max(size, -(-len(text) // _MOST_FRAGMENTS))
+    size = max(size, -(-len(text) // _MAX_FRAGMENTS))
     if len(text) <= size:
         return [text]
     total = -(-len(text) // size)

@@ -30,7 +30,7 @@ from minirospy.web.rosbridge.authentication import authenticate
 from minirospy.web.rosbridge.protocol import Event, OperationError, StatusLevel
 from minirospy.web.rosbridge.services import ClientService, call
 from minirospy.web.rosbridge.subscription import Fragments, Room
-from minirospy.web.rosbridge.topic import MOST_IDS, ClientTopic
+from minirospy.web.rosbridge.topic import MAX_IDS, ClientTopic
 from minirospy.web.rosbridge.types import message_class
 
 if TYPE_CHECKING:
@@ -41,10 +41,10 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-_MOST_CALLS = 200
-_MOST_TOPICS = 1000
-_MOST_SERVICES = 200
-_MOST_WAITING = 64_000_000
+_MAX_CALLS = 200
+_MAX_TOPICS = 1000
+_MAX_SERVICES = 200
+_MAX_WAITING = 64_000_000
 """Calls under way, topics published or subscribed, services offered, bytes that wait for an earlier message (and the same of
 latched messages): of a client."""
 
@@ -203,7 +203,7 @@ class RosbridgeSession:
             return
         self._inbox.append(data)
         self._inbox_size += sys.getsizeof(data)
-        if self._inbox_size > _MOST_WAITING:
+        if self._inbox_size > _MAX_WAITING:
             self.client.close(_POLICY, "too much waits for an earlier operation")
         self.count()
 
@@ -318,8 +318,8 @@ class RosbridgeSession:
         published = self._published.get(event.topic) or self._open(event.topic, event.type, event.latch)
         if published.message_class is not message_class(event.type):
             raise _conflict(event.topic, event.type, published.message_class._type)
-        if event.id not in published.ids and len(published.ids) >= MOST_IDS:
-            raise BridgeError(f"a client may advertise a topic {MOST_IDS} times")
+        if event.id not in published.ids and len(published.ids) >= MAX_IDS:
+            raise BridgeError(f"a client may advertise a topic {MAX_IDS} times")
         published.ids.add(event.id)
 
     def _unadvertise(self, event: protocol.Unadvertise) -> None:
@@ -379,8 +379,8 @@ class RosbridgeSession:
         if not published.latch:
             return
         grown = len(body) - published.latched
-        if self._latched_size + grown > _MOST_WAITING:
-            raise BridgeError(f"a client may have {_MOST_WAITING} bytes of latched messages")
+        if self._latched_size + grown > _MAX_WAITING:
+            raise BridgeError(f"a client may have {_MAX_WAITING} bytes of latched messages")
         self._latched_size += grown
         published.latched = len(body)
         self.count()
@@ -399,8 +399,8 @@ class RosbridgeSession:
     def _open(self, topic: str, type_: str, latch: bool) -> _Published:
         self._require_write("publishing")
         _check_name("topic", topic)
-        if len(self._published) >= _MOST_TOPICS:
-            raise BridgeError(f"a client may publish {_MOST_TOPICS} topics")
+        if len(self._published) >= _MAX_TOPICS:
+            raise BridgeError(f"a client may publish {_MAX_TOPICS} topics")
         found = message_class(type_)
         resolved = self._graph.node.resolve(topic)
         known = self._graph.snapshot.types.get(resolved, ANY)
@@ -447,8 +447,8 @@ class RosbridgeSession:
     def _add_subscription(self, event: protocol.Subscribe) -> None:
         topic = self._subscribed.get(event.topic)
         if topic is None:
-            if len(self._subscribed) >= _MOST_TOPICS:
-                raise BridgeError(f"a client may subscribe to {_MOST_TOPICS} topics")
+            if len(self._subscribed) >= _MAX_TOPICS:
+                raise BridgeError(f"a client may subscribe to {_MAX_TOPICS} topics")
             topic = self._subscribed[event.topic] = ClientTopic(self, self._door, event.topic)
         topic.add(event)
         self.status(StatusLevel.INFO, f"Subscribed to {event.topic}", event.id)
@@ -478,8 +478,8 @@ class RosbridgeSession:
     def _call_service(self, event: protocol.CallService) -> None:
         if not self._is_allowed("services", event.service, "service, cancelling service call for"):
             return
-        if self._calls >= _MOST_CALLS:
-            raise BridgeError(f"{_MOST_CALLS} calls are under way: wait for an answer")
+        if self._calls >= _MAX_CALLS:
+            raise BridgeError(f"{_MAX_CALLS} calls are under way: wait for an answer")
         size = self._operation_size
         self._calls += 1
         self._calls_size += size
@@ -515,8 +515,8 @@ class RosbridgeSession:
             return None
         self._require_write("offering services")
         _check_name("service", event.service)
-        if sum(each.session is self for each in self._door.services.values()) >= _MOST_SERVICES:
-            raise BridgeError(f"a client may offer {_MOST_SERVICES} services")
+        if sum(each.session is self for each in self._door.services.values()) >= _MAX_SERVICES:
+            raise BridgeError(f"a client may offer {_MAX_SERVICES} services")
         return self._offer(event)
 
     async def _offer(self, event: protocol.AdvertiseService) -> None:

@@ -17,9 +17,9 @@ __all__ = ["Fragments", "Merged", "Pacer", "Room", "merge"]
 _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
-MOST_FRAGMENT_BYTES = 64_000_000
+MAX_FRAGMENT_BYTES = 64_000_000
 """Memory of the incomplete messages of one client, and of what keeps them: a wide character takes two or four bytes."""
-_MOST_FRAGMENTS = 100_000
+_MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
 """Memory that a fragment takes besides its text, and an incomplete message besides its fragments."""
@@ -150,11 +150,11 @@ class Fragments:
         known.parts[fragment.number] = fragment.data
         known.since[0] = now
         self._messages.move_to_end(fragment.id)
-        if self.size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
+        if self.size > MAX_FRAGMENT_BYTES or known.total > _MAX_FRAGMENTS:
             self._forget(fragment.id)
             raise OperationError(
-                f"the fragments of message {fragment.id} are too many: {MOST_FRAGMENT_BYTES} bytes and "
-                f"{_MOST_FRAGMENTS} fragments may wait",
+                f"the fragments of message {fragment.id} are too many: {MAX_FRAGMENT_BYTES} bytes and "
+                f"{_MAX_FRAGMENTS} fragments may wait",
                 fragment.id,
             )
 
@@ -163,9 +163,9 @@ class Fragments:
         self._forget(fragment.id)
         # One wide character makes all of the message wide.
         width = max(map(width_of, known.parts.values()))
-        if width * sum(map(len, known.parts.values())) > MOST_FRAGMENT_BYTES:
+        if width * sum(map(len, known.parts.values())) > MAX_FRAGMENT_BYTES:
             raise OperationError(
-                f"message {fragment.id} is too large: {MOST_FRAGMENT_BYTES} bytes of memory are allowed, of which each "
+                f"message {fragment.id} is too large: {MAX_FRAGMENT_BYTES} bytes of memory are allowed, of which each "
                 f"character takes {width}",
                 fragment.id,
             )

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from minirospy.web.rosbridge.door import RosbridgeDoor
     from minirospy.web.rosbridge.session import RosbridgeSession
 
-__all__ = ["MOST_IDS", "ClientTopic"]
+__all__ = ["MAX_IDS", "ClientTopic"]
 
-MOST_IDS = 100
+MAX_IDS = 100
 """Subscriptions of one client to one topic, and its advertisements of one."""
 
 
@@ -44,8 +44,8 @@ class ClientTopic:
     def add(self, event: protocol.Subscribe) -> None:
         """Add a subscription; one with an id that is known is replaced."""
         is_first = not self._subscriptions
-        if event.id not in self._subscriptions and len(self._subscriptions) >= MOST_IDS:
-            raise BridgeError(f"a client may subscribe to a topic {MOST_IDS} times")
+        if event.id not in self._subscriptions and len(self._subscriptions) >= MAX_IDS:
+            raise BridgeError(f"a client may subscribe to a topic {MAX_IDS} times")
         self._subscriptions[event.id] = event
         self._update()
         self._door.graph.subscribe(self._topic, self._arrived)

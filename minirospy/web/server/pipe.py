@@ -19,7 +19,7 @@ __all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "Plain
 
 SMALL_READ = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
 LARGE_READ = 256 * 1024  # of a client that is alone with a large message
-_MOST_PIECES = 128
+_MAX_PIECES = 128
 """Pieces of one call of sendmsg; a system takes 1024 at most."""
 
 
@@ -157,7 +157,7 @@ class PlainPipe:
     def _flush(self) -> None:
         try:
             while self._rest:
-                sent = _send(self._sock, self._rest[:_MOST_PIECES])
+                sent = _send(self._sock, self._rest[:_MAX_PIECES])
                 done = 0
                 while done < len(self._rest) and sent >= len(self._rest[done]):
                     sent -= len(self._rest[done])

@@ -17,7 +17,7 @@ from minirospy.web.server.account import LARGE_PIECE, Piece, Share
 if TYPE_CHECKING:
     from minirospy.web.server.files import FileAnswer
 
-__all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MOST_ANSWERS", "Piece", "SendQueue"]
+__all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MAX_ANSWERS", "Piece", "SendQueue"]
 
 DEFAULT_LIMIT = 10_000_000
 """Bytes of messages that may wait for a client."""
@@ -25,7 +25,7 @@ DEFAULT_LIMIT = 10_000_000
 ENTRY_BYTES = 350
 """Bytes of memory that an entry takes besides its pieces: measured with Python 3.11 are 340 to 360."""
 
-MOST_ANSWERS = 64_000_000
+MAX_ANSWERS = 64_000_000
 """Bytes of answers that may wait for a client which does not read them."""
 
 
@@ -88,7 +88,7 @@ class SendQueue:
     @property
     def is_overrun(self) -> bool:
         """Return whether more answers wait than a client that reads would leave."""
-        return self.answers > MOST_ANSWERS
+        return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
         """Append a message; older ones are dropped where the bound is passed, with ``newest_only`` all of its key."""

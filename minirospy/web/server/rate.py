@@ -6,9 +6,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import NamedTuple
 
-__all__ = ["MOST_ADDRESSES", "ConnectionRate"]
+__all__ = ["MAX_ADDRESSES", "ConnectionRate"]
 
-MOST_ADDRESSES = 1000
+MAX_ADDRESSES = 1000
 """Addresses that are remembered; the one that connected longest ago is forgotten first."""
 
 
@@ -39,6 +39,6 @@ class ConnectionRate:
         is_admitted = tokens >= 1
         self._buckets[address] = _Bucket(tokens - is_admitted, now)
 
-        if len(self._buckets) > MOST_ADDRESSES:
+        if len(self._buckets) > MAX_ADDRESSES:
             self._buckets.popitem(last=False)
         return is_admitted

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FramePair", "pairs_of"]
 
-_MOST_FRAMES = 1000
+_MAX_FRAMES = 1000
 
 
 class FramePair:
@@ -46,8 +46,8 @@ class FramePair:
 
 def pairs_of(request: TFSubscriptionGoal | RepublishTFsRequest) -> list[FramePair]:
     """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres. Raise BridgeError."""
-    if len(request.source_frames) > _MOST_FRAMES:
-        raise BridgeError(f"a request has {_MOST_FRAMES} frames at most")
+    if len(request.source_frames) > _MAX_FRAMES:
+        raise BridgeError(f"a request has {_MAX_FRAMES} frames at most")
     target = request.target_frame.removeprefix("/")
     return [
         FramePair(source.removeprefix("/"), target, request.angular_thres, request.trans_thres)

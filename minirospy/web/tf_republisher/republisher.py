@@ -29,8 +29,8 @@ __all__ = ["NAME", "Republisher"]
 NAME = "/tf2_web_republisher"
 
 _DEFAULT_RATE = 10.0
-_MOST_RATE = 1000.0
-_MOST_REQUESTS = 1000
+_MAX_RATE = 1000.0
+_MAX_REQUESTS = 1000
 _A_TURN = 50
 """Frames after which others have their turn."""
 
@@ -88,8 +88,8 @@ class Republisher:
 
     async def _republish(self, request: RepublishTFsRequest) -> object:
         """Publish transforms on a topic of the request's own until nobody subscribed to it for ``timeout``."""
-        if len(self._requests) >= _MOST_REQUESTS:
-            raise ServiceException(f"{_MOST_REQUESTS} requests are served: no more")
+        if len(self._requests) >= _MAX_REQUESTS:
+            raise ServiceException(f"{_MAX_REQUESTS} requests are served: no more")
         try:
             pairs = pairs_of(request)
         except BridgeError as error:
@@ -151,4 +151,4 @@ class Republisher:
 
 
 def _period(rate: float) -> float:
-    return 1 / min(rate, _MOST_RATE) if rate > 0 else 1 / _DEFAULT_RATE
+    return 1 / min(rate, _MAX_RATE) if rate > 0 else 1 / _DEFAULT_RATE

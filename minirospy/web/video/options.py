@@ -21,7 +21,7 @@ START = f"--{BOUNDARY}\r\n".encode()
 _STREAMS = {"mjpeg": "jpeg", "png": "png", "ros_compressed": ""}
 _SNAPSHOTS = {"jpeg": "jpeg", "jpg": "jpeg", "mjpeg": "jpeg", "png": "png", "ros_compressed": ""}
 _NOT_OFFERED = ("vp8", "vp9", "h264")
-_MOST_PIXELS = 10_000
+_MAX_PIXELS = 10_000
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoR
     picture = Picture(
         formats[type_],
         _number(query, "quality", 95, 1, 100) or 95,
-        _number(query, "width", None, 1, _MOST_PIXELS),
-        _number(query, "height", None, 1, _MOST_PIXELS),
+        _number(query, "width", None, 1, _MAX_PIXELS),
+        _number(query, "height", None, 1, _MAX_PIXELS),
         "invert" in query and query["invert"].lower() not in ("false", "0"),
     )
     # web_video_server takes the compressed images beside those of the topic.

@@ -21,9 +21,9 @@ from minirospy.web.video.pictures import COMPRESSED, IMAGE, MAX_PIXELS, encoded,
 __all__ = ["VideoPages"]
 
 _SNAPSHOT_SECONDS = 10.0
-_MOST_FEEDS = 32
+_MAX_FEEDS = 32
 """Topics and encodings at a time: each image is encoded for each of them."""
-_MOST_KEPT = 32_000_000
+_MAX_KEPT = 32_000_000
 """Bytes of encoded images that are kept for clients that join, of all feeds; larger ones are not kept."""
 _HTML = "text/html; charset=utf-8"
 
@@ -92,7 +92,7 @@ class _Feed:
         """Keep what was encoded last, if all feeds together keep little enough."""
         self._shared.kept -= _size(self.last)
         self.last = found
-        if self._shared.kept + _size(found) > _MOST_KEPT:
+        if self._shared.kept + _size(found) > _MAX_KEPT:
             self.last = None
         self._shared.kept += _size(self.last)
 
@@ -224,8 +224,8 @@ class VideoPages:
             _refuse(
                 exchange, 400, f"topic [{topic}] is of type [{type_}]: {IMAGE} and {COMPRESSED} are images"
             )
-        elif request not in self._feeds and len(self._feeds) >= _MOST_FEEDS:
-            _refuse(exchange, 503, f"{_MOST_FEEDS} encodings of images are in use: no more")
+        elif request not in self._feeds and len(self._feeds) >= _MAX_FEEDS:
+            _refuse(exchange, 503, f"{_MAX_FEEDS} encodings of images are in use: no more")
         else:
             start()
 

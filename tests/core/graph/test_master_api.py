@@ -397,11 +397,11 @@ def test_keys_of_a_node_end_without_a_slash() -> None:
 def test_subscription_that_is_refused_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     master = Recorded()
     master.call("subscribeParam", "/n", URI, "/p")
-    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 1)
+    monkeypatch.setattr(registry_limits, "MAX_ENTRIES", 1)
     assert master.call("subscribeParam", "/n", URI, "/q")[0] == -1
     assert master.parameters.subscribed_keys(URI) == ["/p/"]
-    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 10)
-    monkeypatch.setattr(parameters, "MOST_SUBSCRIPTIONS", 0)
+    monkeypatch.setattr(registry_limits, "MAX_ENTRIES", 10)
+    monkeypatch.setattr(parameters, "MAX_SUBSCRIPTIONS", 0)
     master = Recorded()
     assert master.call("subscribeParam", "/n", URI, "/p")[0] == -1
     assert master.registry.nodes() == {}

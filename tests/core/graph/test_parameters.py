@@ -194,7 +194,7 @@ def test_a_full_tree_refuses_and_forgets_what_was_replaced() -> None:
 
 
 def test_too_many_subscriptions_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("MOST_SUBSCRIPTIONS", 9), ("MOST_OF_ONE", 5), ("FEW_RESERVE", 2), ("FEW", 1)):
+    for name, value in (("MAX_SUBSCRIPTIONS", 9), ("MAX_OF_ONE", 5), ("FEW_RESERVE", 2), ("FEW", 1)):
         monkeypatch.setattr(parameters, name, value)
     tree = tree_of()
     for number in range(5):
@@ -273,8 +273,8 @@ def test_a_large_value_is_weighed_in_many_steps(value: Any) -> None:
 
 
 def test_limits_are_as_documented() -> None:
-    assert (parameters.MOST_BYTES, parameters.RESERVE, parameters.SMALL) == (96 * 2**20, 16 * 2**20, 2**18)
-    assert (parameters.MOST_SUBSCRIPTIONS, parameters.MOST_OF_ONE) == (20_000, 10_000)
+    assert (parameters.MAX_BYTES, parameters.RESERVE, parameters.SMALL) == (96 * 2**20, 16 * 2**20, 2**18)
+    assert (parameters.MAX_SUBSCRIPTIONS, parameters.MAX_OF_ONE) == (20_000, 10_000)
     assert (parameters.FEW_RESERVE, parameters.FEW) == (5_000, 100)
 
 

@@ -105,7 +105,7 @@ def test_one_name_may_be_topic_service_and_parameter_of_a_node() -> None:
 
 
 def test_one_node_registers_so_much_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 3)
+    monkeypatch.setattr(registry_limits, "MAX_ENTRIES", 3)
     registry = Registry()
     for number in range(3):
         registry.register_publisher("/n", f"/t{number}", "a/B", "u")
@@ -148,7 +148,7 @@ def test_limits_are_as_documented() -> None:
         48 * 2**20,
         2**18,
     )
-    assert registry_limits.MOST_ENTRIES == 10_000
+    assert registry_limits.MAX_ENTRIES == 10_000
 
 
 def fill(registry: Registry, uri: str, prefix: str = "") -> int:
@@ -319,7 +319,7 @@ def test_topics_and_services_are_counted() -> None:
 
 
 def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MOST_OLD", 3)
+    monkeypatch.setattr(topic_types, "_MAX_OLD", 3)
     registry = Registry()
     registry.register_publisher("/n", "/published", "a/B", "u")
     registry.register_subscriber("/n", "/subscribed", "a/B", "u")
@@ -344,7 +344,7 @@ def test_old_types_take_no_more_than_4_mib() -> None:
 
 
 def test_types_of_topics_that_are_gone_are_forgotten_one_day(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MOST_OLD", 10)
+    monkeypatch.setattr(topic_types, "_MAX_OLD", 10)
     registry = Registry()
     registry.register_publisher("/n", "/kept", "a/B", "u")
     for number in range(100):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.core.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
+from minirospy.core.graph.subscription import MAX_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 
 
 def test_new_publishers_are_connected_and_lost_ones_left() -> None:
@@ -14,7 +14,7 @@ def test_new_publishers_are_connected_and_lost_ones_left() -> None:
 
 def test_a_list_of_too_many_publishers_is_cut() -> None:
     plan = SubscriptionPlan()
-    uris = [f"http://{number}" for number in range(MOST_PUBLISHERS + 1)]
+    uris = [f"http://{number}" for number in range(MAX_PUBLISHERS + 1)]
     connects = plan.publishers_changed(uris)
     assert [each.uri for each in connects] == uris[:-1]
     assert plan.publishers_changed(uris) == []

@@ -273,7 +273,7 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
 def test_large_requests_are_refused_while_too_many_are_on_their_way(
     monkeypatch: pytest.MonkeyPatch, master: str
 ) -> None:
-    monkeypatch.setattr(rpc_server, "_MOST_HELD", 100_000)
+    monkeypatch.setattr(rpc_server, "_MAX_HELD", 100_000)
     monkeypatch.setattr(rpc_server, "_LARGE", 50_000)
     half = post(b"x" * 300_000)[:150_000]
     assert exchange(master, half).startswith(b"HTTP/1.1 503")

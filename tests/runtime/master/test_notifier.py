@@ -166,7 +166,7 @@ def test_notices_of_one_node_keep_their_order(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_many_parameters_become_one_notice_for_each_subscription(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notifier_module, "_MOST_PARAMETERS", 3)
+    monkeypatch.setattr(notifier_module, "_MAX_PARAMETERS", 3)
 
     async def scene(clock: ManualLoop) -> None:
         scene = Scene(monkeypatch)

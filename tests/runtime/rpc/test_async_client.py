@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.base.errors import RpcError, RpcLate, RpcProtocolError, RpcUnreachable
+from minirospy.base.errors import RpcError, RpcProtocolError, RpcTimeout, RpcUnreachable
 from minirospy.core.graph.registry import PublisherUpdate
 from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.runtime.master.notifier import Notifier
@@ -114,7 +114,7 @@ def test_a_call_under_way_ends_with_its_client_or_its_time_limit() -> None:
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
             client = AsyncRpcClient()
             # It took the connection: not its address, but its process is at fault.
-            with pytest.raises(RpcLate, match=r"timed out after 0\.05 s"):
+            with pytest.raises(RpcTimeout, match=r"timed out after 0\.05 s"):
                 await client.call(uri, "a", timeout=0.05)
             waiting = asyncio.ensure_future(client.call(uri, "a"))
             await until(lambda: client.under_way)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
+from minirospy.runtime.rpc.outbox import MAX_UNREAD, Outbox
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_what_the_socket_takes_does_not_wait(pair: tuple[socket.socket, socket.s
 
 def test_pieces_arrive_in_order_though_the_socket_is_full(pair: tuple[socket.socket, socket.socket]) -> None:
     out = Outbox(pair[0])
-    pieces = [bytes([number]) * MOST_UNREAD for number in range(8)]
+    pieces = [bytes([number]) * MAX_UNREAD for number in range(8)]
     kept = out.write(pieces) + out.write([b"last"])
     assert kept == out.size > 0
 
@@ -53,7 +53,7 @@ def test_pieces_arrive_in_order_though_the_socket_is_full(pair: tuple[socket.soc
 
 def test_a_cleared_outbox_returns_how_much_it_held(pair: tuple[socket.socket, socket.socket]) -> None:
     out = Outbox(pair[0])
-    kept = out.write([bytes(8 * MOST_UNREAD)])
+    kept = out.write([bytes(8 * MAX_UNREAD)])
     assert out.clear() == kept > 0
     assert not out
     assert out.flush() == 0
@@ -61,7 +61,7 @@ def test_a_cleared_outbox_returns_how_much_it_held(pair: tuple[socket.socket, so
 
 def test_a_lost_peer_leaves_the_count_to_the_caller(pair: tuple[socket.socket, socket.socket]) -> None:
     out = Outbox(pair[0])
-    kept = out.write([bytes(8 * MOST_UNREAD)])
+    kept = out.write([bytes(8 * MAX_UNREAD)])
     pair[1].close()
     with pytest.raises(ConnectionError):
         out.flush()

@@ -181,7 +181,7 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
                     assert await greet(listener.port) == {"callerid": "/server"}
                 if len(silent) == 300:
                     silent.pop(0).close()
-            assert len(listener._handshakes) <= tcp.MOST_HANDSHAKES
+            assert len(listener._handshakes) <= tcp.MAX_HANDSHAKES
             assert len(received) == 10
         finally:
             for sock in silent:

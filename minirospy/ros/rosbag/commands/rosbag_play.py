@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMAND", "VERB", "main"]
 
-_MOST_RATE = 1e6
-_MOST_HZ = 1e4
+_MAX_RATE = 1e6
+_MAX_HZ = 1e4
 _FOREVER = 1e12
 
 
@@ -117,8 +117,8 @@ def _play(
     if not paths:
         text = "You must specify at least 1 bag file to play back."
         raise Misuse(text, text)
-    for name, value, most in (("--rate", rate, _MOST_RATE), ("--hz", hz, _MOST_HZ)):
-        if not 1 / _MOST_RATE <= value <= most:
+    for name, value, most in (("--rate", rate, _MAX_RATE), ("--hz", hz, _MAX_HZ)):
+        if not 1 / _MAX_RATE <= value <= most:
             raise UsageError(f"{name} must be above 0, and at most {most:g}")
 
     options = PlayOptions(

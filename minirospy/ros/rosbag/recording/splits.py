@@ -10,7 +10,7 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MOST_EMPTY = 100
+_MAX_EMPTY = 100
 """Files without a message that a silence may leave, as in ROS."""
 
 
@@ -39,7 +39,7 @@ class Splits:
         if options.max_size and size > options.max_size:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
-            if now - self._start > _MOST_EMPTY * options.max_duration:
+            if now - self._start > _MAX_EMPTY * options.max_duration:
                 # The clock has jumped: a simulator's, or a machine's that was set.
                 self._start = now - options.max_duration
             self._start += options.max_duration

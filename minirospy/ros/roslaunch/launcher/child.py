@@ -22,7 +22,7 @@ from minirospy.workspace.packages import Packages
 __all__ = ["run_child"]
 
 _HEARTBEAT_SECONDS = 3.0
-_MOST_MISSED = 3
+_MAX_MISSED = 3
 
 
 def run_child(
@@ -83,7 +83,7 @@ class _Child(Launcher):
                 missed = 0
             except RpcError:
                 missed += 1
-                if missed == _MOST_MISSED:
+                if missed == _MAX_MISSED:
                     self.stop("the parent does not answer")
                     return
 

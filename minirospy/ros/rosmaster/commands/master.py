@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import minirospy
 from minirospy.base import private_files
 from minirospy.base.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host, wrong_address
-from minirospy.base.errors import MinirospyError, RpcError, RpcFault, RpcLate, RpcUnreachable
+from minirospy.base.errors import MinirospyError, RpcError, RpcFault, RpcTimeout, RpcUnreachable
 from minirospy.base.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.command.command import warn
@@ -437,7 +437,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
         if pid is None:
             late = f" or by a suspended master (no answer within {_ANSWER_SECONDS:g} s)"
             return MinirospyError(
-                f"port {port} is taken by another program{late if isinstance(failure, RpcLate) else ''}: "
+                f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
         # It is alive, and holds the lock of its journal all the while.

@@ -40,7 +40,7 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-_MOST_WAITING = 1000
+_MAX_WAITING = 1000
 """So many messages wait while the program is busy; older ones are dropped."""
 
 
@@ -70,7 +70,7 @@ class Buffer:
     async def start(self) -> None:
         """Listen from now on; what ``async with`` does first."""
         for topic, is_static in (("/tf", False), ("/tf_static", True)):
-            subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MOST_WAITING)
+            subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MAX_WAITING)
             self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
 
     async def close(self) -> None:

@@ -33,7 +33,7 @@ Note: This is the transform to get data from target_frame into the source_frame.
 Default echo rate is 1 if echo_rate is not given."""  # noqa: W291 - as ROS prints it
 
 _PRECISION = 3
-_MOST_DIGITS = 17
+_MAX_DIGITS = 17
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
@@ -175,8 +175,8 @@ def _precision() -> int | None:
     value = rospy.get_param("~precision", None)
     if value is None:
         return None
-    if not isinstance(value, int) or isinstance(value, bool) or value > _MOST_DIGITS:
-        raise ToolError(f"~precision is [{value}]: it is a number of digits, up to {_MOST_DIGITS}")
+    if not isinstance(value, int) or isinstance(value, bool) or value > _MAX_DIGITS:
+        raise ToolError(f"~precision is [{value}]: it is a number of digits, up to {_MAX_DIGITS}")
     if value < 1:
         raise ToolError("Precision must be > 0", level="")
     return value

@@ -3,7 +3,7 @@
 import { h, number } from "./dom.js";
 import { t } from "./texts.js";
 
-export const MOST_AXES = 6;
+export const MAX_AXES = 6;
 const LEAST_SIZE = 40; // pixels for the numbers of an axis
 const FONT = "12px system-ui";
 
@@ -13,7 +13,7 @@ export const titleOf = (axis) => t(isLeft(axis) ? "axis {axis}, left" : "axis {a
 /** Return [axis, rest] of words such as "2 /path/y" for an axis that there may be, else null. */
 function numbered(text) {
   const found = /^([1-9]) (.+)$/.exec(text);
-  return found && Number(found[1]) <= MOST_AXES ? [Number(found[1]), found[2]] : null;
+  return found && Number(found[1]) <= MAX_AXES ? [Number(found[1]), found[2]] : null;
 }
 
 /** Return a limit of a range: a number, or null where it follows the values. */
@@ -60,7 +60,7 @@ export class Axes {
       this.choose(label, Number(choice.value));
       this.changed(true);
     } },
-      Array.from({ length: MOST_AXES }, (_, index) => h("option", { value: index + 1 }, titleOf(index + 1))));
+      Array.from({ length: MAX_AXES }, (_, index) => h("option", { value: index + 1 }, titleOf(index + 1))));
     choice.value = this.of(label);
     return choice;
   }

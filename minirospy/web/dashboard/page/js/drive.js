@@ -1,7 +1,7 @@
 // Driving through the server's own door: it publishes what is held, and zero where this page lets go, is lost, or is silent for half a second.
 
 const AGAIN_MS = 500;
-const MOST_WAITING = 2000; // bytes that the network has not taken; more would arrive late
+const MAX_WAITING = 2000; // bytes that the network has not taken; more would arrive late
 
 export class Drive {
   /** react(fields) is called with what the server sends: {writes}, {stopped}, {error, topic}; and {lost: true}. */
@@ -28,7 +28,7 @@ export class Drive {
 
   /** Send what is held, now or never: a command that arrives late is worse than none. */
   send(fields) {
-    if (this.isOpen && this.socket.bufferedAmount < MOST_WAITING) this.socket.send(JSON.stringify(fields));
+    if (this.isOpen && this.socket.bufferedAmount < MAX_WAITING) this.socket.send(JSON.stringify(fields));
   }
 
   close() {

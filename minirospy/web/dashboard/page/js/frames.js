@@ -7,8 +7,8 @@ import { t } from "./texts.js";
 const CONFLICT_SECONDS = 3; // in which a frame has two parents
 const LEAST_AGE = 1; // seconds, under which no frame is old
 const OLD_PERIODS = 10;
-export const MOST_FRAMES = 2000;
-const MOST_PARENTS = 20; // of a frame, the latest
+export const MAX_FRAMES = 2000;
+const MAX_PARENTS = 20; // of a frame, the latest
 
 export class Frames {
   constructor() {
@@ -21,13 +21,13 @@ export class Frames {
       const [parent, child] = [plain(header.frame_id), plain(childId)];
       let frame = this.frames.get(child);
       if (!frame) {
-        if (this.frames.size >= MOST_FRAMES) continue;
+        if (this.frames.size >= MAX_FRAMES) continue;
         frame = { child, rate: new Rate(), parents: new Map() };
         this.frames.set(child, frame);
       }
       frame.parents.delete(parent);
       frame.parents.set(parent, at);
-      if (frame.parents.size > MOST_PARENTS) frame.parents.delete(frame.parents.keys().next().value);
+      if (frame.parents.size > MAX_PARENTS) frame.parents.delete(frame.parents.keys().next().value);
       frame.rate.add(at, 1, 0);
       Object.assign(frame, { parent, isStatic, transform, stamp: header.stamp.secs + header.stamp.nsecs * 1e-9, at });
     }

@@ -1,8 +1,8 @@
 // Layouts: views side by side as a tree of rows and columns, and its text in links and files:
 // row(2:board,column(plot?path=%2Fbutton_state,graph)). A number in front of a part is its share. Pure.
 
-export const MOST_PANES = 24;
-const MOST_TEXT = 20_000;
+export const MAX_PANES = 24;
+const MAX_TEXT = 20_000;
 const SIDES = { left: ["row", 0], right: ["row", 1], top: ["column", 0], bottom: ["column", 1] };
 
 /** A tree of {kind: "pane", id, view, words, weight} and {kind: "row" or "column", parts, weight}; words is the text of a query. */
@@ -16,7 +16,7 @@ export class Layout {
   static parse(text) {
     const layout = new Layout();
     if (!text) return layout;
-    if (text.length > MOST_TEXT) throw new Error("the layout is too long");
+    if (text.length > MAX_TEXT) throw new Error("the layout is too long");
     const reader = { text, at: 0 };
     layout.root = layout.read(reader);
     if (reader.at < text.length) throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected in a layout`);
@@ -42,7 +42,7 @@ export class Layout {
     }
     const words = /^(?:\?([^(),]*))?/.exec(reader.text.slice(reader.at));
     reader.at += words[0].length;
-    if (this.nextId > MOST_PANES) throw new Error(`a layout has ${MOST_PANES} views at most`);
+    if (this.nextId > MAX_PANES) throw new Error(`a layout has ${MAX_PANES} views at most`);
     return this.pane(match[2], words[1] ?? "", weight);
   }
 
@@ -78,7 +78,7 @@ export class Layout {
 
   /** Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are too many. */
   add(view, words, side = "right", target = null) {
-    if (this.panes().length >= MOST_PANES) return null;
+    if (this.panes().length >= MAX_PANES) return null;
     const pane = this.pane(view, words);
     this.insert(pane, side, target);
     return pane;

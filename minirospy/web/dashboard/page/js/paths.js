@@ -3,8 +3,8 @@
 
 import { TextError, isList, isNumeric } from "./ros1.js";
 
-const MOST_VALUES = 50; // of one path, as of a whole array
-const MOST_TESTED = 10_000; // elements
+const MAX_VALUES = 50; // of one path, as of a whole array
+const MAX_TESTED = 10_000; // elements
 
 const TIME_PARTS = ["secs", "nsecs"].map((name) => ({ name, type: "int32", isArray: false }));
 
@@ -76,7 +76,7 @@ export function select(value, steps, found, label = "", depth = 0) {
   } else {
     // What a filter finds is one series, wherever it is in the array.
     const isFiltered = Boolean(steps[depth + 1]?.test);
-    const end = Math.min(step.to, value.length, step.from + (isFiltered ? MOST_TESTED : MOST_VALUES));
+    const end = Math.min(step.to, value.length, step.from + (isFiltered ? MAX_TESTED : MAX_VALUES));
     for (let index = step.from; index < end; index++) select(value[index], steps, found, `${label}[${isFiltered ? ":" : index}]`, depth + 1);
   }
 }
@@ -123,7 +123,7 @@ function leaves(value, found, label) {
     found(label, number);
   } else if (value !== null && typeof value === "object") {
     if (isList(value)) {
-      for (let index = 0; index < Math.min(value.length, MOST_VALUES); index++) {
+      for (let index = 0; index < Math.min(value.length, MAX_VALUES); index++) {
         const each = numberOf(value[index]);
         if (each !== null) found(`${label}[${index}]`, each);
       }

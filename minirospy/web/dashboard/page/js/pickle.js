@@ -4,7 +4,7 @@
 const MARK = Symbol("mark");
 const DEEPEST = 50;
 const LONGEST = 1000; // bytes of an integer that is read: longer ones would keep the page busy
-const MOST_TEXT = 4000; // characters and values of one that is shown
+const MAX_TEXT = 4000; // characters and values of one that is shown
 
 export class PickleError extends Error {}
 
@@ -94,7 +94,7 @@ export function readPickle(bytes) {
 }
 
 /** Return a value as one line, as Python writes it; what is very long is cut. */
-export function pythonText(value, room = { left: MOST_TEXT }, depth = 0) {
+export function pythonText(value, room = { left: MAX_TEXT }, depth = 0) {
   room.left -= 1;
   if (room.left < 0 || depth > DEEPEST) return "…";
   const each = (item) => pythonText(item, room, depth + 1);

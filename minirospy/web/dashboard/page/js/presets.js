@@ -1,6 +1,6 @@
 // Layouts that come with the page. Pure.
 
-const MOST_ROBOTS = 8;
+const MAX_ROBOTS = 8;
 const SYSTEM = new Set(["rosout", "rosout_agg", "tf", "tf_static", "clock", "diagnostics", "diagnostics_agg", "statistics"]);
 const ROBOTIC = new Set(["cmd_vel", "button_state", "odom", "pose", "scan", "joint_states", "joy"]);
 
@@ -29,8 +29,8 @@ export function robotsOf(topics) {
 export function classroom({ boards, topics }) {
   const names = new Set(topics);
   const query = (words) => new URLSearchParams(words).toString();
-  const cells = boards.slice(0, MOST_ROBOTS).map((board) => `board?${query({ board })}`);
-  const robots = robotsOf(topics).slice(0, MOST_ROBOTS).map((space) => {
+  const cells = boards.slice(0, MAX_ROBOTS).map((board) => `board?${query({ board })}`);
+  const robots = robotsOf(topics).slice(0, MAX_ROBOTS).map((space) => {
     if (names.has(`${space}/button_state`)) return `plot?${query({ path: `${space}/button_state`, window: "30" })}`;
     if (names.has(`${space}/cmd_vel`)) return `teleop?${query({ topic: `${space}/cmd_vel` })}`;
     return `topics?${query({ filter: `${space}/` })}`;

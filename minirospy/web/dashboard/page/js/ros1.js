@@ -33,7 +33,7 @@ PRIMITIVES.byte = PRIMITIVES.int8;
 PRIMITIVES.char = PRIMITIVES.uint8;
 
 const IS_LITTLE_ENDIAN = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
-const MOST_EMPTY = 1_000_000; // elements without bytes, which no length of a message limits
+const MAX_EMPTY = 1_000_000; // elements without bytes, which no length of a message limits
 const TEXT = new TextDecoder();
 const BYTES = new TextEncoder();
 
@@ -172,7 +172,7 @@ function readerOfArray(field) {
   const least = leastSize({ ...field, isArray: false });
   return (reader) => {
     const length = count(reader);
-    if (length * least > reader.bytes.byteLength - reader.offset || (!least && length > MOST_EMPTY)) {
+    if (length * least > reader.bytes.byteLength - reader.offset || (!least && length > MAX_EMPTY)) {
       throw new MessageError("the message is shorter than its definition");
     }
     const found = new Array(length);

@@ -1,8 +1,8 @@
 // The points of one plotted series, and what is drawn of many: exact points, or the extremes of each column of pixels. Pure.
 
 const FIRST = 1024;
-export const MOST_POINTS = 4_000_000; // of one series; then the oldest quarter goes
-const MOST_EXACT = 6000; // points of all series that are drawn as they are
+export const MAX_POINTS = 4_000_000; // of one series; then the oldest quarter goes
+const MAX_EXACT = 6000; // points of all series that are drawn as they are
 
 export class Samples {
   constructor() {
@@ -15,7 +15,7 @@ export class Samples {
 
   append(times, values, stamps = null) {
     this.total += times.length;
-    if (this.count + times.length > MOST_POINTS) this.drop(Math.max(MOST_POINTS / 4, this.count + times.length - MOST_POINTS));
+    if (this.count + times.length > MAX_POINTS) this.drop(Math.max(MAX_POINTS / 4, this.count + times.length - MAX_POINTS));
     if (stamps) this.stamps ??= this.times.slice();
     if (this.count + times.length > this.times.length) {
       const size = Math.max(this.times.length * 2, this.count + times.length);
@@ -72,7 +72,7 @@ const finite = (value) => (Number.isFinite(value) ? value : null);
 export function drawn(all, from, to, columns, origin) {
   const ranges = all.map((samples) => [Math.max(0, samples.indexOf(from) - 1), Math.min(samples.count, samples.indexOf(to) + 1)]);
   const total = ranges.reduce((sum, [first, last]) => sum + last - first, 0);
-  return total <= MOST_EXACT ? exact(all, ranges, total, origin) : extremes(all, ranges, from, to, Math.max(1, Math.floor(columns)), origin);
+  return total <= MAX_EXACT ? exact(all, ranges, total, origin) : extremes(all, ranges, from, to, Math.max(1, Math.floor(columns)), origin);
 }
 
 function exact(all, ranges, total, origin) {

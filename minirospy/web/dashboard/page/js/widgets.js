@@ -13,7 +13,7 @@ export const KINDS = {
   button: { title: "Button", isWriter: true, settings: { on: "1", release: "", type: "" } },
 };
 export const COLORS = ["green", "yellow", "red", "blue"];
-export const MOST_PANELS = 60;
+export const MAX_PANELS = 60;
 
 /** The texts of types that a topic may get which nobody publishes yet. */
 export const TYPES = {

@@ -8,8 +8,8 @@ import { PathError, canLead, numericPaths, parseSteps, select, stampOf, topicOf 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
 const LONGEST_DELAY_MS = 4000;
-const MOST_LINES = 30_000; // of one subscriber to all messages, between two batches
-const MOST_POINTS = 1_000_000; // of one series, between two batches
+const MAX_LINES = 30_000; // of one subscriber to all messages, between two batches
+const MAX_POINTS = 1_000_000; // of one series, between two batches
 
 let url = "";
 let protocols = [];
@@ -289,7 +289,7 @@ function give(topic, entry, seconds, bytes, decoded) {
   }
   if (entry.mode === "all") {
     entry.lines.push({ seconds, message });
-    if (entry.lines.length > MOST_LINES) entry.lines.splice(0, MOST_LINES / 10);
+    if (entry.lines.length > MAX_LINES) entry.lines.splice(0, MAX_LINES / 10);
     return message;
   }
   let isFound = false;
@@ -310,7 +310,7 @@ function addPoint(entry, label, seconds, stamp, number) {
     entry.series.set(label, series);
   }
   if (series.count === series.times.length) {
-    if (series.count >= MOST_POINTS) return;
+    if (series.count >= MAX_POINTS) return;
     for (const name of ["times", "stamps", "values"]) {
       const longer = new Float64Array(series.count * 2);
       longer.set(series[name]);

@@ -5,7 +5,7 @@ import { t } from "../texts.js";
 import { writeView } from "./config.js";
 
 const PROTOCOL = "minirospy.rviz.v1";
-const MOST_BYTES = 200_000;
+const MAX_BYTES = 200_000;
 
 /** Send one operation to the server; return a promise of its answer. */
 function requested(link, operation) {
@@ -60,7 +60,7 @@ export class Files {
     this.field.value = "";
     if (!file) return undefined;
     return this.run(async () => {
-      if (file.size > MOST_BYTES) throw new Error(t("{name}: {size} bytes, {most} are allowed", { name: file.name, size: file.size, most: MOST_BYTES }));
+      if (file.size > MAX_BYTES) throw new Error(t("{name}: {size} bytes, {most} are allowed", { name: file.name, size: file.size, most: MAX_BYTES }));
       const { config } = await requested(this.view.link, { parse: await file.text() });
       this.view.open(config);
       this.name ||= file.name;

@@ -6,10 +6,10 @@ import { fromMessage, IDENTITY, multiply, normalized, rotate } from "./transform
 
 export const [NONE, MENU, BUTTON, MOVE_AXIS, MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE, MOVE_3D, ROTATE_3D, MOVE_ROTATE_3D] = Array(10).keys();
 export const [INHERIT, FIXED, VIEW_FACING] = Array(3).keys();
-const MOST_CONTROLS = 200; // of a marker
-const MOST_SHAPES = 1000; // of a marker
-const MOST_ENTRIES = 1000; // of a menu
-export const MOST_TEXT = 300; // characters of a title or description
+const MAX_CONTROLS = 200; // of a marker
+const MAX_SHAPES = 1000; // of a marker
+const MAX_ENTRIES = 1000; // of a menu
+export const MAX_TEXT = 300; // characters of a title or description
 const RING = 36; // parts
 const EDGE_ON = 0.08; // sine of the angle below which a plane is seen from its side
 const RADIANS_OF_PIXEL = 0.01;
@@ -20,15 +20,15 @@ const RADIANS_OF_PIXEL = 0.01;
 export function complete(message) {
   const { name, description, header, controls, menu_entries: entries } = message;
   const shapes = controls.reduce((sum, { markers }) => sum + markers.length, 0);
-  for (const [count, most, text] of [[controls.length, MOST_CONTROLS, "{count} controls, more than {most}"], [shapes, MOST_SHAPES, "{count} markers in its controls, more than {most}"],
-    [entries.length, MOST_ENTRIES, "{count} menu entries, more than {most}"]]) {
+  for (const [count, most, text] of [[controls.length, MAX_CONTROLS, "{count} controls, more than {most}"], [shapes, MAX_SHAPES, "{count} markers in its controls, more than {most}"],
+    [entries.length, MAX_ENTRIES, "{count} menu entries, more than {most}"]]) {
     if (count > most) throw new Error(t(text, { count, most }));
   }
   const numbers = [message.scale, ...[message.pose.position, message.pose.orientation, ...controls.map(({ orientation }) => orientation)].flatMap((each) => Object.values(each))];
   if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contains invalid floats!"));
   const scale = message.scale || 1;
   return {
-    name, description: description.slice(0, MOST_TEXT), header, scale, pose: fromMessage(message.pose), menu: menuOf(entries),
+    name, description: description.slice(0, MAX_TEXT), header, scale, pose: fromMessage(message.pose), menu: menuOf(entries),
     controls: withNames(controls).map((control) => completeControl(control, scale)) };
 }
 
@@ -48,7 +48,7 @@ function completeControl(control, scale) {
   const { name, description, interaction_mode: mode, always_visible: isAlways, markers: shapes } = control;
   const { x, y, z, w } = control.orientation;
   const q = normalized([x, y, z, w]);
-  const made = { name, description: description.slice(0, MOST_TEXT), mode, q, isAlways, facing: control.orientation_mode, isIndependent: control.independent_marker_orientation, shapes };
+  const made = { name, description: description.slice(0, MAX_TEXT), mode, q, isAlways, facing: control.orientation_mode, isIndependent: control.independent_marker_orientation, shapes };
   if (shapes.length) return made;
   if (mode === MENU) return { ...made, facing: VIEW_FACING, isIndependent: false, shapes: [textShape(made.description, scale)] };
   return { ...made, shapes: defaultShapes(mode, q, scale) };
@@ -100,8 +100,8 @@ function menuOf(entries) {
     const children = [];
     known.set(id, children);
     known.get(parent).push({
-      id, title: (box ? title.slice(box[0].length) : title).slice(0, MOST_TEXT), isChecked: box && box[1] === "x", children,
-      command: kind ? `${kind === 1 ? "rosrun" : "roslaunch"} ${command}`.slice(0, MOST_TEXT) : "" });
+      id, title: (box ? title.slice(box[0].length) : title).slice(0, MAX_TEXT), isChecked: box && box[1] === "x", children,
+      command: kind ? `${kind === 1 ? "rosrun" : "roslaunch"} ${command}`.slice(0, MAX_TEXT) : "" });
   }
   return top;
 }

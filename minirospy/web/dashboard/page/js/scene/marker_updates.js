@@ -4,8 +4,8 @@
 import { t } from "../texts.js";
 
 const KEEP_ALIVE = 0;
-const MOST_SERVERS = 20; // of one namespace
-const MOST_WAITING = 100; // updates that came before all markers did
+const MAX_SERVERS = 20; // of one namespace
+const MAX_WAITING = 100; // updates that came before all markers did
 const QUIET_MS = 2000; // servers publish every half second
 
 export class MarkerUpdates {
@@ -32,7 +32,7 @@ export class MarkerUpdates {
     known.updated = now;
     if (known.sequence !== null) return this.next(known, message);
     known.waiting.push(message);
-    if (known.waiting.length > MOST_WAITING) known.waiting.shift();
+    if (known.waiting.length > MAX_WAITING) known.waiting.shift();
     return this.settle(known);
   }
 
@@ -46,7 +46,7 @@ export class MarkerUpdates {
 
   server(id) {
     if (!this.servers.has(id)) {
-      if (this.servers.size >= MOST_SERVERS) throw new Error(t('more than {count} servers: "{name}" is left out', { count: MOST_SERVERS, name: id.slice(0, 200) }));
+      if (this.servers.size >= MAX_SERVERS) throw new Error(t('more than {count} servers: "{name}" is left out', { count: MAX_SERVERS, name: id.slice(0, 200) }));
       this.servers.set(id, { id, sequence: null, full: null, waiting: [], updated: Infinity, lost: "" });
     }
     return this.servers.get(id);

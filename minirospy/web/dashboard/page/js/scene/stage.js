@@ -13,11 +13,11 @@ import { yawOf } from "./transforms.js";
 ColorManagement.enabled = false;
 
 const FIELD_OF_VIEW = (45 * Math.PI) / 180; // as in RViz
-const MOST_PITCH = Math.PI / 2 - 0.001;
+const MAX_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
 const RATIOS = [1, 0.75, 0.5];
-const MOST_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
+const MAX_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
 const LEAST_POINTS = 20_000;
 const SOFTWARE = /swiftshader|llvmpipe|software|softpipe|basic render/i;
 
@@ -36,7 +36,7 @@ export class Stage {
     this.rendererName = String((about && gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) ?? "");
     this.isSoftware = SOFTWARE.test(this.rendererName);
     this.gl = gl;
-    this.mostPoints = MOST_POINTS[this.isSoftware ? "software" : "hardware"];
+    this.mostPoints = MAX_POINTS[this.isSoftware ? "software" : "hardware"];
 
     this.frame = frame;
     this.scene = new Scene();
@@ -195,7 +195,7 @@ export class Stage {
   /** Change parts of the view. */
   setView(parts) {
     Object.assign(this.view, parts);
-    this.view.pitch = Math.min(MOST_PITCH, Math.max(-MOST_PITCH, this.view.pitch));
+    this.view.pitch = Math.min(MAX_PITCH, Math.max(-MAX_PITCH, this.view.pitch));
     this.invalidate();
     this.onView();
   }

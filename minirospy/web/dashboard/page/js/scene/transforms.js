@@ -6,8 +6,8 @@ import { t } from "../texts.js";
 
 export const IDENTITY = Object.freeze({ p: [0, 0, 0], q: [0, 0, 0, 1] });
 const CACHE_SECONDS = 10; // as in tf2
-const MOST_DEPTH = 1000; // frames between one and its root, as in tf2
-const MOST_FRAMES = 10_000; // names that never come again would fill the memory
+const MAX_DEPTH = 1000; // frames between one and its root, as in tf2
+const MAX_FRAMES = 10_000; // names that never come again would fill the memory
 const QUATERNION_TOLERANCE = 0.01; // as in tf2
 
 /** Why there is no transform: kind is "unknown", "unconnected", "loop", "future" or "past". */
@@ -128,7 +128,7 @@ export class Frames {
       return `TF_DENORMALIZED_QUATERNION: the rotation of child_frame_id "${child}" is not normalized`;
     }
 
-    if (this.known.size >= MOST_FRAMES && !(this.known.has(parent) && this.known.has(child))) return `more than ${MOST_FRAMES} frames: "${child}" is left out`;
+    if (this.known.size >= MAX_FRAMES && !(this.known.has(parent) && this.known.has(child))) return `more than ${MAX_FRAMES} frames: "${child}" is left out`;
 
     this.version += 1;
     let edge = this.edges.get(child);
@@ -210,7 +210,7 @@ export class Frames {
   chain(frame) {
     const found = [frame];
     for (let name = this.parent(frame); name !== null; name = this.parent(name)) {
-      if (found.length > MOST_DEPTH || name === frame) throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
+      if (found.length > MAX_DEPTH || name === frame) throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
       found.push(name);
     }
     return found;

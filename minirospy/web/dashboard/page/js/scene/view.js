@@ -25,7 +25,7 @@ const DISPLAYS = {
   Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, InteractiveMarkers, Path, Pose,
   PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera, DepthCloud };
 const KEY = "3d"; // of what the browser keeps
-const MOST_AUTOMATIC = 20; // displays that are added without a click
+const MAX_AUTOMATIC = 20; // displays that are added without a click
 const LEFT_OUT = /_updates$|^\/rosout/;
 const VIEWS = { orbit: "Orbit", top: "Top down", follow: "Follow" };
 
@@ -169,7 +169,7 @@ export class SceneView {
       const name = classForType(type);
       if (!name || CLASSES[name].isLinked || topics.has(topic) || this.dismissed.has(topic) || LEFT_OUT.test(topic)) continue;
       // What the page itself publishes by its tools.
-      if (Object.values(TOOLS).some((tool) => tool.topic === topic) || this.config.displays().length >= MOST_AUTOMATIC) continue;
+      if (Object.values(TOOLS).some((tool) => tool.topic === topic) || this.config.displays().length >= MAX_AUTOMATIC) continue;
       this.config.add(this.newDisplay(name, topic));
       isChanged = true;
     }

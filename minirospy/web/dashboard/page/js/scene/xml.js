@@ -7,7 +7,7 @@ export class XmlError extends Error {}
 const NAMED = { lt: "<", gt: ">", amp: "&", quot: '"', apos: "'" };
 const TOKEN = /<!--[\s\S]*?-->|<!\[CDATA\[([\s\S]*?)\]\]>|<\?[\s\S]*?\?>|<!DOCTYPE[^>[]*(?:\[[^\]]*\])?[^>]*>|<\/([^\s>]+)\s*>|<([A-Za-z_][^\s/>]*)((?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(\/?)>|([^<]+)/gy;
 const ATTRIBUTE = /([^\s=]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
-const MOST_DEPTH = 500;
+const MAX_DEPTH = 500;
 
 /** Return the root element: {name, attributes, children, text}. Throws XmlError with the line. */
 export function parseXml(text) {
@@ -32,7 +32,7 @@ export function parseXml(text) {
       for (const [, key, double, single] of attributes.matchAll(ATTRIBUTE)) element.attributes[key] = decoded(double ?? single);
       inside.children.push(element);
       if (!isEmpty) open.push(element);
-      if (open.length > MOST_DEPTH) fail(start, t("elements are nested too deeply"));
+      if (open.length > MAX_DEPTH) fail(start, t("elements are nested too deeply"));
     }
   }
   if (open.length > 1) fail(text.length, t("</{name}> is missing", { name: open.at(-1).name }));

@@ -7,10 +7,10 @@ import { actionServers, isRunning, progressOf, stampOf, statusWord } from "../ac
 import { t } from "../texts.js";
 import { yaml } from "./services.js";
 
-const MOST_IN_ROW = 300; // characters of a status
+const MAX_IN_ROW = 300; // characters of a status
 const CANCEL_TYPE = "actionlib_msgs/GoalID";
 const CANCEL_TEXT = "time stamp\nstring id\n";
-const MOST_GOALS = 200; // of which feedback and results are kept
+const MAX_GOALS = 200; // of which feedback and results are kept
 const STALE_SECONDS = 5; // of the status topic, which comes at 5 Hz usually
 
 const PAGE = crypto.getRandomValues(new Uint32Array(1))[0].toString(36); // goals of two pages are two
@@ -172,7 +172,7 @@ export class Actions {
   goalOf(id) {
     let goal = this.goals.get(id);
     if (!goal) {
-      if (this.goals.size >= MOST_GOALS) this.forgetOne();
+      if (this.goals.size >= MAX_GOALS) this.forgetOne();
       goal = { id, status: null, text: "", isOwn: false, isListed: false, received: null };
       const cancel = h("button", { type: "button", class: "small", title: t("Cancel {id}", { id }), onclick: () => this.cancel(id) }, t("cancel"));
       goal.cancel = cancel;
@@ -201,7 +201,7 @@ export class Actions {
     }
     this.seen = performance.now() / 1000;
     for (const goal of this.goals.values()) goal.isListed = false;
-    for (const { goal_id: { id }, status, text } of message.status_list.slice(-MOST_GOALS)) {
+    for (const { goal_id: { id }, status, text } of message.status_list.slice(-MAX_GOALS)) {
       Object.assign(this.goalOf(id), { status, text, isListed: true });
     }
     this.showGoals();
@@ -227,7 +227,7 @@ export class Actions {
       const status = goal.finalStatus ?? goal.status;
       const [, badgeCell, textCell] = goal.row.children;
       showBadge(badgeCell.firstChild, status);
-      setText(textCell, brief(goal.text, MOST_IN_ROW) || (goal.isOwn ? t("sent here") : ""));
+      setText(textCell, brief(goal.text, MAX_IN_ROW) || (goal.isOwn ? t("sent here") : ""));
       goal.cancel.hidden = status === null ? !goal.isOwn : !isRunning(status);
       goal.cancel.disabled = !this.link.mayWrite;
       goal.row.classList.toggle("selected", goal.id === this.chosen);

@@ -19,7 +19,7 @@ const APART = 83; // pixels from one thumbnail to the next, before their width i
 const WIDEST = 160;
 const HEAD_BYTES = 11;
 const MOMENT = 1;
-const MOST_SHOWN_FIRST = 3;
+const MAX_SHOWN_FIRST = 3;
 const COMPRESSIONS = [[".bag", "none"], [".bag", "lz4"], [".bag", "bz2"], [".mcap", "none"], [".mcap", "lz4"], [".mcap", "zstd"]];
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10];
 
@@ -300,7 +300,7 @@ class Player {
     fill(this.labels, h("div", { class: "bag-corner muted" }, `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`), this.rows.map((row) => this.label(row)));
     fill(this.moments);
     const order = [...this.rows].sort((one, other) => IMAGES.has(other.type) - IMAGES.has(one.type) || other.count - one.count);
-    for (const row of order.slice(0, MOST_SHOWN_FIRST)) this.setShown(row, true);
+    for (const row of order.slice(0, MAX_SHOWN_FIRST)) this.setShown(row, true);
     this.publishing.checked = false;
     this.clock.checked = false;
     this.clockLabel.hidden = true;

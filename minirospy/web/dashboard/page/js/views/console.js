@@ -5,8 +5,8 @@ import { LEVELS, NAMES, csv, filterOf, lineOf, linesOf, plainText, timeText } fr
 import { VirtualList } from "../virtual_list.js";
 import { t } from "../texts.js";
 
-const MOST_LINES = 50_000;
-const MOST_BYTES = 100_000_000; // of a log file
+const MAX_LINES = 50_000;
+const MAX_BYTES = 100_000_000; // of a log file
 
 // The lines outlive the view: they are collected from the first visit on.
 const lines = [];
@@ -28,15 +28,15 @@ function append(added) {
     counts.set(line.level, (counts.get(line.level) ?? 0) + 1);
   }
   let cut = 0;
-  if (lines.length > MOST_LINES) {
-    cut = lines.length - MOST_LINES + MOST_LINES / 10;
+  if (lines.length > MAX_LINES) {
+    cut = lines.length - MAX_LINES + MAX_LINES / 10;
     lines.splice(0, cut);
     removed += cut;
   }
   for (const listener of listeners) listener(cut);
 }
 
-const MOST_IN_ROW = 1000; // characters
+const MAX_IN_ROW = 1000; // characters
 
 export class Console {
   constructor(link, words, main, place) {
@@ -220,12 +220,12 @@ export class Console {
   async open({ files: [file] }) {
     if (!file) return;
     this.file.value = "";
-    if (file.size > MOST_BYTES) {
-      setText(this.problem, t("{name} is larger than {size} MB", { name: file.name, size: MOST_BYTES / 1e6 }));
+    if (file.size > MAX_BYTES) {
+      setText(this.problem, t("{name} is larger than {size} MB", { name: file.name, size: MAX_BYTES / 1e6 }));
       return;
     }
     const found = linesOf(await file.text(), file.name);
-    append(found.slice(-MOST_LINES));
+    append(found.slice(-MAX_LINES));
     setText(this.problem, found.length ? "" : t("{name} has no lines", { name: file.name }));
   }
 
@@ -288,5 +288,5 @@ export class Console {
 
 /** Return a text that stays in its row: all of it is below after a click. */
 function oneLine(text) {
-  return text.slice(0, MOST_IN_ROW).replace(/[\r\n\v\f\u0085\u2028\u2029]+/g, (breaks, at) => (at + breaks.length < Math.min(text.length, MOST_IN_ROW) ? " ↵ " : ""));
+  return text.slice(0, MAX_IN_ROW).replace(/[\r\n\v\f\u0085\u2028\u2029]+/g, (breaks, at) => (at + breaks.length < Math.min(text.length, MAX_IN_ROW) ? " ↵ " : ""));
 }

@@ -10,7 +10,7 @@ const USUAL = "/diagnostics";
 const LEVELS = ["OK", "Warning", "Error", "Stale"];
 const STALE_SECONDS = 5; // without a message, as in rqt_runtime_monitor
 const MOST = 5000; // statuses that are kept
-const MOST_CHANGES = 30; // of one status
+const MAX_CHANGES = 30; // of one status
 
 export class Diagnostics {
   constructor(link, words, main, place) {
@@ -80,7 +80,7 @@ export class Diagnostics {
         if (this.statuses.size >= MOST && !this.statuses.has(path)) continue;
         const before = this.statuses.get(path);
         const isSame = before?.level === level && before.message === text && !before.isSilent;
-        const changes = isSame ? before.changes : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MOST_CHANGES);
+        const changes = isSame ? before.changes : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MAX_CHANGES);
         this.statuses.set(path, { path, name, level, message: text, hardware, values, at, changes });
       }
     }
@@ -96,7 +96,7 @@ export class Diagnostics {
   /** Record that the messages of a status have ended. */
   silence(status) {
     status.isSilent = true;
-    status.changes = [{ time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) }, ...status.changes].slice(0, MOST_CHANGES);
+    status.changes = [{ time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) }, ...status.changes].slice(0, MAX_CHANGES);
   }
 
   /** Return the nodes of the tree in order, each with its worst level; parents that nobody reports are added. */

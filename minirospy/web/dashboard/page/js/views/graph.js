@@ -11,7 +11,7 @@ import { t } from "../texts.js";
 const MODES = [["active", "Nodes and topics (active)"], ["all", "Nodes and topics (all)"], ["nodes", "Nodes only"]];
 const SHAPES = { n: "node", t: "topic", a: "action" };
 const HEIGHT = 36;
-const MOST_TRIED = 150; // nodes and topics that are laid out in two ways
+const MAX_TRIED = 150; // nodes and topics that are laid out in two ways
 const RATE_TEXT = "000.0 kB/s"; // for which an edge has room
 
 export class Graph {
@@ -104,7 +104,7 @@ export class Graph {
   draw(found) {
     const layouts = [this.lay(found, "LR")];
     // A chain of nodes is easier to read from top to bottom where the view is not as wide as it.
-    if (found.nodes.size + found.topics.size < MOST_TRIED) layouts.push(this.lay(found, "TB"));
+    if (found.nodes.size + found.topics.size < MAX_TRIED) layouts.push(this.lay(found, "TB"));
     const [{ width, height, boxes, edges }] = layouts.sort((one, other) => this.fitOf(other) - this.fitOf(one));
     const groups = [...boxes].filter(([key]) => key[0] === "g").map(([key, box]) => this.makeGroup(key.slice(1), box));
     this.drawn = [];

@@ -5,7 +5,7 @@ import { Door } from "../door.js";
 import { t } from "../texts.js";
 
 const PROTOCOL = "minirospy.ros.roslaunch.launcher.v1";
-const MOST_LOG = 400_000; // characters
+const MAX_LOG = 400_000; // characters
 const GOOD = "d0";
 const LEVELS = { "running": GOOD, "starting": "d1", "ending": "d1", "stopping": "d1", "stopped": "d3", "ended": "d3", "failed": "d2" };
 
@@ -216,7 +216,7 @@ export class Launch {
       this.text.append(level ? h("span", { class: level }, line) : document.createTextNode(line));
     }
     let length = this.text.textContent.length;
-    for (; length > MOST_LOG; this.text.firstChild.remove()) length -= this.text.firstChild.textContent.length;
+    for (; length > MAX_LOG; this.text.firstChild.remove()) length -= this.text.firstChild.textContent.length;
     if (isFirst && !text) this.text.append(h("span", { class: "muted" }, t("It has printed nothing yet.")));
     if (isAtEnd || isFirst) this.text.scrollTop = this.text.scrollHeight;
   }

@@ -2,13 +2,13 @@
 
 import { Dock } from "../dock.js";
 import { download, fill, h, setText } from "../dom.js";
-import { Layout, MOST_PANES } from "../layout.js";
+import { Layout, MAX_PANES } from "../layout.js";
 import { PRESETS, classroom } from "../presets.js";
 import { t } from "../texts.js";
 
 const KEY = "layouts"; // of localStorage: {name: text}
 const FILE = "minirospy layout"; // what a file says of itself
-const MOST_FILE = 100_000; // bytes
+const MAX_FILE = 100_000; // bytes
 const WAIT_MS = 3000; // for the names of boards
 
 export class Layouts {
@@ -152,7 +152,7 @@ export class Layouts {
     // The pane is measured by its view, so the dock is seen before.
     this.start.hidden = true;
     this.dock.element.hidden = false;
-    if (!this.dock.add(view)) this.report(t("A layout has {count} views at most.", { count: MOST_PANES }), true);
+    if (!this.dock.add(view)) this.report(t("A layout has {count} views at most.", { count: MAX_PANES }), true);
   }
 
   save() {
@@ -204,7 +204,7 @@ export class Layouts {
     this.file.value = "";
     if (!file) return;
     try {
-      if (file.size > MOST_FILE) throw new Error(t("it is too large"));
+      if (file.size > MAX_FILE) throw new Error(t("it is too large"));
       const content = JSON.parse(await file.text());
       if (content?.[FILE] !== 1 || typeof content.layout !== "string") throw new Error(t("it is not a layout of this page"));
       Layout.parse(content.layout);

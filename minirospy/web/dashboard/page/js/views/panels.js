@@ -3,7 +3,7 @@
 import { fill, h, setText, shown, svg, uniqueId } from "../dom.js";
 import { numberOf, numericPaths } from "../paths.js";
 import { t, errorText } from "../texts.js";
-import { COLORS, KINDS, MOST_PANELS, TYPES, isSame, messageWith, panelText, parsePanel, splitPath, valueAt } from "../widgets.js";
+import { COLORS, KINDS, MAX_PANELS, TYPES, isSame, messageWith, panelText, parsePanel, splitPath, valueAt } from "../widgets.js";
 
 const SEND_MS = 50; // between two messages of a slider that is moved
 const LABELS = { unit: "unit", at: "on from", color: "color", min: "least", max: "most", step: "step", on: "value when on", off: "value when off", release: "value when released", type: "type" };
@@ -12,7 +12,7 @@ export class Panels {
   constructor(link, words, main, place) {
     this.link = link;
     this.place = place;
-    this.panels = words.getAll("p").map(parsePanel).filter(Boolean).slice(0, MOST_PANELS).map((spec) => this.make(spec));
+    this.panels = words.getAll("p").map(parsePanel).filter(Boolean).slice(0, MAX_PANELS).map((spec) => this.make(spec));
     this.isEditing = words.get("edit") === "1" || !this.panels.length;
     this.editing = null; // the panel whose settings are in the form
     this.editButton = h("button", { type: "button", "aria-pressed": String(this.isEditing), onclick: () => this.switchEditing() }, t("Edit"));
@@ -110,7 +110,7 @@ export class Panels {
     if (this.editing) {
       this.editing.close();
       this.panels[this.panels.indexOf(this.editing)] = panel;
-    } else if (this.panels.length < MOST_PANELS) this.panels.push(panel);
+    } else if (this.panels.length < MAX_PANELS) this.panels.push(panel);
     this.editing = null;
     this.path.value = this.label.value = "";
     this.showSettings({});

@@ -9,7 +9,7 @@ import { t } from "../texts.js";
 
 const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
 const USUAL_WINDOW = "10";
-const MOST_PAIRS = 5000; // points of one series over another
+const MAX_PAIRS = 5000; // points of one series over another
 const FRAME_MS = 33;
 const QUIET_MS = 300; // without another change, until it is in the address
 const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
@@ -420,7 +420,7 @@ export class Plot {
       if (this.over) {
         const over = this.series.get(this.over)?.samples ?? new Samples();
         const shown = this.visible();
-        const data = shown.map(({ samples }) => pairs(over, samples, from, to, MOST_PAIRS));
+        const data = shown.map(({ samples }) => pairs(over, samples, from, to, MAX_PAIRS));
         const scales = shown.map(({ label }) => this.axes.scaleOf(label));
         this.ranges = new Map([["x", rangeOf(data.map(([xs]) => xs))],
           ...scales.map((scale) => [scale, rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys))])]);

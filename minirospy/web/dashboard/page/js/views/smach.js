@@ -22,9 +22,9 @@ string[] initial_states
 string local_data
 `;
 const EMPTY_USERDATA = "gAJ9cQAu"; // pickle.dumps({}, 2) as base64
-const MOST_CONTAINERS = 500;
-const MOST_EVENTS = 100;
-const MOST_SENDS = 10;
+const MAX_CONTAINERS = 500;
+const MAX_EVENTS = 100;
+const MAX_SENDS = 10;
 const SEND_MS = 400;
 const GAP = 40; // between outermost containers
 
@@ -107,17 +107,17 @@ export class Smach {
   }
 
   structure({ message }) {
-    if (this.structures.size < MOST_CONTAINERS || this.structures.has(message.path)) this.structures.set(message.path, message);
+    if (this.structures.size < MAX_CONTAINERS || this.structures.has(message.path)) this.structures.set(message.path, message);
   }
 
   status({ message, seconds }) {
-    if (this.statuses.size >= MOST_CONTAINERS && !this.statuses.has(message.path)) return;
+    if (this.statuses.size >= MAX_CONTAINERS && !this.statuses.has(message.path)) return;
     const before = this.statuses.get(message.path);
     this.statuses.set(message.path, message);
     const active = activeOf(message);
     if (!before || activeOf(before).join() !== active.join()) {
       this.events.unshift({ seconds, path: message.path, active });
-      this.events.length = Math.min(this.events.length, MOST_EVENTS);
+      this.events.length = Math.min(this.events.length, MAX_EVENTS);
     }
   }
 
@@ -263,7 +263,7 @@ export class Smach {
     // Again until the machine has answered: a message that comes before its connection is lost.
     const { server } = this;
     const isDone = () => this.statuses.get(path)?.initial_states.join() === state;
-    for (let number = 0; number < MOST_SENDS && (number === 0 || !isDone()) && server === this.server && !this.isClosed; number++) {
+    for (let number = 0; number < MAX_SENDS && (number === 0 || !isDone()) && server === this.server && !this.isClosed; number++) {
       try {
         await this.link.publish(`${server}/smach/container_init`, INIT, INIT_TEXT, { path, initial_states: [state], local_data: EMPTY_USERDATA });
         setText(this.problem, "");

@@ -9,7 +9,7 @@ import { t } from "../texts.js";
 // Measuring these costs the bandwidth of a camera: only when opened.
 const HEAVY = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud",
   "nav_msgs/OccupancyGrid", "theora_image_transport/Packet", "stereo_msgs/DisparityImage"]);
-const MOST_ITEMS = 100; // of one array that is opened
+const MAX_ITEMS = 100; // of one array that is opened
 const REFRESH_MS = 500;
 
 export class Topics {
@@ -203,7 +203,7 @@ export class Tree {
 
   show(message) {
     const isArray = isList(message);
-    const names = isArray ? Array.from({ length: Math.min(message.length, MOST_ITEMS) }, (_, index) => index) : Object.keys(message);
+    const names = isArray ? Array.from({ length: Math.min(message.length, MAX_ITEMS) }, (_, index) => index) : Object.keys(message);
     const wanted = new Set(names);
     for (const [name, item] of this.items) {
       if (!wanted.has(name)) {
@@ -247,7 +247,7 @@ class Field {
     this.isOpen ??= !isList(value);
     this.head.disabled = false;
     this.head.setAttribute("aria-expanded", String(this.isOpen));
-    setText(this.value, this.isOpen ? (!isList(value) ? "" : t("{count} values", { count: value.length }) + (value.length > MOST_ITEMS ? t(", the first {count} are shown", { count: MOST_ITEMS }) : "")) : shown(value));
+    setText(this.value, this.isOpen ? (!isList(value) ? "" : t("{count} values", { count: value.length }) + (value.length > MAX_ITEMS ? t(", the first {count} are shown", { count: MAX_ITEMS }) : "")) : shown(value));
     if (this.isOpen) {
       if (!this.tree) {
         this.tree = new Tree(this.path);

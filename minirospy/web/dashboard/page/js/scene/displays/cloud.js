@@ -6,8 +6,8 @@ import { t } from "../../texts.js";
 import { IDENTITY } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
-const MOST_SCANS = 1000;
-const MOST_BOXES = 50_000; // of one message
+const MAX_SCANS = 1000;
+const MAX_BOXES = 50_000; // of one message
 
 export class Cloud extends TopicDisplay {
   changed(path) {
@@ -28,7 +28,7 @@ export class Cloud extends TopicDisplay {
     const decay = this.number("Decay Time");
     if (decay <= 0) for (const item of [...this.items]) this.remove(item);
     this.draw(message);
-    this.keep(MOST_SCANS);
+    this.keep(MAX_SCANS);
   }
 
   draw(message) {
@@ -44,7 +44,7 @@ export class Cloud extends TopicDisplay {
     const { size, grows } = isPixels ? { size: this.number("Size (Pixels)", 3) } : this.sizeOf();
     const paint = { rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1) };
     // Boxes are 36 corners each: of very many a square is drawn.
-    const object = settings.Style === "Boxes" && found.count <= MOST_BOXES && !grows ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
+    const object = settings.Style === "Boxes" && found.count <= MAX_BOXES && !grows ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
       : points(found.positions, colors, { ...paint, size, isMetres: !isPixels, grows, isRound: settings.Style === "Spheres" });
     const item = this.addAt(message.header, object);
     item.until = performance.now() + this.number("Decay Time") * 1000;

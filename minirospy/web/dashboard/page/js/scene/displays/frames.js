@@ -6,7 +6,7 @@ import { missingText } from "../transforms.js";
 import { t } from "../../texts.js";
 import { Display } from "./display.js";
 
-const MOST_CELLS = 1000;
+const MAX_CELLS = 1000;
 const ARROW_COLORS = [[255, 26, 153], [204, 204, 77]];
 
 /** Return a setting's frame: "" stands for the fixed one. */
@@ -35,7 +35,7 @@ class Anchored extends Display {
 
 export class Grid extends Anchored {
   make() {
-    const count = Math.min(MOST_CELLS, Math.max(1, Math.round(this.number("Plane Cell Count", 10))));
+    const count = Math.min(MAX_CELLS, Math.max(1, Math.round(this.number("Plane Cell Count", 10))));
     const half = (count * this.number("Cell Size", 1)) / 2;
     const positions = new Float32Array((count + 1) * 12);
     for (let line = 0; line <= count; line++) {

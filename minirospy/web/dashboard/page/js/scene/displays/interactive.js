@@ -1,7 +1,7 @@
 // Interactive markers of servers: shown with their handles and texts, moved by a person (grips.js), who is reported to the server.
 
 import { Group, Matrix4, Quaternion, Vector3 } from "../../../vendor/three/three.min.js";
-import { complete, MOST_TEXT, rotationsOf, toMessage, VIEW_FACING } from "../handles.js";
+import { complete, MAX_TEXT, rotationsOf, toMessage, VIEW_FACING } from "../handles.js";
 import { MarkerUpdates } from "../marker_updates.js";
 import { schema } from "../schemas.js";
 import { axes, discard } from "../shapes.js";
@@ -15,7 +15,7 @@ const TYPE = "visualization_msgs/InteractiveMarkerFeedback";
 const FEEDBACK = schema(
   "Header header\nstring client_id\nstring marker_name\nstring control_name\nuint8 event_type\nPose pose\nuint32 menu_entry_id\nPoint mouse_point\nbool mouse_point_valid", "geometry_msgs/Pose");
 const MOST = 1000; // interactive markers
-const MOST_STATUSES = 20; // of single markers
+const MAX_STATUSES = 20; // of single markers
 const FETCH_MS = 1000; // between two requests for all markers
 const SUFFIX = "/update";
 
@@ -236,7 +236,7 @@ export class InteractiveMarkers extends TopicDisplay {
   /** Show a marker; return the Error of one that cannot be shown. */
   show(key, message) {
     const shown = this.markers.get(key) ?? new Shown(this);
-    const status = `Marker ${message.name.slice(0, MOST_TEXT)}`;
+    const status = `Marker ${message.name.slice(0, MAX_TEXT)}`;
     try {
       if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} interactive markers", { count: MOST }));
       shown.fill(message);
@@ -246,7 +246,7 @@ export class InteractiveMarkers extends TopicDisplay {
     } catch (error) {
       shown.close();
       this.markers.delete(key);
-      if (this.status.size < MOST_STATUSES) this.setStatus(status, 2, error.message);
+      if (this.status.size < MAX_STATUSES) this.setStatus(status, 2, error.message);
       return new Error(`${status}: ${error.message}`);
     }
   }

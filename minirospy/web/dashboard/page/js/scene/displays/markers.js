@@ -10,7 +10,7 @@ import { TopicDisplay } from "./display.js";
 const [ADD, DELETE, DELETE_ALL] = [0, 2, 3];
 const KINDS = ["Arrow", "Cube", "Sphere", "Cylinder", "Line Strip", "Line List", "Cube List", "Sphere List", "Points", "View Facing Text", "Mesh Resource", "Triangle List"];
 const MOST = 10_000; // markers of a display
-const MOST_SPACES = 1000; // namespaces in the list of settings
+const MAX_SPACES = 1000; // namespaces in the list of settings
 
 const rgbOf = ({ r, g, b }) => [r * 255, g * 255, b * 255];
 const flat = (points) => {
@@ -62,7 +62,7 @@ export class Markers extends TopicDisplay {
       return;
     }
     if (marker.action !== ADD) throw new Error(t("the action {action} is not known", { action: marker.action }));
-    if (!this.spaces.has(marker.ns) && this.spaces.size < MOST_SPACES) {
+    if (!this.spaces.has(marker.ns) && this.spaces.size < MAX_SPACES) {
       this.spaces.add(marker.ns);
       this.context.statusChanged();
     }

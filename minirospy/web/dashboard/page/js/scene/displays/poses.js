@@ -6,7 +6,7 @@ import { fromMessage } from "../transforms.js";
 import { t } from "../../texts.js";
 import { TopicDisplay } from "./display.js";
 
-const MOST_KEPT = 2000;
+const MAX_KEPT = 2000;
 
 function posed(object, pose) {
   const { p, q } = fromMessage(pose);
@@ -94,7 +94,7 @@ export class PoseArray extends LastMessage {
       : () => arrow(material, {
         shaft: this.number("Shaft Length", 0.23), shaftWidth: this.number("Shaft Radius", 0.01),
         head: this.number("Head Length", 0.07), headWidth: this.number("Head Radius", 0.03) });
-    return grouped(new Group(), ...shown.slice(0, MOST_KEPT).map((pose) => posed(make(), pose)));
+    return grouped(new Group(), ...shown.slice(0, MAX_KEPT).map((pose) => posed(make(), pose)));
   }
 }
 
@@ -127,7 +127,7 @@ export class Odometry extends LastMessage {
       group.add(this.ball);
     }
     this.addAt(message.header, group);
-    this.keep(Math.min(MOST_KEPT, this.number("Keep", 100) || MOST_KEPT));
+    this.keep(Math.min(MAX_KEPT, this.number("Keep", 100) || MAX_KEPT));
   }
 }
 
@@ -156,7 +156,7 @@ export class Path extends LastMessage {
         : () => arrow(material, {
           shaft: this.number("Shaft Length", 0.1), shaftWidth: this.number("Shaft Diameter", 0.1),
           head: this.number("Head Length", 0.2), headWidth: this.number("Head Diameter", 0.3) });
-      for (const { pose } of poses.slice(0, MOST_KEPT)) group.add(posed(make(), pose));
+      for (const { pose } of poses.slice(0, MAX_KEPT)) group.add(posed(make(), pose));
     }
     return grouped(group);
   }
