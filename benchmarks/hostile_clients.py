@@ -53,9 +53,9 @@ def frame(opcode: int, data: bytes, *, is_final: bool = True) -> bytes:
 
 
 class Attack(NamedTuple):
-    """``door``: the port; ``first`` is sent once, then ``again`` until the end; ``reads``: whether answers are read."""
+    """``endpoint``: the port; ``first`` is sent once, then ``again`` until the end; ``reads``: whether answers are read."""
 
-    door: str
+    endpoint: str
     first: bytes
     again: bytes
     reads: bool = True
@@ -141,12 +141,12 @@ def attack_for(name: str, ports: dict[str, int], count: int, seconds: float, tok
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     attack = attacks()[name]
-    port = ports[attack.door]
+    port = ports[attack.endpoint]
     if attack.is_http:
         print("ready", flush=True)
         _flood(port, attack.again, count, time.monotonic() + seconds)
         return
-    protocol = "foxglove.sdk.v1" if attack.door == "page" else ""
+    protocol = "foxglove.sdk.v1" if attack.endpoint == "page" else ""
     socks = []
     for _ in range(count):
         sock = connect(port, token, protocol)

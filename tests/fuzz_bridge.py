@@ -240,7 +240,7 @@ class Target:
         from minirospy import Node
         from minirospy.runtime.master.master import Master
         from minirospy.web.bridge import Bridge, BridgeOptions
-        from minirospy.web.rosbridge.door import RosbridgeOptions
+        from minirospy.web.rosbridge.endpoint import RosbridgeOptions
 
         master = Master()
         await master.start()

@@ -1,4 +1,4 @@
-"""A node in an event loop: its life, and the doors to its topics, services, parameters and time."""
+"""A node in an event loop: its lifetime, and access to its topics, services, parameters and time."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ def _bridge(
     from minirospy.web.access import Access, is_loopback
     from minirospy.web.addresses import host_names
     from minirospy.web.bridge import Bridge, BridgeOptions
-    from minirospy.web.foxglove.door import CAPABILITIES
+    from minirospy.web.foxglove.endpoint import CAPABILITIES
     from minirospy.web.graph import Filters
     from minirospy.web.serve import run
     from minirospy.web.server.connection import Limits

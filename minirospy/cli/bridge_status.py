@@ -62,23 +62,23 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
 
 def _print_bridge(found: _Json) -> None:
     print(f"node [{found['node']}], for {found['seconds']:.0f} s")
-    for name, door in found["doors"].items():
-        url = _url(_SCHEMES.get(name, "ws"), door)
-        refused = f", {door['refused']} refused" if door["refused"] else ""
-        print(f"{name}: {url}, {door['connections']} connections{refused}")
-    if "video" not in found["doors"]:
-        print(f"video: {', '.join(_url('http', door) for door in found['doors'].values())}")
+    for name, endpoint in found["endpoints"].items():
+        url = _url(_SCHEMES.get(name, "ws"), endpoint)
+        refused = f", {endpoint['refused']} refused" if endpoint["refused"] else ""
+        print(f"{name}: {url}, {endpoint['connections']} connections{refused}")
+    if "video" not in found["endpoints"]:
+        print(f"video: {', '.join(_url('http', endpoint) for endpoint in found['endpoints'].values())}")
     print(f"{len(found['topics'])} topics subscribed")
     for client in found["clients"]:
         print(
-            f" * {client['address']} ({client['door']}, {client['rights']}, {client['seconds']:.0f} s): "
+            f" * {client['address']} ({client['endpoint']}, {client['rights']}, {client['seconds']:.0f} s): "
             f"{client['sent']} messages sent ({_size(client['sent_bytes'])}), {client['dropped']} dropped, "
             f"{client['waiting']} waiting ({_size(client['waiting_bytes'])}), {client['received']} received"
         )
 
 
-def _url(scheme: str, door: _Json) -> str:
-    return f"{scheme}{'s' if door['encrypted'] else ''}://{door['address']}:{door['port']}"
+def _url(scheme: str, endpoint: _Json) -> str:
+    return f"{scheme}{'s' if endpoint['encrypted'] else ''}://{endpoint['address']}:{endpoint['port']}"
 
 
 def _token(given: str) -> _Token:

@@ -1,4 +1,4 @@
-"""The bridge as a whole: the shared graph, its doors and their listeners, their state and their diagnostics."""
+"""The bridge as a whole: the shared graph, its endpoints and their listeners, their state and their diagnostics."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from minirospy.base.errors import BridgeError
 from minirospy.introspect.snapshot import fetch
 from minirospy.web.access import Access
 from minirospy.web.foxglove.assets import ALLOWED, Assets
-from minirospy.web.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
+from minirospy.web.foxglove.endpoint import CAPABILITIES, FoxgloveEndpoint, FoxgloveOptions, Playback
 from minirospy.web.graph import Filters, SharedGraph
 from minirospy.web.rosbridge.client_topics import ClientTopics
-from minirospy.web.rosbridge.door import RosbridgeDoor, RosbridgeOptions
+from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint, RosbridgeOptions
 from minirospy.web.server.account import Account
-from minirospy.web.server.connection import Door, Exchange, HttpHandler, Limits
+from minirospy.web.server.connection import Endpoint, Exchange, HttpHandler, Limits
 from minirospy.web.server.listener import Listener
 from minirospy.web.server.pipe import tls_context
 from minirospy.web.video.pages import VideoPages
@@ -81,7 +81,7 @@ class BridgeOptions:
 class Addition:
     """What the listener of the Foxglove protocol serves in addition; ``pages`` are public: they need no token."""
 
-    doors: Sequence[Door] = ()
+    endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)
 
 
@@ -103,7 +103,7 @@ class Bridge:
             slowest_look=self.options.slowest_look,
             clock=playback.now if playback else None,
         )
-        self.foxglove = FoxgloveDoor(
+        self.foxglove = FoxgloveEndpoint(
             self.graph,
             Assets(Packages(), self.options.assets),
             FoxgloveOptions(
@@ -115,7 +115,7 @@ class Bridge:
             playback,
         )
         client_topics = ClientTopics(node)
-        self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge, client_topics.changed)
+        self.rosbridge = RosbridgeEndpoint(self.graph, self.options.rosbridge, client_topics.changed)
         self._video = VideoPages(self.graph)
         self._beside: list[ClientTopics | Rosapi | Republisher] = []
         if self.options.rosbridge_port is not None:
@@ -129,25 +129,29 @@ class Bridge:
     async def start(self) -> None:
         """Listen. Raises BridgeError."""
         tls = self._tls()
-        served: list[tuple[str, list[Door], int | None]] = [
-            ("foxglove", [self.foxglove, *self._addition.doors], self.options.foxglove_port),
+        served: list[tuple[str, list[Endpoint], int | None]] = [
+            ("foxglove", [self.foxglove, *self._addition.endpoints], self.options.foxglove_port),
             ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
             ("video", [], self.options.video_port),
         ]
-        for name, doors, port in served:
+        for name, endpoints, port in served:
             if port is not None:
                 public = self._addition.pages if name == "foxglove" else {}
-                self.listeners[name] = await self._listen(doors, port, tls, public)
+                self.listeners[name] = await self._listen(endpoints, port, tls, public)
         await self._start_beside()
         if self.options.diagnostics:
             self._reporting = asyncio.ensure_future(self._report())
 
     async def _listen(
-        self, doors: list[Door], port: int, tls: ssl.SSLContext | None, public: Mapping[str, HttpHandler]
+        self,
+        endpoints: list[Endpoint],
+        port: int,
+        tls: ssl.SSLContext | None,
+        public: Mapping[str, HttpHandler],
     ) -> Listener:
         """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
         listener = Listener(
-            doors,
+            endpoints,
             self.options.access,
             limits=self.options.limits,
             pages={**self._video.handlers, "/status": self._status_page},
@@ -192,13 +196,13 @@ class Bridge:
     def status(self) -> dict[str, object]:
         """Return what the bridge serves and to whom, as JSON has it."""
         clients = []
-        for door, listener in self.listeners.items():
+        for endpoint, listener in self.listeners.items():
             for connection in listener.connections:
                 if connection.client:
                     queue = connection.queue
                     clients.append(
                         {
-                            "door": door,
+                            "endpoint": endpoint,
                             "address": connection.peer,
                             "protocol": connection.client.subprotocol or "",
                             "rights": connection.client.grant.value,
@@ -217,15 +221,15 @@ class Bridge:
         return {
             "node": self.node.name,
             "seconds": round(time.monotonic() - self._started, 1),
-            "doors": {
-                door: {
+            "endpoints": {
+                endpoint: {
                     "address": listener.host,
                     "port": listener.port,
                     "encrypted": listener.is_encrypted,
                     "connections": len(listener.connections),
                     "refused": listener.refused,
                 }
-                for door, listener in self.listeners.items()
+                for endpoint, listener in self.listeners.items()
             },
             "topics": {
                 topic: {"received": shared.received, "received_bytes": shared.received_bytes}
@@ -265,7 +269,7 @@ class Bridge:
             dropped: dict[str, int] = {}
             array = DiagnosticArray()
             array.header.stamp = self.node.now()
-            for door, listener in self.listeners.items():
+            for endpoint, listener in self.listeners.items():
                 for connection in listener.connections:
                     if not connection.client:
                         continue
@@ -282,7 +286,7 @@ class Bridge:
                     array.status.append(
                         DiagnosticStatus(
                             level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
-                            name=f"{self.node.name.lstrip('/')}: {door} client {connection.peer}",
+                            name=f"{self.node.name.lstrip('/')}: {endpoint} client {connection.peer}",
                             message=f"{lost} messages dropped in a second" if lost else "all messages sent",
                             hardware_id=connection.peer,
                             values=[KeyValue(key, str(value)) for key, value in values.items()],

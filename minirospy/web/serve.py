@@ -90,9 +90,9 @@ def exit_status(name: str, body: Callable[[], int]) -> int:
         return 1
 
 
-def announce(bridge: Bridge, door: str, text: str, scheme: str = "ws") -> None:
-    """Log where a door is, and whether it needs a token."""
-    listener = bridge.listeners[door]
+def announce(bridge: Bridge, endpoint: str, text: str, scheme: str = "ws") -> None:
+    """Log where an endpoint is, and whether it needs a token."""
+    listener = bridge.listeners[endpoint]
     scheme += "s" if listener.is_encrypted else ""
     bridge.node.log.info("%s %s://%s:%d", text, scheme, listener.host, listener.port)
     if bridge.options.access.requires_token:

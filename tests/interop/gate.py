@@ -48,13 +48,13 @@ class Gate:
 
 
 @contextlib.asynccontextmanager
-async def serving(gate: Gate, door: str, **options: Any) -> AsyncIterator[Bridge]:
-    """Run a bridge, whose ``door`` is behind the gate meanwhile."""
+async def serving(gate: Gate, endpoint: str, **options: Any) -> AsyncIterator[Bridge]:
+    """Run a bridge, whose ``endpoint`` is behind the gate meanwhile."""
     async with Node("bridge", rosout=False) as node:
         bridge = Bridge(node, BridgeOptions(foxglove_port=0, rosbridge_port=0, diagnostics=False, **options))
         try:
             await bridge.start()
-            gate.target = bridge.listeners[door].port
+            gate.target = bridge.listeners[endpoint].port
             yield bridge
         finally:
             gate.target = None

@@ -27,20 +27,20 @@ const link = { address: () => "", protocols: () => [] };
 
 
 @needs_node
-def test_click_while_a_door_is_not_connected_is_reported_not_lost_in_silence() -> None:
+def test_click_while_a_endpoint_is_not_connected_is_reported_not_lost_in_silence() -> None:
     found = run_script(
-        "Door",
-        "js/door.js",
+        "Endpoint",
+        "js/endpoint.js",
         f"""{FAKE_SOCKET}
         const said = [];
-        const door = new Door(link, "x", {{ error: (text) => said.push(text) }});
-        door.send({{ op: "start" }});
+        const endpoint = new Endpoint(link, "x", {{ error: (text) => said.push(text) }});
+        endpoint.send({{ op: "start" }});
         const early = said.length;
         socket.readyState = 1;
-        door.send({{ op: "start" }});
+        endpoint.send({{ op: "start" }});
         const sent = socket.sent.length;
-        door.close();
-        door.send({{ op: "start" }});
+        endpoint.close();
+        endpoint.send({{ op: "start" }});
         return {{ early, sent, said }};""",
     )
     assert found["early"] == 1

@@ -118,7 +118,7 @@ def test_listening_bridge_requires_the_token_that_it_prints(
 
 
 def test_status_is_also_json(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    port = start("bridge", "--port", "0", "--name", "door").port
+    port = start("bridge", "--port", "0", "--name", "endpoint").port
     assert command.main(["--status", "--json", "--port", str(port)]) == 0
     assert json.loads(capsys.readouterr().out)["node"] == "/door"
 
@@ -139,7 +139,7 @@ def test_status_lists_all_ports_of_a_bridge(start: Start, capsys: pytest.Capture
         assert len(lines) == 5
     assert command.main(["--status", "--json", "--port", str(port), "--rosbridge-port", other]) == 0
     (status,) = json.loads(capsys.readouterr().out)
-    assert sorted(status["doors"]) == ["foxglove", "rosbridge"]
+    assert sorted(status["endpoints"]) == ["foxglove", "rosbridge"]
 
 
 def test_status_shows_what_answers_and_names_what_refuses(

@@ -32,7 +32,7 @@ from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
 from minirospy.web.rosbridge import png, protocol
-from minirospy.web.rosbridge.door import RosbridgeOptions
+from minirospy.web.rosbridge.endpoint import RosbridgeOptions
 from tests.waiting import until, wait_until
 
 if TYPE_CHECKING:

@@ -519,10 +519,10 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
         handled.append(text)
         loop.now += 0.004
 
-    door = Mock()
-    door.select.return_value = "foxglove.sdk.v1"
-    door.open.return_value.received_text = handle
-    site.doors = [door]
+    endpoint = Mock()
+    endpoint.select.return_value = "foxglove.sdk.v1"
+    endpoint.open.return_value.received_text = handle
+    site.endpoints = [endpoint]
     connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
     connection.received(HANDSHAKE.encode())
     pipe.resume.reset_mock()
@@ -560,9 +560,9 @@ def connected(
     site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = grant
     site.admit.return_value = None
-    door = Mock()
-    door.select.return_value = "foxglove.sdk.v1"
-    site.doors = [door]
+    endpoint = Mock()
+    endpoint.select.return_value = "foxglove.sdk.v1"
+    site.endpoints = [endpoint]
     connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
     connection.received(HANDSHAKE.encode())
     loop.iterate()
@@ -702,9 +702,9 @@ def test_clients_are_pinged_before_they_are_disconnected() -> None:
     site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
     site.admit.return_value = None
-    door = Mock()
-    door.select.return_value = "foxglove.sdk.v1"
-    site.doors = [door]
+    endpoint = Mock()
+    endpoint.select.return_value = "foxglove.sdk.v1"
+    site.endpoints = [endpoint]
     connection = Connection(site, pipe, "127.0.0.1", loop)  # type: ignore[arg-type]
     connection.received(HANDSHAKE.encode())
     loop.iterate()

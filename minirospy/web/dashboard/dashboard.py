@@ -1,4 +1,4 @@
-"""The dashboard as a whole: a bridge at one port, with the page and its doors in it."""
+"""The dashboard as a whole: a bridge at one port, with the page and its endpoints in it."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from pathlib import Path
 
 from minirospy.aio.node import Node
 from minirospy.web.bridge import Addition, Bridge, BridgeOptions
-from minirospy.web.dashboard.bag_door import BagDoor
+from minirospy.web.dashboard.bag_endpoint import BagEndpoint
 from minirospy.web.dashboard.bag_folder import BagFolder
-from minirospy.web.dashboard.board_door import BoardDoor
+from minirospy.web.dashboard.board_endpoint import BoardEndpoint
 from minirospy.web.dashboard.codes import Codes
-from minirospy.web.dashboard.drive_door import DriveDoor
+from minirospy.web.dashboard.drive_endpoint import DriveEndpoint
 from minirospy.web.dashboard.files import handlers, read_folder
-from minirospy.web.dashboard.joint_door import JointDoor
-from minirospy.web.dashboard.launch_door import LaunchDoor
-from minirospy.web.dashboard.rviz_door import RvizDoor
-from minirospy.web.dashboard.tools_door import ToolsDoor
+from minirospy.web.dashboard.joint_endpoint import JointEndpoint
+from minirospy.web.dashboard.launch_endpoint import LaunchEndpoint
+from minirospy.web.dashboard.rviz_endpoint import RvizEndpoint
+from minirospy.web.dashboard.tools_endpoint import ToolsEndpoint
 
 __all__ = ["PORT", "Dashboard"]
 
@@ -42,17 +42,17 @@ class Dashboard:
         """
         master_uri = node._node.environment.master_uri
         self.codes = Codes()
-        self._board = BoardDoor()
-        self.rviz = RvizDoor(rviz_file)
-        self._tools = ToolsDoor(master_uri)
-        self._bags = BagDoor(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
-        self._launches = LaunchDoor(master_uri)
-        self._joints = JointDoor(node, lambda: self.bridge.graph, always_publishes=publishes_joints)
-        driving = DriveDoor(lambda: self.bridge.graph)
+        self._board = BoardEndpoint()
+        self.rviz = RvizEndpoint(rviz_file)
+        self._tools = ToolsEndpoint(master_uri)
+        self._bags = BagEndpoint(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
+        self._launches = LaunchEndpoint(master_uri)
+        self._joints = JointEndpoint(node, lambda: self.bridge.graph, always_publishes=publishes_joints)
+        driving = DriveEndpoint(lambda: self.bridge.graph)
         own = (self.rviz, self._bags, self._launches, self._joints)
-        doors = (self._board, self._tools, driving, *own)
+        endpoints = (self._board, self._tools, driving, *own)
         pages = {**handlers(read_folder()), "/token": self.codes.serve}
-        self.bridge = Bridge(node, options, addition=Addition(doors, pages))
+        self.bridge = Bridge(node, options, addition=Addition(endpoints, pages))
 
     @property
     def port(self) -> int:

@@ -1,4 +1,4 @@
-"""Sessions of the page's doors: operations of a client come in as JSON, answers go out as JSON.
+"""Sessions of the page's endpoints: operations of a client come in as JSON, answers go out as JSON.
 
 A text is an object that names its operation, ``{"op": NAME, ...}``. A client that may not carry it out, a text that is too long
 or is not an operation, and whatever goes wrong are answered with one line, ``{"error": text}``. Operations are carried out one
@@ -25,7 +25,7 @@ from minirospy.base.errors import MinirospyError
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
 
-__all__ = ["Fields", "Handler", "JsonDoor", "JsonSession", "number", "text_of", "texts_of", "wait_until"]
+__all__ = ["Fields", "Handler", "JsonEndpoint", "JsonSession", "number", "text_of", "texts_of", "wait_until"]
 
 _log = logging.getLogger(__name__)
 
@@ -251,7 +251,7 @@ class JsonSession:
 _S = TypeVar("_S", bound=JsonSession)
 
 
-class JsonDoor(Generic[_S]):
+class JsonEndpoint(Generic[_S]):
     """Opens a session for each client of a sub-protocol; ``session`` makes one."""
 
     def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:

@@ -14,7 +14,7 @@ from minirospy.base.errors import BridgeError
 from minirospy.base.name_filter import NameFilter
 from minirospy.web.bridge import FOXGLOVE_PORT, Bridge, BridgeOptions
 from minirospy.web.foxglove.assets import ALLOWED
-from minirospy.web.foxglove.door import CAPABILITIES
+from minirospy.web.foxglove.endpoint import CAPABILITIES
 from minirospy.web.graph import Filters
 from minirospy.web.node_parameters import access_of, address_of, private_parameters, texts, value
 from minirospy.web.serve import announce, exit_status, run

@@ -23,7 +23,7 @@ from minirospy.web.graph import Arrival, Publication
 from minirospy.web.server.files import FileAnswer
 
 if TYPE_CHECKING:
-    from minirospy.web.foxglove.door import FoxgloveDoor
+    from minirospy.web.foxglove.endpoint import FoxgloveEndpoint
     from minirospy.web.server.connection import WebClient
 
 __all__ = ["FoxgloveSession"]
@@ -50,11 +50,11 @@ _TIME = "time"
 class FoxgloveSession:
     """The state of one client; called by its connection, on the loop."""
 
-    def __init__(self, door: FoxgloveDoor, client: WebClient) -> None:
+    def __init__(self, endpoint: FoxgloveEndpoint, client: WebClient) -> None:
         self.client = client
         self.wants_graph = False
-        self._door = door
-        self._graph = door.graph
+        self._endpoint = endpoint
+        self._graph = endpoint.graph
         self._subscriptions: dict[int, tuple[Channel, Callable[[Arrival], None]]] = {}
         self._publications: dict[int, Publication] = {}
         self._calls: set[asyncio.Task[None]] = set()
@@ -106,10 +106,10 @@ class FoxgloveSession:
         self._publications.clear()
         for task in list(self._calls):
             task.cancel()
-        self._door.parameters.forget(self)
-        self._door.left(self)
+        self._endpoint.parameters.forget(self)
+        self._endpoint.left(self)
 
-    # --- from the door
+    # --- from the endpoint
 
     def send(self, text: str) -> None:
         """Send a JSON message."""
@@ -170,7 +170,7 @@ class FoxgloveSession:
 
     def _require(self, capability: str, doing: str) -> None:
         """Raise BridgeError where the client may not do this."""
-        if capability not in self._door.capabilities_of(self.client):
+        if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"
             )
@@ -198,7 +198,7 @@ class FoxgloveSession:
 
     def _subscribe(self, event: protocol.Subscribe) -> None:
         for subscription_id, channel_id in event.subscriptions:
-            channel = self._door.channels.by_id.get(channel_id)
+            channel = self._endpoint.channels.by_id.get(channel_id)
             if subscription_id in self._subscriptions:
                 self._status(
                     StatusLevel.ERROR,
@@ -213,7 +213,10 @@ class FoxgloveSession:
                 raise BridgeError(f"a client may have {_MAX_CHANNELS} subscriptions")
             else:
                 listener = partial(
-                    self._arrived, subscription_id, channel, self._door.channels.type_of(channel_id).md5sum
+                    self._arrived,
+                    subscription_id,
+                    channel,
+                    self._endpoint.channels.type_of(channel_id).md5sum,
                 )
                 self._subscriptions[subscription_id] = (channel, listener)
                 self._graph.subscribe(channel.topic, listener)
@@ -223,7 +226,7 @@ class FoxgloveSession:
             not channel.schema.text and md5sum == ANY
         ):
             # The text that the client decodes with does not fit this publisher.
-            self._door.definition_differs(channel, arrival.header)
+            self._endpoint.definition_differs(channel, arrival.header)
             return
         head = serializing.message_head(subscription_id, arrival.nanoseconds)
         self.client.send_message(subscription_id, head, arrival.body)
@@ -294,7 +297,7 @@ class FoxgloveSession:
 
     async def _send_parameters(self, names: tuple[str, ...], id_: str | None, *, lists_unset: bool) -> None:
         try:
-            found = await self._door.parameters.read(names)
+            found = await self._endpoint.parameters.read(names)
         except (MasterUnreachableError, RpcError) as error:
             self._status(StatusLevel.ERROR, f"parameters cannot be read: {error}")
             return
@@ -312,7 +315,7 @@ class FoxgloveSession:
         self._spawn(self._write_parameters(event))
 
     async def _write_parameters(self, event: protocol.SetParameters) -> None:
-        for why in await self._door.parameters.write(event.parameters):
+        for why in await self._endpoint.parameters.write(event.parameters):
             self._status(StatusLevel.ERROR, why)
         if event.id is not None:
             names = tuple(parameter.name for parameter in event.parameters)
@@ -321,19 +324,19 @@ class FoxgloveSession:
 
     def _subscribe_parameters(self, event: protocol.SubscribeParameterUpdates) -> None:
         self._require("parametersSubscribe", "subscribing to parameters")
-        if self._door.parameters.count(self) + len(event.names) > _MAX_PARAMETERS:
+        if self._endpoint.parameters.count(self) + len(event.names) > _MAX_PARAMETERS:
             raise BridgeError(
                 f"a client may subscribe to {_MAX_PARAMETERS} parameters, or to all without names"
             )
-        self._door.parameters.subscribe(self, event.names)
+        self._endpoint.parameters.subscribe(self, event.names)
 
     def _unsubscribe_parameters(self, event: protocol.UnsubscribeParameterUpdates) -> None:
-        self._door.parameters.unsubscribe(self, event.names)
+        self._endpoint.parameters.unsubscribe(self, event.names)
 
     def _subscribe_graph(self, _: protocol.SubscribeConnectionGraph) -> None:
         self._require("connectionGraph", "subscribing to the graph")
         self.wants_graph = True
-        self._door.send_graph(self)
+        self._endpoint.send_graph(self)
 
     def _unsubscribe_graph(self, _: protocol.UnsubscribeConnectionGraph) -> None:
         if not self.wants_graph:
@@ -348,7 +351,7 @@ class FoxgloveSession:
             return
         self.client.send_file(
             FileAnswer(
-                partial(self._door.assets.open, event.uri),
+                partial(self._endpoint.assets.open, event.uri),
                 lambda _: serializing.asset_head(event.request_id),
                 partial(serializing.asset_failure, event.request_id),
             )
@@ -357,7 +360,7 @@ class FoxgloveSession:
     def _call_service(self, event: protocol.ServiceRequest) -> None:
         try:
             self._require("services", "calling services")
-            info = self._door.services.infos.get(event.service_id)
+            info = self._endpoint.services.infos.get(event.service_id)
             if info is None:
                 raise BridgeError(f"Service with id {event.service_id} does not exist")
             if event.encoding != protocol.MESSAGE_ENCODING:
@@ -387,6 +390,6 @@ class FoxgloveSession:
 
     def _control_playback(self, event: protocol.PlaybackControl) -> None:
         self._require("playbackControl", "controlling the player")
-        assert self._door.playback
-        self._door.playback.control(event)
-        self._door.playback_changed(self._door.playback.state())
+        assert self._endpoint.playback
+        self._endpoint.playback.control(event)
+        self._endpoint.playback_changed(self._endpoint.playback.state())

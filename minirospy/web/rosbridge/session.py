@@ -34,7 +34,7 @@ from minirospy.web.rosbridge.topic import MAX_IDS, ClientTopic
 from minirospy.web.rosbridge.types import message_class
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.door import RosbridgeDoor
+    from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
     from minirospy.web.server.connection import WebClient
 
 __all__ = ["RosbridgeSession"]
@@ -92,16 +92,16 @@ class RosbridgeSession:
     new topic), those behind it wait, except for calls of services.
     """
 
-    def __init__(self, door: RosbridgeDoor, client: WebClient) -> None:
+    def __init__(self, endpoint: RosbridgeEndpoint, client: WebClient) -> None:
         self.client = client
-        self.connected = door.graph.node.now()
+        self.connected = endpoint.graph.node.now()
         self.room = Room()
         """For messages of topics whose rate the client limits."""
-        self._door = door
-        self._graph = door.graph
+        self._endpoint = endpoint
+        self._graph = endpoint.graph
         self._level = StatusLevel.ERROR
-        self._is_authenticated = not door.options.authenticate
-        self._fragments = Fragments(door.options.fragment_timeout)
+        self._is_authenticated = not endpoint.options.authenticate
+        self._fragments = Fragments(endpoint.options.fragment_timeout)
 
         self._subscribed: dict[str, ClientTopic] = {}
         self._published: dict[str, _Published] = {}
@@ -156,15 +156,15 @@ class RosbridgeSession:
         for published in self._published.values():
             self._release(published)
         self._published.clear()
-        for name, service in list(self._door.services.items()):
+        for name, service in list(self._endpoint.services.items()):
             if service.session is self:
-                self._door.close_service(service, f"the client that offers {name} has disconnected")
+                self._endpoint.close_service(service, f"the client that offers {name} has disconnected")
         # The session is part of reference cycles: what it keeps is freed now, not when they are collected.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):
             task.cancel()
-        self._door.left(self)
+        self._endpoint.left(self)
 
     # --- for services and topics
 
@@ -176,7 +176,7 @@ class RosbridgeSession:
         if isinstance(data, bytes):
             self.client.send_binary(data)
             return
-        size = fragment_size or self._door.options.fragment_size
+        size = fragment_size or self._endpoint.options.fragment_size
         id_ = fields.get("id")
         for text in protocol.fragments(data, size, id_) if size else (data,):  # type: ignore[arg-type]
             self.client.send_text(text)
@@ -187,7 +187,7 @@ class RosbridgeSession:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
             shown = text if id_ is None else f"[id: {id_}] {text}"
-            self._door.log.warning("[Client %s] %s", self.client.name, shown)
+            self._endpoint.log.warning("[Client %s] %s", self.client.name, shown)
 
     # --- one operation after the other
 
@@ -257,7 +257,7 @@ class RosbridgeSession:
 
     async def _carry_out_large(self, data: str | bytes) -> None:
         try:
-            event = await self._door.in_thread(lambda: protocol.parse(protocol.decode_in_pieces(data)))
+            event = await self._endpoint.in_thread(lambda: protocol.parse(protocol.decode_in_pieces(data)))
         except BridgeError as error:
             self._unreadable(error)
             return
@@ -281,7 +281,9 @@ class RosbridgeSession:
 
     def _carry_out(self, event: Event) -> _Pending | None:
         if not self._is_authenticated and not isinstance(event, protocol.Auth):
-            self._door.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+            self._endpoint.log.warning(
+                "Client %s did not authenticate. Closing connection.", self.client.name
+            )
             self.client.close(_POLICY, "authentication is required first")
             return None
         try:
@@ -340,7 +342,7 @@ class RosbridgeSession:
         if published.latched > _LARGE_LATCHED:
             published.publication.close()
         else:
-            self._door.release(published.publication)
+            self._endpoint.release(published.publication)
 
     def _publish(self, event: protocol.Publish) -> _Work | None:
         if not self._is_allowed("topics", event.topic, "topic, cancelling publish to"):
@@ -370,7 +372,7 @@ class RosbridgeSession:
         return self._publish_when_joined(published.publication, body)
 
     async def _publish_large(self, published: _Published, event: protocol.Publish) -> None:
-        body = await self._door.in_thread(lambda: self._body(published, event))
+        body = await self._endpoint.in_thread(lambda: self._body(published, event))
         self._count_latched(published, body)
         await self._publish_when_joined(published.publication, body)
 
@@ -449,7 +451,7 @@ class RosbridgeSession:
         if topic is None:
             if len(self._subscribed) >= _MAX_TOPICS:
                 raise BridgeError(f"a client may subscribe to {_MAX_TOPICS} topics")
-            topic = self._subscribed[event.topic] = ClientTopic(self, self._door, event.topic)
+            topic = self._subscribed[event.topic] = ClientTopic(self, self._endpoint, event.topic)
         topic.add(event)
         self.status(StatusLevel.INFO, f"Subscribed to {event.topic}", event.id)
 
@@ -497,13 +499,15 @@ class RosbridgeSession:
         try:
             self._require_write("calling services")
             _check_name("service", event.service)
-            in_thread = self._door.in_thread if is_large else None
+            in_thread = self._endpoint.in_thread if is_large else None
             response = await call(self._graph, event.service, event.arguments, in_thread)
             values: object = conversion.values(response)
             result = True
         except _REFUSALS as error:
             values, result = str(error), False
-            self._door.log.warning("[Client %s] call_service %s: %s", self.client.name, event.service, error)
+            self._endpoint.log.warning(
+                "[Client %s] call_service %s: %s", self.client.name, event.service, error
+            )
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
             values, result = "the bridge failed on this call", False
             self._faults.report(error)
@@ -515,17 +519,17 @@ class RosbridgeSession:
             return None
         self._require_write("offering services")
         _check_name("service", event.service)
-        if sum(each.session is self for each in self._door.services.values()) >= _MAX_SERVICES:
+        if sum(each.session is self for each in self._endpoint.services.values()) >= _MAX_SERVICES:
             raise BridgeError(f"a client may offer {_MAX_SERVICES} services")
         return self._offer(event)
 
     async def _offer(self, event: protocol.AdvertiseService) -> None:
-        if event.service in self._door.services:
+        if event.service in self._endpoint.services:
             self.status(
                 StatusLevel.WARNING, f"Duplicate service advertised. Overwriting {event.service}.", event.id
             )
-        await self._door.free_service(event.service, "Duplicate advertiser.")
-        self._door.services[event.service] = ClientService(self, self._graph, event.service, event.type)
+        await self._endpoint.free_service(event.service, "Duplicate advertiser.")
+        self._endpoint.services[event.service] = ClientService(self, self._graph, event.service, event.type)
         self.status(StatusLevel.INFO, f"Advertised service {event.service}.", event.id)
 
     def _unadvertise_service(self, event: protocol.UnadvertiseService) -> _Work:
@@ -535,7 +539,7 @@ class RosbridgeSession:
                 f"Service {event.service} has not been advertised via rosbridge, can't unadvertise.", event.id
             )
         why = f"Service {event.service} was unadvertised with a service call in progress"
-        closing = self._door.close_service(service, why)
+        closing = self._endpoint.close_service(service, why)
         self.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
         return _ended(closing)
 
@@ -544,12 +548,12 @@ class RosbridgeSession:
         if service is None:
             raise OperationError(f"Service {event.service} has not been advertised via rosbridge.", event.id)
         if self._is_large:
-            return service.answered_large(event, self._door.in_thread)
+            return service.answered_large(event, self._endpoint.in_thread)
         service.answered(event)
         return None
 
     def _own_service(self, name: str) -> ClientService | None:
-        service = self._door.services.get(name)
+        service = self._endpoint.services.get(name)
         return service if service and service.session is self else None
 
     # --- the others
@@ -570,7 +574,7 @@ class RosbridgeSession:
         if await authenticate(self._graph.node, event):
             self._is_authenticated = True
             return
-        self._door.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+        self._endpoint.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
         self.client.close(_POLICY, "not authenticated")
 
     def _is_allowed(self, kind: str, name: str, what: str) -> bool:

@@ -12,7 +12,7 @@ from minirospy.web.rosbridge.protocol import StatusLevel
 from minirospy.web.rosbridge.subscription import Merged, Pacer, merge
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.door import RosbridgeDoor
+    from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
     from minirospy.web.rosbridge.session import RosbridgeSession
 
 __all__ = ["MAX_IDS", "ClientTopic"]
@@ -24,11 +24,11 @@ MAX_IDS = 100
 class ClientTopic:
     """One subscription to the graph, for all of a client to one topic."""
 
-    def __init__(self, session: RosbridgeSession, door: RosbridgeDoor, name: str) -> None:
+    def __init__(self, session: RosbridgeSession, endpoint: RosbridgeEndpoint, name: str) -> None:
         self.name = name
         self._session = session
-        self._door = door
-        self._topic = door.graph.node.resolve(name)
+        self._endpoint = endpoint
+        self._topic = endpoint.graph.node.resolve(name)
         self._subscriptions: dict[object, protocol.Subscribe] = {}
         self._merged: Merged | None = None
         self._pacer: Pacer[Arrival] = Pacer(session.room, lambda arrival: len(arrival.body))
@@ -48,10 +48,10 @@ class ClientTopic:
             raise BridgeError(f"a client may subscribe to a topic {MAX_IDS} times")
         self._subscriptions[event.id] = event
         self._update()
-        self._door.graph.subscribe(self._topic, self._arrived)
+        self._endpoint.graph.subscribe(self._topic, self._arrived)
         if not is_first:
             # It was subscribed to once more for the sake of latched messages, which each subscription gets.
-            self._door.graph.unsubscribe(self._topic, self._arrived)
+            self._endpoint.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
         """Remove a subscription, without an id all."""
@@ -65,8 +65,8 @@ class ClientTopic:
     def close(self) -> None:
         """Unsubscribe."""
         self._is_closed = True
-        self._door.graph.unsubscribe(self._topic, self._arrived)
-        self._door.forget_topic(self.name)
+        self._endpoint.graph.unsubscribe(self._topic, self._arrived)
+        self._endpoint.forget_topic(self.name)
         self._session.client.discard(self.name)
         self._pacer.clear()
         if self._timer:
@@ -107,8 +107,8 @@ class ClientTopic:
         assert self._merged
         compression = self._merged.compression
         try:
-            class_ = None if compression == "cbor-raw" else self._door.class_of(arrival)
-            data = self._door.encoded(self.name, class_, arrival, compression)
+            class_ = None if compression == "cbor-raw" else self._endpoint.class_of(arrival)
+            data = self._endpoint.encoded(self.name, class_, arrival, compression)
         except BridgeError as error:
             if str(error) not in self._reported and len(self._reported) < 10:
                 self._reported.add(str(error))
@@ -116,7 +116,7 @@ class ClientTopic:
             return
 
         client, newest_only = self._session.client, self._merged.queue_length == 1
-        size = self._merged.fragment_size or self._door.options.fragment_size
+        size = self._merged.fragment_size or self._endpoint.options.fragment_size
         if compression.startswith("cbor"):
             client.send_message(self.name, b"", data, newest_only=newest_only)
         elif size and len(data) > size:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PLAIN_HEADERS",
-    "Door",
+    "Endpoint",
     "Exchange",
     "HttpHandler",
     "HttpRequest",
@@ -97,7 +97,7 @@ class Session(Protocol):
     def ended(self) -> None: ...
 
 
-class Door(Protocol):
+class Endpoint(Protocol):
     """A protocol over WebSocket."""
 
     def select(self, offered: Sequence[str]) -> str | None:
@@ -117,7 +117,7 @@ class Site(Protocol):
     def limits(self) -> Limits: ...
 
     @property
-    def doors(self) -> Sequence[Door]: ...
+    def endpoints(self) -> Sequence[Endpoint]: ...
 
     @property
     def turns(self) -> FairTurns: ...

@@ -28,7 +28,7 @@ from minirospy.web.json_text import size_in_memory
 from minirospy.web.server.admission import Rank
 from minirospy.web.server.client import (
     PLAIN_HEADERS,
-    Door,
+    Endpoint,
     Exchange,
     HttpHandler,
     HttpRequest,
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Connection",
-    "Door",
+    "Endpoint",
     "Exchange",
     "HttpHandler",
     "HttpRequest",
@@ -108,7 +108,7 @@ class Connection:
             logger=_QUIET,
         )
         self._turn = site.turns.join(self._work)
-        self._door: Door | None = None
+        self._endpoint: Endpoint | None = None
         self._fragments = bytearray()
         self._is_held_back = False
         # The client has sent as many frames as it may in this second.
@@ -376,7 +376,7 @@ class Connection:
             return
 
         response = self._protocol.accept(request)
-        if response.status_code != http.HTTPStatus.SWITCHING_PROTOCOLS or self._door is None:
+        if response.status_code != http.HTTPStatus.SWITCHING_PROTOCOLS or self._endpoint is None:
             text = bytes(response.body or b"").decode(errors="replace").strip().partition(": ")[2]
             self._refuse(Refusal(response.status_code, text or "not a WebSocket request"))
             return
@@ -388,7 +388,7 @@ class Connection:
         if not self.client.may_write:
             self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
         self._watch(self._ping)
-        self.session = self._door.open(self.client)
+        self.session = self._endpoint.open(self.client)
 
     def _admitted(self, request: Request) -> tuple[HttpRequest, Grant, bool] | Refusal:
         """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
@@ -419,13 +419,13 @@ class Connection:
     def _select(self, offered: Sequence[Subprotocol]) -> Subprotocol | None:
         names = [name for name in offered if not name.startswith(TOKEN_PROTOCOL)]
         why = "nothing is served here"
-        for door in self._site.doors:
+        for endpoint in self._site.endpoints:
             try:
-                chosen = door.select(names)
+                chosen = endpoint.select(names)
             except LookupError as error:
                 why = str(error.args[0])
                 continue
-            self._door = door
+            self._endpoint = endpoint
             return chosen  # type: ignore[return-value]
         raise NegotiationError(why)
 

@@ -19,7 +19,7 @@ from minirospy.web.access import Access, Credentials, Grant, Refusal
 from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank, displaced, rank_of
 from minirospy.web.server.client import PLAIN_HEADERS, response_head
-from minirospy.web.server.connection import Connection, Door, HttpHandler, Limits
+from minirospy.web.server.connection import Connection, Endpoint, HttpHandler, Limits
 from minirospy.web.server.owners import is_own_user
 from minirospy.web.server.pipe import PipeEvents, PlainPipe, TlsPipe
 from minirospy.web.server.rate import ConnectionRate
@@ -48,11 +48,11 @@ _TOO_OFTEN = _refusal(429, 1, "too many new connections from this address: wait 
 
 
 class Listener:
-    """Serves doors (protocols over WebSocket) and pages (HTTP) at one port."""
+    """Serves endpoints (protocols over WebSocket) and pages (HTTP) at one port."""
 
     def __init__(
         self,
-        doors: Sequence[Door],
+        endpoints: Sequence[Endpoint],
         access: Access,
         *,
         limits: Limits | None = None,
@@ -63,7 +63,7 @@ class Listener:
         on_change: Callable[[int], object] = lambda _: None,
     ) -> None:
         """``pages``: path -> what answers it; ``public_pages`` need no token. ``on_change`` gets the number of connections."""
-        self.doors = doors
+        self.endpoints = endpoints
         self.limits = limits or Limits()
         self.connections: set[Connection] = set()
         self.refused = 0

@@ -16,7 +16,7 @@ from minirospy.web.dashboard import json_session
 from minirospy.web.dashboard.json_session import (
     Fields,
     Handler,
-    JsonDoor,
+    JsonEndpoint,
     JsonSession,
     number,
     text_of,
@@ -113,9 +113,9 @@ def run(work: Coroutine[object, object, None]) -> None:
     asyncio.run(asyncio.wait_for(work, 60))
 
 
-def opened(client: Client) -> tuple[JsonDoor[Session], Session]:
-    door = JsonDoor("toys.v1", Session)
-    return door, door.open(cast("WebClient", client))
+def opened(client: Client) -> tuple[JsonEndpoint[Session], Session]:
+    endpoint = JsonEndpoint("toys.v1", Session)
+    return endpoint, endpoint.open(cast("WebClient", client))
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def opened(client: Client) -> tuple[JsonDoor[Session], Session]:
 def test_operation_that_fails_is_one_line_and_the_next_one_works(how: str, text: str) -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         session.received_text(json.dumps({"op": "fail", "how": how}))
         session.received_text('{"op": "say"}')
         session.received_text('{"op": "say", "text": "hello"}')
@@ -141,7 +141,7 @@ def test_operation_that_fails_is_one_line_and_the_next_one_works(how: str, text:
             {"error": "not an operation on toys: say: text is missing"},
             {"said": "hello"},
         ]
-        await door.close()
+        await endpoint.close()
 
     run(work())
 
@@ -163,13 +163,13 @@ def test_operation_that_fails_is_one_line_and_the_next_one_works(how: str, text:
 def test_text_that_is_no_operation_is_refused_with_one_line(text: str) -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         session.received_text(text)
         (error,) = client.sent
         assert error["error"].startswith("not an operation on toys: ")
         assert "\n" not in error["error"]
         assert len(error["error"]) < 200
-        await door.close()
+        await endpoint.close()
 
     run(work())
 
@@ -177,14 +177,14 @@ def test_text_that_is_no_operation_is_refused_with_one_line(text: str) -> None:
 def test_operation_that_is_too_long_is_not_parsed() -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         session.received_text(json.dumps({"op": "say", "text": "x" * 1000}))
         session.received_binary(b"x")
         assert client.sent == [
             {"error": "an operation on toys has 1000 characters at most"},
             {"error": "binary messages have no meaning here"},
         ]
-        await door.close()
+        await endpoint.close()
 
     run(work())
 
@@ -192,7 +192,7 @@ def test_operation_that_is_too_long_is_not_parsed() -> None:
 def test_operations_that_wait_are_limited() -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         session.received_text('{"op": "block"}')
         await client.until(1)
         await until(lambda: not session._operations)
@@ -201,7 +201,7 @@ def test_operations_that_wait_are_limited() -> None:
         assert [*map(list, client.sent)] == [["writes"], ["error"], ["error"]]
         session.gate.set()
         assert (await client.until(6))[3:] == [{"said": "x"}] * 3
-        await door.close()
+        await endpoint.close()
 
     run(work())
 
@@ -209,7 +209,7 @@ def test_operations_that_wait_are_limited() -> None:
 def test_client_that_is_no_owner_gets_the_reason_and_nothing_else() -> None:
     async def work(loop: ManualLoop) -> None:
         client = Client(is_owner=False)
-        door, session = opened(client)
+        endpoint, session = opened(client)
         await client.until(2)
         session.received_text('{"op": "say", "text": "x"}')
         session.changed()
@@ -220,7 +220,7 @@ def test_client_that_is_no_owner_gets_the_reason_and_nothing_else() -> None:
             {"error": "you may not play"},
         ]
         assert session.follows == 0
-        closing = asyncio.ensure_future(door.close())
+        closing = asyncio.ensure_future(endpoint.close())
         await loop.advance(1.0)
         await closing
 
@@ -240,7 +240,7 @@ def test_look_that_fails_is_reported_once_and_repeated(
 ) -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         await client.until(1)
         session.fault = fault
         session.changed()
@@ -251,7 +251,7 @@ def test_look_that_fails_is_reported_once_and_repeated(
         session.fault, failed = None, session.follows
         await until(lambda: session.follows > failed)
         assert len(client.sent) == 2
-        await door.close()
+        await endpoint.close()
 
     with caplog.at_level(logging.ERROR):
         run(work())
@@ -261,28 +261,28 @@ def test_look_that_fails_is_reported_once_and_repeated(
 def test_session_is_left_once_however_often_it_is_ended() -> None:
     async def work() -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         session.received_text('{"op": "block"}')
         await client.until(1)
         session.ended()
         await session.leaving.wait()
         session.ended()
-        await door.close()
+        await endpoint.close()
         assert session.left_by == ["left"]
-        assert not door.sessions
+        assert not endpoint.sessions
         session.gate.set()
 
     run(work())
 
 
-def test_session_that_opens_after_the_end_of_its_door_ends() -> None:
+def test_session_that_opens_after_the_end_of_its_endpoint_ends() -> None:
     async def work() -> None:
-        door, _ = opened(Client())
-        await door.close()
-        late = door.open(cast("WebClient", Client()))
+        endpoint, _ = opened(Client())
+        await endpoint.close()
+        late = endpoint.open(cast("WebClient", Client()))
         await asyncio.wait([late._task])
         assert late.is_ended
-        assert not door.sessions
+        assert not endpoint.sessions
 
     run(work())
 
@@ -290,14 +290,14 @@ def test_session_that_opens_after_the_end_of_its_door_ends() -> None:
 def test_changes_of_any_thread_are_looked_at_no_faster_than_the_pace() -> None:
     async def work(loop: ManualLoop) -> None:
         client = Client()
-        door, session = opened(client)
+        endpoint, session = opened(client)
         await loop.advance(10.0)
         assert session.follows == 1
 
         def change() -> None:
             for _ in range(1000):
                 session.post_change()
-                door.post_change()
+                endpoint.post_change()
 
         # The first look is long ago; that at the next changes waits for the pace.
         for pause, looks in ((0.0, 2), (0.9, 2), (0.2, 3)):
@@ -305,7 +305,7 @@ def test_changes_of_any_thread_are_looked_at_no_faster_than_the_pace() -> None:
             await manual_loop.until(changing.done)
             await loop.advance(pause * session.pace)
             assert session.follows == looks
-        closing = asyncio.ensure_future(door.close())
+        closing = asyncio.ensure_future(endpoint.close())
         await loop.advance(1.0)
         await closing
 
@@ -330,7 +330,7 @@ def test_wait_ends_when_the_clock_has_passed_its_end(monkeypatch: pytest.MonkeyP
 
 def test_work_that_goes_on_is_waited_for_and_its_fault_logged(caplog: pytest.LogCaptureFixture) -> None:
     async def work() -> None:
-        door, _ = opened(Client())
+        endpoint, _ = opened(Client())
         done: list[int] = []
 
         async def slow() -> None:
@@ -338,8 +338,8 @@ def test_work_that_goes_on_is_waited_for_and_its_fault_logged(caplog: pytest.Log
             done.append(1)
             raise ZeroDivisionError("by nothing")
 
-        door.spawn(slow())
-        await door.close()
+        endpoint.spawn(slow())
+        await endpoint.close()
         assert done == [1]
 
     with caplog.at_level(logging.ERROR):

@@ -21,8 +21,8 @@ from websockets.typing import Subprotocol
 from minirospy.base.errors import RvizFileError
 from minirospy.cli import dashboard as command
 from minirospy.web.access import Access
-from minirospy.web.dashboard import rviz_door
-from minirospy.web.dashboard.rviz_door import SUBPROTOCOL, RvizDoor
+from minirospy.web.dashboard import rviz_endpoint
+from minirospy.web.dashboard.rviz_endpoint import SUBPROTOCOL, RvizEndpoint
 from minirospy.web.dashboard.rviz_file import format_rviz, parse_rviz
 from tests import manual_loop
 from tests.waiting import until
@@ -99,7 +99,7 @@ def test_text_that_is_not_a_file_of_rviz_is_refused(text: str, error: str) -> No
 
 @pytest.fixture
 def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[object], Any]]]:
-    """Return a function that opens the door of a dashboard with this file; what it returns sends an operation."""
+    """Return a function that opens the endpoint of a dashboard with this file; what it returns sends an operation."""
     sockets = ExitStack()
 
     def opening(file: Path | None, token: str = TOKEN, **options: Any) -> Callable[[object], Any]:
@@ -174,14 +174,14 @@ def test_operations_that_wait_are_limited() -> None:
     client = cast("WebClient", SimpleNamespace(send_text=sent.append, holds=lambda _: None))
 
     async def work() -> None:
-        door = RvizDoor()
-        session = door.open(client)
+        endpoint = RvizEndpoint()
+        session = endpoint.open(client)
         for _ in range(100):
             session.received_text('{"parse": "a: 1"}')
         await until(lambda: len(sent) >= 100)
         session.received_text('{"parse": "a: 1"}')
         await until(lambda: len(sent) >= 101)
-        await door.close()
+        await endpoint.close()
 
     asyncio.run(work())
     assert sum("too many operations" in each for each in sent) == 80
@@ -232,11 +232,11 @@ def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> N
     client = cast("WebClient", SimpleNamespace(send_text=sent.append, holds=lambda _: None, is_owner=True))
 
     async def work() -> None:
-        door = RvizDoor(file)
+        endpoint = RvizEndpoint(file)
         for config in configs:
-            door.open(client).received_text(json.dumps({"save": config}))
+            endpoint.open(client).received_text(json.dumps({"save": config}))
         await until(lambda: len(sent) >= len(configs))
-        await door.close()
+        await endpoint.close()
 
     asyncio.run(work())
     assert all(json.loads(each) == {"name": "my.rviz"} for each in sent), sent
@@ -248,11 +248,11 @@ def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
     client = cast("WebClient", SimpleNamespace(send_text=lambda _: None, holds=lambda _: None, is_owner=True))
 
     async def work() -> None:
-        door = RvizDoor(file)
-        door.open(client).received_text(json.dumps({"save": parse_rviz(FILE)}))
+        endpoint = RvizEndpoint(file)
+        endpoint.open(client).received_text(json.dumps({"save": parse_rviz(FILE)}))
         # At each turn of the loop: with a pause between two looks it may be saved already.
-        await manual_loop.until(lambda: door._tasks)
-        await door.close()
+        await manual_loop.until(lambda: endpoint._tasks)
+        await endpoint.close()
 
     asyncio.run(work())
     assert parse_rviz(file.read_text(encoding="utf-8")) == parse_rviz(FILE)
@@ -365,7 +365,7 @@ def test_operation_that_fails_is_answered(
     def fail(*_: object) -> str:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(rviz_door, "format_rviz", fail)
+    monkeypatch.setattr(rviz_endpoint, "format_rviz", fail)
     send = opened(None)
     failed = {"error": "the dashboard failed on this operation: ZeroDivisionError"}
     assert send({"format": {}}) == failed

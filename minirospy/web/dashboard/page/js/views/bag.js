@@ -1,7 +1,7 @@
 // Bags: topics recorded into the folder of the command, and a bag on a timeline, played without or with publishing it.
 
 import { bandwidth, fill, h, setText } from "../dom.js";
-import { Door } from "../door.js";
+import { Endpoint } from "../endpoint.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { decode } from "../ros1.js";
@@ -30,19 +30,19 @@ export class Bag {
     this.name = words.get("file") ?? "";
     this.problem = h("p", { class: "error", role: "alert" });
     this.files = h("select", { class: "grow", "aria-label": "Bag", onchange: () => this.choose(this.files.value) });
-    this.recorder = new Recorder(link, (fields) => this.door.send(fields));
-    this.player = new Player(link, (fields) => this.door.send(fields));
+    this.recorder = new Recorder(link, (fields) => this.endpoint.send(fields));
+    this.player = new Player(link, (fields) => this.endpoint.send(fields));
     this.empty = h("p", { class: "empty" });
     this.recordButton = h("button", { type: "button", "aria-expanded": "false", onclick: () => this.recorder.toggle(this.recordButton) }, h("span", { class: "dot" }), "Record …");
-    main.append(h("div", { class: "bar" }, this.files, h("button", { type: "button", title: "Look for bags again", "aria-label": "Look for bags again", onclick: () => this.door.send({ op: "list" }) }, "↻"), this.recordButton, this.recorder.status),
+    main.append(h("div", { class: "bar" }, this.files, h("button", { type: "button", title: "Look for bags again", "aria-label": "Look for bags again", onclick: () => this.endpoint.send({ op: "list" }) }, "↻"), this.recordButton, this.recorder.status),
       this.problem, this.recorder.element, this.player.element, this.empty);
     this.onKey = (event) => { if (place.isActive()) this.player.key(event); };
     addEventListener("keydown", this.onKey);
-    this.door = new Door(link, PROTOCOL, {
+    this.endpoint = new Endpoint(link, PROTOCOL, {
       opened: () => {
         this.say("");
-        this.door.send({ op: "list" });
-        if (this.name) this.door.send({ op: "open", name: this.name });
+        this.endpoint.send({ op: "list" });
+        if (this.name) this.endpoint.send({ op: "open", name: this.name });
       },
       closed: () => this.player.leave(),
       writes: (writes) => {
@@ -65,7 +65,7 @@ export class Bag {
 
   close() {
     removeEventListener("keydown", this.onKey);
-    this.door.close();
+    this.endpoint.close();
     this.recorder.close();
     this.player.close();
   }
@@ -89,7 +89,7 @@ export class Bag {
     this.say("");
     this.player.leave();
     if (name && !this.recorder.element.hidden && !this.recorder.isRecording) this.recorder.toggle(this.recordButton);
-    this.door.send(name ? { op: "open", name } : { op: "close" });
+    this.endpoint.send(name ? { op: "open", name } : { op: "close" });
   }
 }
 

@@ -1,7 +1,7 @@
 // The joints of robot_description: a slider for each that can be set; the server publishes joint_states, as joint_state_publisher_gui.
 
 import { h, setText } from "../dom.js";
-import { Door } from "../door.js";
+import { Endpoint } from "../endpoint.js";
 import { t } from "../texts.js";
 
 const PROTOCOL = "minirospy.joints.v1";
@@ -19,9 +19,9 @@ export class Joints {
       place.remember(this.inDegrees.checked ? { degrees: "1" } : {});
       for (const row of this.rows.values()) this.showRow(row);
     } });
-    const button = (text, op, title) => h("button", { type: "button", title, onclick: () => this.door.send({ op }) }, text);
+    const button = (text, op, title) => h("button", { type: "button", title, onclick: () => this.endpoint.send({ op }) }, text);
     this.buttons = [button("Center", "center", "All joints to their zeros"), button("Randomize", "randomize", "All joints anywhere between their limits")];
-    this.publishing = h("input", { type: "checkbox", onchange: () => this.door.send({ op: "publish", on: this.publishing.checked }) });
+    this.publishing = h("input", { type: "checkbox", onchange: () => this.endpoint.send({ op: "publish", on: this.publishing.checked }) });
     this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, this.publishText = h("span", {}, t("Publish")));
     this.problem = h("p", { class: "error", role: "alert" });
     this.warning = h("p", { class: "joint-warning" });
@@ -29,9 +29,9 @@ export class Joints {
     this.list = h("div", { class: "panel joints" });
     this.empty = h("p", { class: "empty" });
     main.append(h("div", { class: "bar" }, this.filter, h("label", {}, this.inDegrees, t("degrees")), this.buttons, this.publishLabel,
-      h("button", { type: "button", title: "Read robot_description again", "aria-label": "Read robot_description again", onclick: () => this.door.send({ op: "reload" }) }, "↻")),
+      h("button", { type: "button", title: "Read robot_description again", "aria-label": "Read robot_description again", onclick: () => this.endpoint.send({ op: "reload" }) }, "↻")),
     this.problem, this.warning, this.list, this.about, this.empty);
-    this.door = new Door(link, PROTOCOL, {
+    this.endpoint = new Endpoint(link, PROTOCOL, {
       writes: (writes) => {
         this.writes = writes;
         setText(this.problem, writes ? "" : t("This token is read-only: it sets no joints."));
@@ -47,7 +47,7 @@ export class Joints {
   close() {
     clearTimeout(this.waiting);
     clearTimeout(this.later);
-    this.door.close();
+    this.endpoint.close();
   }
 
   enable() {
@@ -141,7 +141,7 @@ export class Joints {
       this.waiting = null;
       const positions = Object.fromEntries([...this.rows.values()].filter((row) => row.slider && row.changed > (this.sent ?? -Infinity)).map(({ name, position }) => [name, position]));
       this.sent = performance.now();
-      this.door.send({ op: "set", positions });
+      this.endpoint.send({ op: "set", positions });
     }, 30);
   }
 

@@ -1,7 +1,7 @@
 // Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log lines.
 
 import { fill, h, refill, setText } from "../dom.js";
-import { Door } from "../door.js";
+import { Endpoint } from "../endpoint.js";
 import { t } from "../texts.js";
 
 const PROTOCOL = "minirospy.ros.roslaunch.launcher.v1";
@@ -29,12 +29,12 @@ export class Launch {
       h("div", { class: "bar" }, this.logTitle, h("span", { class: "spring" }), h("button", { type: "button", class: "small", onclick: () => this.text.replaceChildren() }, t("clear")),
         h("button", { type: "button", class: "small", "aria-label": "Close the log", onclick: () => this.follow(null) }, "×")), this.text);
     main.append(h("div", { class: "split launch" },
-      h("div", { class: "panel side details launch-side" }, h("div", { class: "bar" }, this.filter, h("button", { type: "button", title: "Look for launch files again", "aria-label": "Look for launch files again", onclick: () => this.door.send({ op: "list" }) }, "↻")), this.list),
+      h("div", { class: "panel side details launch-side" }, h("div", { class: "bar" }, this.filter, h("button", { type: "button", title: "Look for launch files again", "aria-label": "Look for launch files again", onclick: () => this.endpoint.send({ op: "list" }) }, "↻")), this.list),
       h("div", { class: "launch-main" }, this.problem, this.form, this.area, this.empty, this.log)));
-    this.door = new Door(link, PROTOCOL, {
+    this.endpoint = new Endpoint(link, PROTOCOL, {
       opened: () => {
         this.say("");
-        this.door.send({ op: "list" });
+        this.endpoint.send({ op: "list" });
         if (this.followed) this.follow(this.followed);
       },
       writes: (writes) => { this.writes = writes; },
@@ -51,7 +51,7 @@ export class Launch {
   }
 
   close() {
-    this.door.close();
+    this.endpoint.close();
   }
 
   say(text) {
@@ -83,7 +83,7 @@ export class Launch {
     this.say("");
     this.chosen = [name, file];
     this.place.remember({ package: name, file });
-    this.door.send({ op: "describe", package: name, file });
+    this.endpoint.send({ op: "describe", package: name, file });
     this.drawFiles();
   }
 
@@ -119,7 +119,7 @@ export class Launch {
   start() {
     this.say("");
     const [name, file] = this.chosen;
-    this.door.send({ op: "start", package: name, file, args: this.given() });
+    this.endpoint.send({ op: "start", package: name, file, args: this.given() });
   }
 
   // --- launches
@@ -144,7 +144,7 @@ export class Launch {
   makeRun({ id, package: name, file, args }) {
     const button = (text, op, title) => h("button", { type: "button", class: op === "stop" ? "stop small" : "small", title, onclick: () => {
       this.say("");
-      this.door.send({ op, id });
+      this.endpoint.send({ op, id });
     } }, text);
     const run = { badge: h("span", { class: "badge" }), error: h("p", { class: "error" }), rows: new Map(), table: h("tbody", {}),
       stop: button("Stop", "stop", "End its nodes"), restart: button("Restart", "restart", "End its nodes, and start it again"), remove: button("×", "remove", "Remove from this list") };
@@ -172,7 +172,7 @@ export class Launch {
   }
 
   makeNode(run, id, { name, program }) {
-    const end = (restarts) => () => this.door.send({ op: "end", id, node: name, restarts });
+    const end = (restarts) => () => this.endpoint.send({ op: "end", id, node: name, restarts });
     const row = { badge: h("span", { class: "badge" }), pid: h("span", { class: "num" }), starts: h("span", { class: "muted" }),
       restart: h("button", { type: "button", class: "small", onclick: end(true) }, t("restart")), stop: h("button", { type: "button", class: "small", onclick: end(false) }, t("stop")) };
     row.log = h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: name }) }, t("log"));
@@ -202,7 +202,7 @@ export class Launch {
     const launch = this.launches.find(({ id }) => id === which?.id);
     setText(this.logTitle, which ? which.node || `roslaunch ${launch?.package ?? ""} ${launch?.file ?? ""}` : "");
     this.text.setAttribute("aria-label", this.logTitle.textContent);
-    this.door.send({ op: "follow", id: which?.id ?? null, node: which?.node ?? "" });
+    this.endpoint.send({ op: "follow", id: which?.id ?? null, node: which?.node ?? "" });
     for (const each of this.launches) if (this.runs.has(each.id)) this.showRun(this.runs.get(each.id), each);
   }
 

@@ -5,7 +5,7 @@ import { t } from "./texts.js";
 const FIRST_DELAY_MS = 300;
 const LONGEST_DELAY_MS = 4000;
 
-export class Door {
+export class Endpoint {
   /** `handlers`: by the name of the only field of a text message, or of the first; `binary` for binary ones; `opened`, `closed`. */
   constructor(link, protocol, handlers) {
     this.link = link;

@@ -23,7 +23,7 @@ from minirospy.web.graph import Arrival, SharedGraph
 if TYPE_CHECKING:
     from minirospy.web.server.connection import WebClient
 
-__all__ = ["CAPABILITIES", "FoxgloveDoor", "FoxgloveOptions", "Playback"]
+__all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions", "Playback"]
 
 _log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ class FoxgloveOptions:
     metadata: Mapping[str, str] = field(default_factory=lambda: {"ROS_DISTRO": DISTRO.strip()})
 
 
-class FoxgloveDoor:
+class FoxgloveEndpoint:
     """Serves the Foxglove protocol. On the loop."""
 
     def __init__(
@@ -85,7 +85,7 @@ class FoxgloveDoor:
         self._is_outdated = False
         self._reporting: asyncio.TimerHandle | None = None
 
-    # --- Door
+    # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str:
         """Return the sub-protocol to use. Raise LookupError."""

@@ -20,12 +20,12 @@ from minirospy.board.board import Board
 from minirospy.board.model import BUTTONS, LEDS, PINS, Function
 from minirospy.board.place import Place
 from minirospy.board.scanner import FIELDS
-from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession, number
 
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "BoardDoor", "BoardSession"]
+__all__ = ["SUBPROTOCOL", "BoardEndpoint", "BoardSession"]
 
 SUBPROTOCOL = "minirospy.board.v1"
 
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 _LOOK_SECONDS = 0.02
 
 
-class BoardDoor(JsonDoor["BoardSession"]):
+class BoardEndpoint(JsonEndpoint["BoardSession"]):
     """Serves boards of this machine; each client names its own, ``?board=NAME``."""
 
     def __init__(self) -> None:

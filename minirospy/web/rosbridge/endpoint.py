@@ -24,7 +24,7 @@ from minirospy.web.rosbridge.types import ArrivingTypes
 if TYPE_CHECKING:
     from minirospy.web.server.connection import WebClient
 
-__all__ = ["RosbridgeDoor", "RosbridgeOptions"]
+__all__ = ["RosbridgeEndpoint", "RosbridgeOptions"]
 
 _SUBPROTOCOL = "rosbridge_v2"
 _LOG_LINES = 20
@@ -42,7 +42,7 @@ class RosbridgeOptions:
     authenticate: bool = False
 
 
-class RosbridgeDoor:
+class RosbridgeEndpoint:
     """Serves the rosbridge protocol. On the loop."""
 
     def __init__(
@@ -66,7 +66,7 @@ class RosbridgeDoor:
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
         self._on_clients = on_clients
 
-    # --- Door
+    # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str | None:
         """Return the sub-protocol to use."""

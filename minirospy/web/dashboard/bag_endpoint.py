@@ -26,7 +26,7 @@ from minirospy.web.dashboard.bag_player import GraphStage, OpenBag
 from minirospy.web.dashboard.json_session import (
     Fields,
     Handler,
-    JsonDoor,
+    JsonEndpoint,
     JsonSession,
     number,
     text_of,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from minirospy.web.graph import SharedGraph
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "BagDoor", "BagSession"]
+__all__ = ["SUBPROTOCOL", "BagEndpoint", "BagSession"]
 
 SUBPROTOCOL = "minirospy.core.bag.v1"
 
@@ -52,7 +52,7 @@ _MOMENT, _THUMBNAIL = 1, 2
 _SECOND = 10**9
 
 
-class BagDoor(JsonDoor["BagSession"]):
+class BagEndpoint(JsonEndpoint["BagSession"]):
     """Serves the bags of a folder; all clients see the same recording."""
 
     def __init__(self, folder: BagFolder, master_uri: str, graph: Callable[[], SharedGraph]) -> None:
@@ -104,8 +104,8 @@ class BagSession(JsonSession):
     subject: ClassVar[str] = "bags"
     owners_only: ClassVar[str] = "record or open bags"
 
-    def __init__(self, door: BagDoor, client: WebClient) -> None:
-        self._door = door
+    def __init__(self, endpoint: BagEndpoint, client: WebClient) -> None:
+        self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
         """Topics whose messages are sent, and the time of the last one, -1 before."""
@@ -129,7 +129,7 @@ class BagSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the recording's state, the player's, the messages of the moment that are shown, a thumbnail that waits."""
-        recording = self._door.recording
+        recording = self._endpoint.recording
         state = recording.state() if recording else None
         self._send_changed("recording", state._asdict() if state else None)
         pause = _RECORDING_SECONDS if state and not state.is_ended else None
@@ -147,8 +147,8 @@ class BagSession(JsonSession):
     # --- recording
 
     async def _list(self, _: Fields) -> Fields:
-        bags = await self.in_thread(self._door.folder.bags)
-        folder = self._door.folder
+        bags = await self.in_thread(self._endpoint.folder.bags)
+        folder = self._endpoint.folder
         rows = [[bag.name, bag.size, bag.modified] for bag in bags]
         return {"files": rows, "folder": str(folder.root), "given": folder.given}
 
@@ -156,12 +156,12 @@ class BagSession(JsonSession):
         suffix = text_of(fields, "suffix")
         if suffix not in (".bag", ".mcap"):
             raise UsageError(f"recordings are .bag or .mcap, not '{suffix[:20]}'")
-        await self._door.record(
+        await self._endpoint.record(
             text_of(fields, "name"), suffix, texts_of(fields, "topics"), text_of(fields, "compression")
         )
 
     async def _stop(self, fields: Fields) -> Fields:
-        await self._door.stop()
+        await self._endpoint.stop()
         return await self._list(fields)
 
     # --- a bag
@@ -174,10 +174,10 @@ class BagSession(JsonSession):
     async def _open(self, fields: Fields) -> Fields:
         await self._close_bag()
         name = text_of(fields, "name")
-        stage = GraphStage(self._door.graph())
+        stage = GraphStage(self._endpoint.graph())
 
         def opening() -> OpenBag:
-            path = self._door.folder.path_of(name)
+            path = self._endpoint.folder.path_of(name)
             try:
                 return OpenBag(path, name, stage, self.post_change)
             except BagError as error:

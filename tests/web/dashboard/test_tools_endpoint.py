@@ -1,4 +1,4 @@
-"""The tools' door over WebSocket: requests of the page that the Foxglove protocol has no message for."""
+"""The tools' endpoint over WebSocket: requests of the page that the Foxglove protocol has no message for."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from minirospy.web.access import Access
-from minirospy.web.dashboard import tools_door
-from minirospy.web.dashboard.tools_door import SUBPROTOCOL
+from minirospy.web.dashboard import tools_endpoint
+from minirospy.web.dashboard.tools_endpoint import SUBPROTOCOL
 
 if TYPE_CHECKING:
     from minirospy.introspect.graph import Graph
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class Tools:
-    """A client of the door."""
+    """A client of the endpoint."""
 
     def __init__(self, served: Served, token: str = "") -> None:
         names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
@@ -251,7 +251,7 @@ def test_request_that_fails_in_any_way_is_answered(
     def fail(_: str) -> None:
         raise error
 
-    monkeypatch.setattr(tools_door, "parameter_values", fail)
+    monkeypatch.setattr(tools_endpoint, "parameter_values", fail)
     with Tools(serve()) as tools:
         answer = tools.request(do="yaml", text="a: 1")["error"]
         assert str(error) in answer or answer == "the dashboard failed on this operation: ZeroDivisionError"
@@ -261,7 +261,7 @@ def test_request_that_fails_in_any_way_is_answered(
 def test_survey_that_fails_is_reported_and_repeated(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    survey = tools_door.survey
+    survey = tools_endpoint.survey
     failed = threading.Event()
 
     def fail_once(graph: Any, processes: Any) -> Any:
@@ -270,8 +270,8 @@ def test_survey_that_fails_is_reported_and_repeated(
             raise OSError("no more files")
         return survey(graph, processes)
 
-    monkeypatch.setattr(tools_door, "survey", fail_once)
-    monkeypatch.setattr(tools_door, "_REPORT_SECONDS", 0.05)
+    monkeypatch.setattr(tools_endpoint, "survey", fail_once)
+    monkeypatch.setattr(tools_endpoint, "_REPORT_SECONDS", 0.05)
     with Tools(serve()) as tools:
         tools.request(do="watch")
         report(tools, lambda each: "no more files" in each.get("trouble", ""))
@@ -283,7 +283,7 @@ def test_surveys_do_not_pile_up_where_watching_is_switched_on_and_off(
 ) -> None:
     running, most = [0], [0]
     lock, go_on = threading.Lock(), threading.Event()
-    survey = tools_door.survey
+    survey = tools_endpoint.survey
 
     def slow(graph: Any, processes: Any) -> Any:
         with lock:
@@ -294,7 +294,7 @@ def test_surveys_do_not_pile_up_where_watching_is_switched_on_and_off(
             running[0] -= 1
         return survey(graph, processes)
 
-    monkeypatch.setattr(tools_door, "survey", slow)
+    monkeypatch.setattr(tools_endpoint, "survey", slow)
     with Tools(serve()) as tools:
         for _ in range(5):
             tools.request(do="watch")
@@ -311,7 +311,7 @@ def test_request_that_fails_is_answered_and_reports_go_on(
     served = serve()
     served.node("talker")
     faults = iter([ZeroDivisionError])
-    survey = tools_door.survey
+    survey = tools_endpoint.survey
 
     def failing(graph: Graph, processes: ProcessLoads) -> Survey:
         for fault in faults:
@@ -321,8 +321,8 @@ def test_request_that_fails_is_answered_and_reports_go_on(
     def ping(*_: object) -> float:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(tools_door, "survey", failing)
-    monkeypatch.setattr(tools_door, "ping_node", ping)
+    monkeypatch.setattr(tools_endpoint, "survey", failing)
+    monkeypatch.setattr(tools_endpoint, "ping_node", ping)
     with Tools(served) as tools:
         failed = "the dashboard failed on this operation: ZeroDivisionError"
         assert tools.request(do="ping", node="/talker")["error"] == failed

@@ -1,4 +1,4 @@
-"""Driving by the server's door: the last message is zero, whatever happens to the client."""
+"""Driving by the server's endpoint: the last message is zero, whatever happens to the client."""
 
 from __future__ import annotations
 
@@ -26,7 +26,14 @@ from websockets.typing import Subprotocol
 from minirospy.base.name_filter import NameFilter
 from minirospy.runtime.stop_guard import StopGuard
 from minirospy.web.access import Access
-from minirospy.web.dashboard.drive_door import SUBPROTOCOL, Command, DriveSession, Joystick, Velocity, parse
+from minirospy.web.dashboard.drive_endpoint import (
+    SUBPROTOCOL,
+    Command,
+    DriveSession,
+    Joystick,
+    Velocity,
+    parse,
+)
 from minirospy.web.graph import Filters
 
 if TYPE_CHECKING:

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from minirospy.base.errors import BridgeError, RvizFileError
 from minirospy.base.private_files import create_file
-from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession, text_of
 from minirospy.web.dashboard.rviz_file import MAX_CHARACTERS, format_rviz, parse_rviz
 
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "RvizDoor", "RvizSession", "read_file"]
+__all__ = ["SUBPROTOCOL", "RvizEndpoint", "RvizSession", "read_file"]
 
 SUBPROTOCOL = "minirospy.rviz.v1"
 
@@ -64,7 +64,7 @@ def _write_file(path: Path, text: str) -> None:
         raise RvizFileError(str(path), 0, why or str(error)) from None
 
 
-class RvizDoor(JsonDoor["RvizSession"]):
+class RvizEndpoint(JsonEndpoint["RvizSession"]):
     """Serves the file of the command, if there is one."""
 
     def __init__(self, file: Path | None = None) -> None:
@@ -80,14 +80,14 @@ class RvizDoor(JsonDoor["RvizSession"]):
 
 
 class RvizSession(JsonSession):
-    """One client; its operations read and parse in the door's thread."""
+    """One client; its operations read and parse in the endpoint's thread."""
 
     subject: ClassVar[str] = ".rviz files"
     longest: ClassVar[int] = 600_000
     most_waiting: ClassVar[int] = 20
 
-    def __init__(self, door: RvizDoor, client: WebClient) -> None:
-        self._door = door
+    def __init__(self, endpoint: RvizEndpoint, client: WebClient) -> None:
+        self._endpoint = endpoint
         handlers: Mapping[str, Handler] = {
             "read": self._read,
             "parse": self._parse,
@@ -105,8 +105,8 @@ class RvizSession(JsonSession):
         """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`: in that of the door."""
-        return await asyncio.get_running_loop().run_in_executor(self._door.thread, work)
+        """See :meth:`JsonSession.in_thread`: in that of the endpoint."""
+        return await asyncio.get_running_loop().run_in_executor(self._endpoint.thread, work)
 
     async def _read(self, _: Fields) -> Fields:
         file = self._file()
@@ -130,13 +130,13 @@ class RvizSession(JsonSession):
             _write_file(file, text)
 
         # The page may be closed meanwhile: what was to be saved is.
-        await asyncio.shield(self._door.spawn(self.in_thread(save)))
+        await asyncio.shield(self._endpoint.spawn(self.in_thread(save)))
         return {"name": file.name}
 
     def _file(self) -> Path:
-        if self._door.file is None:
+        if self._endpoint.file is None:
             raise BridgeError("the dashboard was not started with a .rviz file (rviz -d FILE)")
-        return self._door.file
+        return self._endpoint.file
 
 
 def _config(value: object) -> dict[str, object]:

@@ -18,8 +18,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from minirospy.web.access import Access
-from minirospy.web.dashboard import launch_door
-from minirospy.web.dashboard.launch_door import SUBPROTOCOL, LaunchDoor, LaunchSession, _Tail
+from minirospy.web.dashboard import launch_endpoint
+from minirospy.web.dashboard.launch_endpoint import SUBPROTOCOL, LaunchEndpoint, LaunchSession, _Tail
 from minirospy.web.dashboard.launch_files import LaunchFile
 from minirospy.web.dashboard.launch_run import LaunchRun, _Lines
 from tests.waiting import wait_until
@@ -246,12 +246,12 @@ class Run:
 
 def test_launches_that_have_ended_are_limited() -> None:
     async def work() -> list[int]:
-        door = LaunchDoor("http://127.0.0.1:1")
+        endpoint = LaunchEndpoint("http://127.0.0.1:1")
         for number in range(30):
-            door.runs[number] = cast("LaunchRun", Run(number))
-        door.runs[3].is_ended = False  # type: ignore[misc]
-        door.changed()
-        return list(door.runs)
+            endpoint.runs[number] = cast("LaunchRun", Run(number))
+        endpoint.runs[3].is_ended = False  # type: ignore[misc]
+        endpoint.changed()
+        return list(endpoint.runs)
 
     assert asyncio.run(work()) == [3, *range(10, 30)]
 
@@ -263,12 +263,12 @@ def test_restart_is_completed_where_its_page_closes(
     page, other = client(served), client(served)
     run = Run(77)
     assert served.dashboard
-    door = served.dashboard._launches
+    endpoint = served.dashboard._launches
     started: list[LaunchFile] = []
 
     async def add() -> None:
-        door.runs[77] = cast("LaunchRun", run)
-        door.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
+        endpoint.runs[77] = cast("LaunchRun", run)
+        endpoint.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
 
     served.run(add())
     page.send("restart", id=77)
@@ -276,7 +276,7 @@ def test_restart_is_completed_where_its_page_closes(
     page.socket.close()
     other.send("restart", id=77)
     run.joined.set()
-    wait_until(lambda: 77 not in door.runs)
+    wait_until(lambda: 77 not in endpoint.runs)
     assert started == [("lamp", "lamp.launch")]
 
 
@@ -285,13 +285,13 @@ def test_launch_that_has_been_restarted_is_not_started_twice() -> None:
     started: list[LaunchFile] = []
 
     async def work() -> None:
-        door = LaunchDoor("http://127.0.0.1:1")
-        door.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
+        endpoint = LaunchEndpoint("http://127.0.0.1:1")
+        endpoint.start = lambda file, *_: started.append(file)  # type: ignore[method-assign, assignment]
         run = Run(77)
         run.joined.set()
-        door.runs[77] = cast("LaunchRun", run)
+        endpoint.runs[77] = cast("LaunchRun", run)
         for _ in range(2):
-            await door.restart(cast("LaunchRun", run))
+            await endpoint.restart(cast("LaunchRun", run))
 
     asyncio.run(work())
     assert started == [("lamp", "lamp.launch")]
@@ -305,25 +305,25 @@ def test_nothing_is_started_once_the_dashboard_closes(
     page.send("list")
     page.next(lambda found: "files" in found)
     assert served.dashboard
-    door = served.dashboard._launches
+    endpoint = served.dashboard._launches
     reached, go_on = threading.Event(), threading.Event()
-    path_of = door.files.path_of
+    path_of = endpoint.files.path_of
 
     def slow(file: LaunchFile) -> Path:
         reached.set()
         assert go_on.wait(60)
         return path_of(file)
 
-    monkeypatch.setattr(door.files, "path_of", slow)
+    monkeypatch.setattr(endpoint.files, "path_of", slow)
     page.send("start", **FILE, args={"needed": "yes"})
     assert reached.wait(60)
-    served.run(door.close())
+    served.run(endpoint.close())
     go_on.set()
     served.run(served.dashboard.close())
     for thread in threading.enumerate():
         if "LaunchSession" in thread.name or "launch-session" in thread.name:
             thread.join(60)
-    assert not door.runs
+    assert not endpoint.runs
 
 
 def test_lines_since_a_number_are_neither_lost_nor_repeated() -> None:
@@ -389,7 +389,7 @@ def test_session_goes_on_after_a_fault(
         raise ZeroDivisionError
 
     monkeypatch.setattr(LaunchSession, "_send_log", failing)
-    monkeypatch.setattr(launch_door, "resolved_arg_docs", describe)
+    monkeypatch.setattr(launch_endpoint, "resolved_arg_docs", describe)
     page = client()
     page.send("describe", **FILE, args={})
     while page.error() != "the dashboard failed on this operation: ZeroDivisionError":

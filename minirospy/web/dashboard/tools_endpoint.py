@@ -28,12 +28,12 @@ from minirospy.introspect.survey import Survey, describe, survey
 from minirospy.introspect.type_texts import installed_type
 from minirospy.introspect.values import check_parameter, format_value, parse_value
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, text_of, texts_of
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession, text_of, texts_of
 
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "ToolsDoor", "ToolsSession"]
+__all__ = ["SUBPROTOCOL", "ToolsEndpoint", "ToolsSession"]
 
 SUBPROTOCOL = "minirospy.tools.v1"
 
@@ -52,7 +52,7 @@ _AT_ONCE = 4
 """Requests of one client that are answered at the same time: nodes that do not answer take seconds."""
 
 
-class ToolsDoor(JsonDoor["ToolsSession"]):
+class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
     """Serves the requests of pages. ``tool`` is the name by which nodes are called."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
@@ -132,8 +132,8 @@ class ToolsSession(JsonSession):
     longest: ClassVar[int] = 100_000
     most_waiting: ClassVar[int] = 20
 
-    def __init__(self, door: ToolsDoor, client: WebClient) -> None:
-        self._door = door
+    def __init__(self, endpoint: ToolsEndpoint, client: WebClient) -> None:
+        self._endpoint = endpoint
         self._running: set[asyncio.Task[None]] = set()
         self._threads = ThreadPoolExecutor(_AT_ONCE, "tools")
         handlers: Mapping[str, Handler] = {
@@ -192,7 +192,7 @@ class ToolsSession(JsonSession):
     def ended(self) -> None:
         """See :meth:`JsonSession.ended`."""
         super().ended()
-        self._door.unwatch(self)
+        self._endpoint.unwatch(self)
         for task in tuple(self._running):
             task.cancel()
         self._threads.shutdown(wait=False, cancel_futures=True)
@@ -202,11 +202,11 @@ class ToolsSession(JsonSession):
         self.client.send_text_message("report", data, newest_only=True)
 
     async def _watch(self, _: Fields) -> Fields:
-        self._door.watch(self)
+        self._endpoint.watch(self)
         return {}
 
     async def _unwatch(self, _: Fields) -> Fields:
-        self._door.unwatch(self)
+        self._endpoint.unwatch(self)
         return {}
 
     async def _ping(self, fields: Fields) -> Fields:
@@ -215,7 +215,7 @@ class ToolsSession(JsonSession):
         name = text_of(fields, "node")
 
         def ping() -> float:
-            with self._door.graph() as graph:
+            with self._endpoint.graph() as graph:
                 return ping_node(graph, find_node(graph, name))
 
         return {"seconds": await self.in_thread(ping)}
@@ -226,7 +226,7 @@ class ToolsSession(JsonSession):
         name = text_of(fields, "node")
 
         def kill() -> None:
-            with self._door.graph() as graph:
+            with self._endpoint.graph() as graph:
                 node = find_node(graph, name)
                 ping_node(graph, node)  # of one that has exited already, the reason is reported
                 kill_node(graph, node, "requested in the dashboard")
@@ -240,7 +240,7 @@ class ToolsSession(JsonSession):
         wanted = texts_of(fields, "nodes")
 
         def clean() -> list[str]:
-            with self._door.graph() as graph:
+            with self._endpoint.graph() as graph:
                 silent = [node for node in unreachable_nodes(graph) if node.name in wanted]
                 for node in silent:
                     forget_node(graph, node)
@@ -255,7 +255,7 @@ class ToolsSession(JsonSession):
         """
         if "topic" in fields:
             topic = text_of(fields, "topic")
-            name = (await self.in_thread(self._door.topic_types)).get(topic, "")
+            name = (await self.in_thread(self._endpoint.topic_types)).get(topic, "")
             if "/" not in name:
                 raise NotFoundError("topic", topic, ())
         else:
@@ -273,7 +273,7 @@ class ToolsSession(JsonSession):
         """Return the values of a file of rqt_reconfigure or dynparam by name."""
         text = text_of(fields, "text")
         loop = asyncio.get_running_loop()
-        values = await loop.run_in_executor(self._door.parser, parameter_values, text)
+        values = await loop.run_in_executor(self._endpoint.parser, parameter_values, text)
         # JSON has no infinity.
         return {
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
@@ -295,7 +295,7 @@ class ToolsSession(JsonSession):
         value = await self._parsed(fields)
 
         def set_value() -> None:
-            with self._door.graph() as graph:
+            with self._endpoint.graph() as graph:
                 set_parameter(graph, graph.resolve(name), value)
 
         await self.in_thread(set_value)
@@ -310,7 +310,7 @@ class ToolsSession(JsonSession):
             check_parameter(value, "the value")
             return value
 
-        return await asyncio.get_running_loop().run_in_executor(self._door.parser, parse)
+        return await asyncio.get_running_loop().run_in_executor(self._endpoint.parser, parse)
 
 
 def _type_name(value: object) -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, ClassVar
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.ros.roslaunch.launcher.arg_docs import resolved_arg_docs
-from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession
+from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession
 from minirospy.web.dashboard.launch_files import LaunchFile, LaunchFiles
 from minirospy.web.dashboard.launch_run import LaunchRun
 from minirospy.workspace.packages import Packages
@@ -26,7 +26,7 @@ from minirospy.workspace.packages import Packages
 if TYPE_CHECKING:
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "LaunchDoor", "LaunchSession"]
+__all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 
 SUBPROTOCOL = "minirospy.ros.roslaunch.launcher.v1"
 
@@ -41,7 +41,7 @@ _MAX_ENDED = 20
 _TAIL_BYTES = 64 * 1024
 
 
-class LaunchDoor(JsonDoor["LaunchSession"]):
+class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
     """Serves the launch files of the packages; all clients see the same launches."""
 
     def __init__(self, master_uri: str) -> None:
@@ -81,7 +81,7 @@ class LaunchDoor(JsonDoor["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonDoor.changed`; of the launches that have ended only the newest are kept."""
+        """See :meth:`JsonEndpoint.changed`; of the launches that have ended only the newest are kept."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
@@ -143,8 +143,8 @@ class LaunchSession(JsonSession):
     owners_only: ClassVar[str] = "start programs"
     pace: ClassVar[float] = 0.1
 
-    def __init__(self, door: LaunchDoor, client: WebClient) -> None:
-        self._door = door
+    def __init__(self, endpoint: LaunchEndpoint, client: WebClient) -> None:
+        self._endpoint = endpoint
         self._tail: _Tail | None = None
         self._sent = ""
         handlers: Mapping[str, Handler] = {
@@ -162,20 +162,20 @@ class LaunchSession(JsonSession):
     async def follow(self) -> float | None:
         """Send the launches, where one has changed, and what is new in the log."""
         # Before the rest is sent: what a launch does meanwhile is reported as a change.
-        is_stopping = any(run.is_stopping for run in self._door.runs.values())
+        is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
         return _LOG_SECONDS if is_growing else _STOPPING_SECONDS if is_stopping else None
 
     async def _list(self, _: Fields) -> Fields:
-        return {"files": await self.in_thread(self._door.files.scan)}
+        return {"files": await self.in_thread(self._endpoint.files.scan)}
 
     async def _describe(self, fields: Fields) -> Fields:
         file, args = _file(fields), _args(fields)
 
         def read() -> list[list[str | None]]:
-            path = self._door.files.path_of(file)
-            docs = resolved_arg_docs(str(path), args, self._door.packages)
+            path = self._endpoint.files.path_of(file)
+            docs = resolved_arg_docs(str(path), args, self._endpoint.packages)
             return [[each.name, each.default, each.doc] for each in docs]
 
         found = {"package": file.package, "file": file.path, "args": await self.in_thread(read)}
@@ -183,19 +183,19 @@ class LaunchSession(JsonSession):
 
     async def _start(self, fields: Fields) -> None:
         file, args = _file(fields), _args(fields)
-        path = await self.in_thread(partial(self._door.files.path_of, file))
-        self._door.start(file, path, args)
+        path = await self.in_thread(partial(self._endpoint.files.path_of, file))
+        self._endpoint.start(file, path, args)
 
     async def _stop(self, fields: Fields) -> None:
         self._run_of(fields).stop()
 
     async def _restart(self, fields: Fields) -> None:
         # This goes on where the page is closed; meanwhile the session shows how it goes.
-        self._door.spawn(self._report_restart(self._run_of(fields)))
+        self._endpoint.spawn(self._report_restart(self._run_of(fields)))
 
     async def _report_restart(self, run: LaunchRun) -> None:
         try:
-            await self._door.restart(run)
+            await self._endpoint.restart(run)
         except MinirospyError as error:
             self.send_error(str(error))
 
@@ -203,8 +203,8 @@ class LaunchSession(JsonSession):
         run = self._run_of(fields)
         if not run.is_ended:
             raise UsageError(f"{run.package}/{run.file} runs: stop it first")
-        self._door.runs.pop(run.id, None)
-        self._door.changed()
+        self._endpoint.runs.pop(run.id, None)
+        self._endpoint.changed()
 
     async def _end_node(self, fields: Fields) -> None:
         self._run_of(fields).end_node(str(fields["node"]), restarts=bool(fields.get("restarts")))
@@ -216,13 +216,13 @@ class LaunchSession(JsonSession):
 
     def _run_of(self, fields: Fields) -> LaunchRun:
         number = fields["id"]
-        if not isinstance(number, int) or number not in self._door.runs:
+        if not isinstance(number, int) or number not in self._endpoint.runs:
             raise UsageError("this launch is not there any more")
-        return self._door.runs[number]
+        return self._endpoint.runs[number]
 
     def _send_launches(self) -> None:
         launches = []
-        for run in self._door.runs.values():
+        for run in self._endpoint.runs.values():
             state = run.state()
             launches.append({**state._asdict(), "nodes": [node._asdict() for node in state.nodes]})
         text = json.dumps({"launches": launches})

@@ -24,7 +24,14 @@ from minirospy.core.urdf.elements import parse_xml
 from minirospy.introspect.graph import why_illegal
 from minirospy.ros.robot_state_publisher.joint_parameters import NAMES, JointParameters, read_parameters
 from minirospy.ros.robot_state_publisher.joints import FreeJoint, JointError, JointStates, read_joints
-from minirospy.web.dashboard.json_session import Fields, Handler, JsonDoor, JsonSession, number, wait_until
+from minirospy.web.dashboard.json_session import (
+    Fields,
+    Handler,
+    JsonEndpoint,
+    JsonSession,
+    number,
+    wait_until,
+)
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
@@ -35,7 +42,7 @@ if TYPE_CHECKING:
     from minirospy.web.graph import SharedGraph
     from minirospy.web.server.client import WebClient
 
-__all__ = ["SUBPROTOCOL", "JointDoor", "JointSession"]
+__all__ = ["SUBPROTOCOL", "JointEndpoint", "JointSession"]
 
 SUBPROTOCOL = "minirospy.joints.v1"
 
@@ -46,7 +53,7 @@ _TOPIC = "joint_states"
 _FARTHEST = 1e6
 
 
-class JointDoor(JsonDoor["JointSession"]):
+class JointEndpoint(JsonEndpoint["JointSession"]):
     """Serves the joints of robot_description. ``always_publishes``: as the node joint_state_publisher_gui does."""
 
     def __init__(
@@ -73,17 +80,17 @@ class JointDoor(JsonDoor["JointSession"]):
         self._faults = Faults(_log, "following and publishing joints")
         self._sources: list[asyncio.Task[None]] = []
 
-    # --- Door
+    # --- Endpoint
 
     def open(self, client: WebClient) -> JointSession:
-        """See :meth:`JsonDoor.open`."""
+        """See :meth:`JsonEndpoint.open`."""
         if not self.sessions:
             self._graph().watch(self._graph_changed)
         self.start_work()
         return super().open(client)
 
     def left(self, session: JointSession) -> None:
-        """See :meth:`JsonDoor.left`: nothing is published for nobody."""
+        """See :meth:`JsonEndpoint.left`: nothing is published for nobody."""
         if not self.sessions:
             self._graph().unwatch(self._graph_changed)
             self.publish(is_on=False)
@@ -295,8 +302,8 @@ class JointSession(JsonSession):
 
     subject: ClassVar[str] = "joints"
 
-    def __init__(self, door: JointDoor, client: WebClient) -> None:
-        self._door = door
+    def __init__(self, endpoint: JointEndpoint, client: WebClient) -> None:
+        self._endpoint = endpoint
         self._generation = 0
         self._sent = ""
         handlers: Mapping[str, Handler] = {
@@ -314,28 +321,28 @@ class JointSession(JsonSession):
 
     async def follow(self) -> None:
         """Send the joints, where they have been read again, and their positions."""
-        if self._generation != self._door.generation:
-            self._generation = self._door.generation
-            self.send(self._door.description())
-        text = json.dumps({"state": self._door.state()})
+        if self._generation != self._endpoint.generation:
+            self._generation = self._endpoint.generation
+            self.send(self._endpoint.description())
+        text = json.dumps({"state": self._endpoint.state()})
         if text != self._sent:
             self._sent = text
             self.client.send_text_message("state", text.encode(), newest_only=True)
 
     async def _set(self, fields: Fields) -> None:
-        self._door.set(_positions(fields))
+        self._endpoint.set(_positions(fields))
 
     async def _center(self, _: Fields) -> None:
-        self._door.center()
+        self._endpoint.center()
 
     async def _randomize(self, _: Fields) -> None:
-        self._door.randomize()
+        self._endpoint.randomize()
 
     async def _publish(self, fields: Fields) -> None:
-        self._door.publish(is_on=bool(fields["on"]))
+        self._endpoint.publish(is_on=bool(fields["on"]))
 
     async def _reload(self, _: Fields) -> None:
-        await self._door.load(is_forced=True)
+        await self._endpoint.load(is_forced=True)
 
 
 def _finite(value: float) -> float:

@@ -21,7 +21,7 @@ from minirospy.introspect.snapshot import fetch
 from minirospy.ros.robot_state_publisher.joints import read_joints
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.web.access import Access
-from minirospy.web.dashboard.joint_door import SUBPROTOCOL, JointDoor
+from minirospy.web.dashboard.joint_endpoint import SUBPROTOCOL, JointEndpoint
 from minirospy.web.graph import Filters
 from minirospy.workspace.packages import Packages
 from tests.waiting import wait_until
@@ -114,7 +114,7 @@ def test_description_is_read_beside_the_loop(
         threads.append(threading.get_ident())
         return read_joints(*args)
 
-    monkeypatch.setattr("minirospy.web.dashboard.joint_door.read_joints", read)
+    monkeypatch.setattr("minirospy.web.dashboard.joint_endpoint.read_joints", read)
     served = serve()
     set_params(served, robot_description=ROBOT)
     assert client(served).next("joints")["robot"] == "crane"
@@ -136,7 +136,7 @@ def test_description_that_is_read_slowly_is_sent_complete(
         assert may_end.wait(60)
         return read_joints(*args)
 
-    monkeypatch.setattr("minirospy.web.dashboard.joint_door.read_joints", read)
+    monkeypatch.setattr("minirospy.web.dashboard.joint_endpoint.read_joints", read)
     served = serve()
     set_params(served, robot_description=ROBOT)
     page = client(served)
@@ -378,12 +378,12 @@ def test_joints_are_followed_after_a_fault(
     served = serve()
     set_params(served, robot_description=ROBOT)
     faults = iter([ZeroDivisionError])
-    load = JointDoor.load
+    load = JointEndpoint.load
 
-    async def failing(door: JointDoor, *, is_forced: bool = False) -> None:
+    async def failing(endpoint: JointEndpoint, *, is_forced: bool = False) -> None:
         for fault in faults:
             raise fault
-        await load(door, is_forced=is_forced)
+        await load(endpoint, is_forced=is_forced)
 
-    monkeypatch.setattr(JointDoor, "load", failing)
+    monkeypatch.setattr(JointEndpoint, "load", failing)
     assert client(served).next("joints", bool)["rows"]

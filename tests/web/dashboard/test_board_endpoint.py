@@ -12,8 +12,8 @@ from websockets.typing import Subprotocol
 
 from minirospy.board.board import Board
 from minirospy.web.access import Access
-from minirospy.web.dashboard import board_door
-from minirospy.web.dashboard.board_door import SUBPROTOCOL
+from minirospy.web.dashboard import board_endpoint
+from minirospy.web.dashboard.board_endpoint import SUBPROTOCOL
 from tests.web.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def test_board_that_cannot_be_shown_has_its_error(
     def fail(_: Board) -> dict[str, object]:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(board_door, "state_of", fail)
+    monkeypatch.setattr(board_endpoint, "state_of", fail)
     with opened(serve()) as socket:
         # Closed as soon as it comes: the board is left nevertheless, which a fixture checks.
         found = state(socket, lambda each: "error" in each)

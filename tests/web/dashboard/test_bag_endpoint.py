@@ -24,8 +24,8 @@ from minirospy.core.bag.timeline import Timeline
 from minirospy.ros.rosbag.recording.sources import Bags
 from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, start_process
 from minirospy.web.access import Access
-from minirospy.web.dashboard import bag_door, recording
-from minirospy.web.dashboard.bag_door import SUBPROTOCOL, BagSession
+from minirospy.web.dashboard import bag_endpoint, recording
+from minirospy.web.dashboard.bag_endpoint import SUBPROTOCOL, BagSession
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.bag_player import OpenBag
 from minirospy.web.dashboard.recording import Recording
@@ -320,7 +320,7 @@ def starting(monkeypatch: pytest.MonkeyPatch) -> Gate:
             gate.pass_through()
             super().__init__(*words)
 
-    monkeypatch.setattr(bag_door, "Recording", Slow)
+    monkeypatch.setattr(bag_endpoint, "Recording", Slow)
     return gate
 
 
@@ -332,14 +332,14 @@ def test_recording_is_kept_where_its_page_closes_while_it_starts(
 ) -> None:
     served = serve()
     assert served.dashboard
-    door = served.dashboard._bags
+    endpoint = served.dashboard._bags
     page = client(served)
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
     assert starting.reached.wait(60)
     page.socket.close()
-    wait_until(lambda: not door.sessions)
+    wait_until(lambda: not endpoint.sessions)
     starting.opened.set()
-    wait_until(lambda: door.recording is not None)
+    wait_until(lambda: endpoint.recording is not None)
 
 
 def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
@@ -414,16 +414,16 @@ def test_bag_is_closed_where_its_page_closes_while_it_opens(
             super().close()
             closed.set()
 
-    monkeypatch.setattr(bag_door, "OpenBag", Slow)
+    monkeypatch.setattr(bag_endpoint, "OpenBag", Slow)
     make_bag(folder / "a.bag", 1)
     served = serve()
     assert served.dashboard
-    door = served.dashboard._bags
+    endpoint = served.dashboard._bags
     page = client(served)
     page.send("open", name="a.bag")
     assert gate.reached.wait(60)
     page.socket.close()
-    wait_until(lambda: not door.sessions)
+    wait_until(lambda: not endpoint.sessions)
     gate.opened.set()
     assert closed.wait(60)
 

@@ -35,7 +35,7 @@ __all__ = [
     "SILENT_SECONDS",
     "SUBPROTOCOL",
     "Command",
-    "DriveDoor",
+    "DriveEndpoint",
     "DriveSession",
     "Joystick",
     "Velocity",
@@ -150,7 +150,7 @@ def _numbers(values: object) -> tuple[float, ...]:
     return numbers
 
 
-class DriveDoor:
+class DriveEndpoint:
     """Opens a session for each client; ``graph`` returns the graph that they publish to."""
 
     def __init__(self, graph: Callable[[], SharedGraph]) -> None:
