@@ -238,7 +238,7 @@ def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, as
 
 
 def ask_node(api: str, service: str) -> None:
-    """Call the node's Slave API and its service once. Raises OSError without a good answer."""
+    """Call the node's Slave API and its service once. Raise OSError without a good answer."""
     with ServerProxy(api) as proxy:
         proxy.getPid("/good")
     with _connect(port_of(service)) as sock:

@@ -53,7 +53,7 @@ class Target:
         self._master: Any = None
 
     def __call__(self, data: bytes) -> None:
-        """One input. Raises on a finding."""
+        """One input. Raise on a finding."""
         self._loop.run_until_complete(self._take(data))
 
     def close(self) -> None:

@@ -172,7 +172,7 @@ class Target:
         self._parts: tuple[Any, Any, Any] | None = None
 
     def __call__(self, kind: str, data: bytes) -> None:
-        """Give one input to a listener. Raises on a finding."""
+        """Give one input to a listener. Raise on a finding."""
         self._loop.run_until_complete(self._take(kind, data))
 
     def close(self) -> None:

@@ -74,7 +74,7 @@ PURE_FILES = (
             "frames.py",
             "holders.py",
             "keys.py",
-            "lanes.py",
+            "flows.py",
             "report.py",
             "ros1_keys.py",
             "rules.py",

@@ -130,7 +130,7 @@ def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
 
 
 def _given_urls() -> dict[str, str]:
-    """Return the addresses that the metadata should have. Raises ReleaseError where the variable has no address."""
+    """Return the addresses that the metadata should have. Raise ReleaseError where the variable has no address."""
     address = os.environ.get(ADDRESS_VARIABLE, "").strip()
     try:
         return project_urls(address) if address else {}
@@ -225,7 +225,7 @@ def find_pythons() -> dict[str, str]:
 
 
 def _try_out(python: str, wheel: Path, scratch: Path) -> None:
-    """Install the wheel into a new environment, and run the demo there. Raises ReleaseError."""
+    """Install the wheel into a new environment, and run the demo there. Raise ReleaseError."""
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         venv = Path(folder, "venv")
         _run(python, "-m", "venv", str(venv))
@@ -245,7 +245,7 @@ def _try_out(python: str, wheel: Path, scratch: Path) -> None:
 
 
 def _run(*command: str, environ: Mapping[str, str] | None = None, cwd: str | Path = ROOT) -> str:
-    """Run a command and return what it prints. Raises ReleaseError with its output."""
+    """Run a command and return what it prints. Raise ReleaseError with its output."""
     done = subprocess.run(
         command,
         env=environ,

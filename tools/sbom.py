@@ -31,7 +31,7 @@ class SbomError(Exception):
 
 
 def make_sbom(wheel: Path, seconds: int) -> str:
-    """Return the text of the wheel's bill of materials, made at a time (Unix seconds). Raises SbomError."""
+    """Return the text of the wheel's bill of materials, made at a time (Unix seconds). Raise SbomError."""
     with zipfile.ZipFile(wheel) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()

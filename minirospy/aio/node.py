@@ -88,7 +88,7 @@ class Node:
         rosout: bool = True,
         simulated_time: bool = True,
     ) -> None:
-        """Create the node. Raises ValueError on a name that is empty or has a namespace."""
+        """Create the node. Raise ValueError on a name that is empty or has a namespace."""
         if not name:
             raise ValueError("name must not be empty")
         if "/" in name:
@@ -142,7 +142,7 @@ class Node:
     async def start(self) -> None:
         """Open the node's servers and wait for a master; what ``async with`` does first.
 
-        Raises ROSInitException where the node cannot listen, or has been started before.
+        Raise ROSInitException where the node cannot listen, or has been started before.
         """
         if self._runtime or self._is_closed:
             raise ROSInitException(f"node [{self.name}] has been started before: make another one")
@@ -236,7 +236,7 @@ class Node:
 
     @property
     def uri(self) -> str:
-        """The URI of this node's Slave API. Raises ROSInitException before the node has been started."""
+        """The URI of this node's Slave API. Raise ROSInitException before the node has been started."""
         return self._node.uri
 
     def resolve(self, name: str) -> str:
@@ -251,7 +251,7 @@ class Node:
         While the program is busy, the newest ``queue_size`` messages wait; older ones are dropped and counted
         (``dropped``). Listening starts immediately, in the background; ``await node.subscribe(...)`` waits until
         the master knows. It ends by :meth:`Subscription.close`, or when the subscription is garbage-collected.
-        Raises ValueError on a ``queue_size`` below 1.
+        Raise ValueError on a ``queue_size`` below 1.
         """
         if queue_size < 1:
             raise ValueError(f"queue_size is {queue_size}: a subscription keeps at least one message")
@@ -284,7 +284,7 @@ class Node:
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
         """Return the next message of ``topic``.
 
-        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
         """
         async with self.subscribe(topic, message_class, queue_size=1) as subscription:
             return await subscription.next(timeout)
@@ -305,7 +305,7 @@ class Node:
         ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
         number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets the
         last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
-        has connected or disconnected. Raises ValueError where this node publishes the topic with another type.
+        has connected or disconnected. Raise ValueError where this node publishes the topic with another type.
         """
         resolved = self.resolve(topic)
         state = self._published.get(resolved)
@@ -349,7 +349,7 @@ class Node:
     ) -> _Response:
         """Call a service, with a request or its fields, and return its response.
 
-        Raises ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        Raise ServiceException where the call fails, TypeError or AttributeError where the arguments do not
         fit the request, SerializationError where a value does not. Cancelling it hangs up.
         """
         return await self.service_proxy(service, service_class)(*args, **kwds)
@@ -376,7 +376,7 @@ class Node:
         ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
         their values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
         other in a worker thread. What it raises goes to the client as the call's error.
-        Raises ServiceException where this node offers the service already.
+        Raise ServiceException where this node offers the service already.
         """
         resolved = self.resolve(service)
         if resolved in self._served:
@@ -386,7 +386,7 @@ class Node:
     async def wait_for_service(self, service: str, timeout: float | None = None) -> None:
         """Wait until a service is registered and answers.
 
-        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
         """
         name = self.resolve(service)
         try:
@@ -399,7 +399,7 @@ class Node:
     async def get_param(self, name: str, default: object = _UNSPECIFIED) -> Any:
         """Return a parameter's value, or ``default``.
 
-        Raises KeyError where it is neither set nor has a default, MasterUnreachableError.
+        Raise KeyError where it is neither set nor has a default, MasterUnreachableError.
         """
         try:
             return await self._node.master("getParam", self.resolve(name))
@@ -409,7 +409,7 @@ class Node:
             return default
 
     async def set_param(self, name: str, value: object) -> None:
-        """Set a parameter; a dictionary sets a whole namespace. Raises RpcError on a value of no XML-RPC type."""
+        """Set a parameter; a dictionary sets a whole namespace. Raise RpcError on a value of no XML-RPC type."""
         await self._node.master("setParam", self.resolve(name), value)
 
     async def has_param(self, name: str) -> bool:
@@ -417,7 +417,7 @@ class Node:
         return bool(await self._node.master("hasParam", self.resolve(name)))
 
     async def delete_param(self, name: str) -> None:
-        """Delete a parameter, or a whole namespace. Raises KeyError where it is not set."""
+        """Delete a parameter, or a whole namespace. Raise KeyError where it is not set."""
         try:
             await self._node.master("deleteParam", self.resolve(name))
         except RpcRefused as error:
@@ -444,7 +444,7 @@ class Node:
     async def sleep(self, duration: float | Duration) -> None:
         """Sleep for ``duration`` seconds of the node's time.
 
-        Raises ROSInterruptException where the node ends meanwhile, ROSTimeMovedBackwardsException where
+        Raise ROSInterruptException where the node ends meanwhile, ROSTimeMovedBackwardsException where
         simulated time jumps back.
         """
         seconds = duration.to_sec() if isinstance(duration, Duration) else duration

@@ -30,7 +30,7 @@ class ParameterWatch:
     async def add(self, name: str) -> object:
         """Subscribe to a parameter (global name) and return its value, ``{}`` where it is not set.
 
-        Raises MasterUnreachableError, RpcError.
+        Raise MasterUnreachableError, RpcError.
         """
         runtime = self._node._node
         value: object = await runtime.master("subscribeParam", runtime.uri, name)
@@ -38,7 +38,7 @@ class ParameterWatch:
         return value
 
     async def remove(self, name: str) -> None:
-        """Unsubscribe from a parameter. Raises as :meth:`add`."""
+        """Unsubscribe from a parameter. Raise as :meth:`add`."""
         runtime = self._node._node
         runtime.parameters.discard(name)
         await runtime.master("unsubscribeParam", runtime.uri, name)

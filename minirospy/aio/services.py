@@ -70,7 +70,7 @@ class ServiceProxy(Generic[_Response_co]):
         self._lock = asyncio.Lock()
 
     async def __call__(self, *args: object, **kwds: object) -> _Response_co:
-        """Call the service. Raises as :meth:`Node.call` does."""
+        """Call the service. Raise as :meth:`Node.call` does."""
         message = args_kwds_to_message(self._service_class._request_class, args, kwds)
         number_header(message, next(self._sequence))
         request = serialized(message)

@@ -70,7 +70,7 @@ class Subscription(Handle, Generic[_M_co]):
     async def next(self, timeout: float | None = None) -> _M_co:
         """Return the next message.
 
-        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
         """
         try:
             return await asyncio.wait_for(self.__anext__(), timeout)
@@ -88,7 +88,7 @@ class Subscription(Handle, Generic[_M_co]):
     async def wait_for_publishers(self, count: int = 1, timeout: float | None = None) -> None:
         """Wait until so many publishers are connected.
 
-        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
         """
         connected = asyncio.Event()
         callbacks = self._state.subscription.on_connected
@@ -155,7 +155,7 @@ class Publisher(Handle, Generic[_M_co]):
         self._registration = state.join(self)
 
     def publish_raw(self, body: bytes) -> None:
-        """Publish a message that is serialized already. Does not wait. Raises ROSException once it is closed."""
+        """Publish a message that is serialized already. Does not wait. Raise ROSException once it is closed."""
         state = self._state
         if state is None or self._node.is_shutdown:
             raise ROSException("publish() to a closed topic")
@@ -167,7 +167,7 @@ class Publisher(Handle, Generic[_M_co]):
     async def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
-        Does not wait for subscribers, except with ``queue_size=None``. Raises ROSException once it is closed,
+        Does not wait for subscribers, except with ``queue_size=None``. Raise ROSException once it is closed,
         ROSSerializationException or TypeError on values that do not fit.
         """
         if not self._registration.done():
@@ -203,7 +203,7 @@ class Publisher(Handle, Generic[_M_co]):
     async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:
         """Wait until so many subscribers are connected.
 
-        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends.
         """
         try:
             await asyncio.wait_for(self._wait_for(count), timeout)

@@ -110,7 +110,7 @@ def start_outside_of_job(
 ) -> subprocess.Popen[bytes]:
     """Start a process that may outlive this one, also where the children of this one are guarded.
 
-    ``options`` as in subprocess.Popen. Raises OSError.
+    ``options`` as in subprocess.Popen. Raise OSError.
     """
     import subprocess
 

@@ -147,7 +147,7 @@ class SimulatedClock:
         """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
 
         While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
-        Raises ROSTimeMovedBackwardsException where the clock is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException where the clock is set to before the sleep's start.
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)

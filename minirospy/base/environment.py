@@ -77,7 +77,7 @@ class Environment(NamedTuple):
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
-        Raises UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
+        Raise UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
         more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
         or MINIROSPY_LOCAL, and on a master of another machine with MINIROSPY_LOCAL=1.
         """
@@ -139,7 +139,7 @@ class Environment(NamedTuple):
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """Return the master's URI and the namespace, all that a tool needs for queries. Raises as Environment.read."""
+    """Return the master's URI and the namespace, all that a tool needs for queries. Raise as Environment.read."""
     uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
     uri = _checked_uri(uri)
     if is_local(environ):
@@ -148,7 +148,7 @@ def master_and_namespace(
 
 
 def is_local(environ: Mapping[str, str]) -> bool:
-    """Return whether MINIROSPY_LOCAL keeps this process on this machine. Raises UsageError on an unknown value."""
+    """Return whether MINIROSPY_LOCAL keeps this process on this machine. Raise UsageError on an unknown value."""
     text = environ.get("MINIROSPY_LOCAL", "")
     if text.lower() not in _SWITCH:
         raise UsageError(f"MINIROSPY_LOCAL [{text}] is neither 1 nor 0")
@@ -158,7 +158,7 @@ def is_local(environ: Mapping[str, str]) -> bool:
 def export_local(environ: MutableMapping[str, str]) -> None:
     """Restrict the programs that are started with ``environ`` to this machine if MINIROSPY_LOCAL is set.
 
-    Those of other ROS clients do not know the variable. Raises UsageError as Environment.read.
+    Those of other ROS clients do not know the variable. Raise UsageError as Environment.read.
     """
     if is_local(environ):
         environ["ROS_MASTER_URI"], _ = master_and_namespace(environ)
@@ -167,7 +167,7 @@ def export_local(environ: MutableMapping[str, str]) -> None:
 
 
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
-    """Return the (host, port, path) of ``scheme://host:port/path``. Raises ValueError.
+    """Return the (host, port, path) of ``scheme://host:port/path``. Raise ValueError.
 
     By hand: importing urllib.parse takes a command a twentieth of its time.
     """

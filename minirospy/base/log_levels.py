@@ -50,7 +50,7 @@ def logger_levels(names: Iterable[str]) -> dict[str, str]:
 
 
 def set_logger_level(logger: str, level: str) -> None:
-    """Set a logger's level by name, in upper or lower case. Raises ValueError on another name."""
+    """Set a logger's level by name, in upper or lower case. Raise ValueError on another name."""
     levels = {name: ros for ros, name in LEVEL_NAMES.items()}
     if level.upper() not in levels:
         raise ValueError(f"[{level}] is not one of the levels {', '.join(levels).lower()}")

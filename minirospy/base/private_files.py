@@ -33,7 +33,7 @@ _FLAGS = (
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
 
-    Raises OSError, also where the name is that of a link, or of anything but a device or a regular file with one
+    Raise OSError, also where the name is that of a link, or of anything but a device or a regular file with one
     name. With O_TRUNC the file is emptied after these checks.
     """
     if os.path.islink(path):
@@ -60,25 +60,25 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
 
 
 def open_text(path: Path, mode: str) -> IO[str]:
-    """Open ``path`` to write text in UTF-8, ``mode`` "a" to append or "w" to empty it first. Raises OSError."""
+    """Open ``path`` to write text in UTF-8, ``mode`` "a" to append or "w" to empty it first. Raise OSError."""
     how = {"a": os.O_APPEND, "w": os.O_TRUNC}[mode]
     return os.fdopen(open_file(path, os.O_WRONLY | os.O_CREAT | how), mode, encoding="utf-8")
 
 
 def create_file(path: Path, mode: int = 0o600) -> int:
-    """Create ``path`` for writing, in place of what has that name; return the file descriptor. Raises OSError."""
+    """Create ``path`` for writing, in place of what has that name; return the file descriptor. Raise OSError."""
     remove_file(path)
     return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
 
 def read_file(path: Path) -> tuple[bytes, float]:
-    """Return the bytes of ``path`` and the time of its last change. Raises OSError."""
+    """Return the bytes of ``path`` and the time of its last change. Raise OSError."""
     with os.fdopen(open_file(path, os.O_RDONLY), "rb") as stream:
         return stream.read(), os.fstat(stream.fileno()).st_mtime
 
 
 def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
-    """Give ``source`` the name ``target``, in place of what has that name. Raises OSError.
+    """Give ``source`` the name ``target``, in place of what has that name. Raise OSError.
 
     Windows refuses it while another process has one of them open: there this waits until it is closed, for a second.
     """
@@ -86,7 +86,7 @@ def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str])
 
 
 def remove_file(path: Path) -> None:
-    """Remove ``path``, if it exists; on Windows as soon as no other process has it open. Raises OSError."""
+    """Remove ``path``, if it exists; on Windows as soon as no other process has it open. Raise OSError."""
     _until_closed(lambda: path.unlink(missing_ok=True))
 
 

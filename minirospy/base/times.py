@@ -20,7 +20,7 @@ class TVal:
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        """``secs`` may be a float where ``nsecs`` is 0. Raises ValueError or TypeError."""
+        """``secs`` may be a float where ``nsecs`` is 0. Raise ValueError or TypeError."""
         if type(secs) is int and type(nsecs) is int and 0 <= nsecs < _BILLION:
             self.secs: int = secs
             self.nsecs: int = nsecs

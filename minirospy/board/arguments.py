@@ -13,7 +13,7 @@ NO_BOUNCETIME = -666
 
 
 def channels_of(channel: object) -> list[int]:
-    """Return the channels of one or of several. Raises ValueError."""
+    """Return the channels of one or of several. Raise ValueError."""
     if isinstance(channel, int):
         return [channel]
     if not isinstance(channel, (list, tuple)):
@@ -24,7 +24,7 @@ def channels_of(channel: object) -> list[int]:
 
 
 def level_of(value: object) -> int:
-    """Return 0 or 1. Raises TypeError."""
+    """Return 0 or 1. Raise TypeError."""
     if isinstance(value, int):
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
@@ -34,7 +34,7 @@ def level_of(value: object) -> int:
 
 
 def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
-    """Return what looks for an edge; ``bouncetime`` in ms. Raises ValueError, TypeError."""
+    """Return what looks for an edge; ``bouncetime`` in ms. Raise ValueError, TypeError."""
     # Whole milliseconds: a time in seconds, such as 0.2, is refused with a TypeError, as by RPi.GPIO.
     edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:

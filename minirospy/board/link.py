@@ -78,7 +78,7 @@ class Link:
     ``levels`` mirrors every pin's level and is always the same list: reading it is the fast way to read a pin.
     ``on_edge`` is called on the reader thread, for every edge on the board.
 
-    Raises BoardError when no server can be started.
+    Raise BoardError when no server can be started.
     """
 
     def __init__(self, place: Place, on_edge: Callable[[Edge], None] | None = None) -> None:

@@ -266,7 +266,7 @@ def _rviz(
     arguments: Sequence[str] = (),
     ignored: object = None,
 ) -> int:
-    from minirospy.web.dashboard.rviz_door import read_file
+    from minirospy.web.dashboard.rviz_endpoint import read_file
 
     file = Path(display_config) if display_config else None
     if file and read_file(file) is None:

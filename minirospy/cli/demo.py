@@ -149,7 +149,7 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
-    """Press the button until the LED lights: then both nodes are connected. Raises MinirospyError."""
+    """Press the button until the LED lights: then both nodes are connected. Raise MinirospyError."""
     print("Starting the master, button_publisher.py and led_actuator.py ...", flush=True)
     end = time.monotonic() + _START_SECONDS
     while time.monotonic() < end:

@@ -81,7 +81,7 @@ def _pass_options(parser: Parser) -> None:
         "--priority",
         action="append",
         default=[],
-        metavar="GLOB=LANE",
+        metavar="GLOB=PRIORITY",
         help="teleop, data or bulk, as '/arm/*=teleop' (by type)",
         completer="nothing",
     )
@@ -210,7 +210,7 @@ def _gateway(
     from minirospy.base.name_filter import NameFilter
     from minirospy.fleet.gateway import Gateway, GatewayOptions
     from minirospy.fleet.ros1_keys import parse_namespace
-    from minirospy.fleet.rules import GatewayRules, parse_lanes, parse_rates
+    from minirospy.fleet.rules import GatewayRules, parse_priorities, parse_rates
     from minirospy.web.serve import run
 
     rules = GatewayRules(
@@ -219,7 +219,7 @@ def _gateway(
         parameters=NameFilter.of(params),
         robots=NameFilter.of(robots),
         rates=parse_rates(rate),
-        lanes=parse_lanes(priority),
+        priorities=parse_priorities(priority),
         has_frames=frames,
         stop_seconds=stop_after,
     )

@@ -159,7 +159,7 @@ prefer_ros1()
 
 
 def spin() -> None:
-    """Wait until the node shuts down. Raises ROSInitException before init_node."""
+    """Wait until the node shuts down. Raise ROSInitException before init_node."""
     current_session().spin()
 
 
@@ -169,7 +169,7 @@ def is_shutdown() -> bool:
 
 
 def on_shutdown(h: Callable[[], object]) -> None:
-    """Call ``h`` when the node shuts down, before it leaves the graph. Raises TypeError."""
+    """Call ``h`` when the node shuts down, before it leaves the graph. Raise TypeError."""
     current_session().lifecycle.add_hook(h)
 
 
@@ -230,5 +230,5 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
 
 
 def load_command_line_node_params(argv: Sequence[str]) -> dict[str, object]:
-    """Return the private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raises ROSInitException."""
+    """Return the private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raise ROSInitException."""
     return private_parameters(names.parse_arguments(argv))

@@ -91,7 +91,7 @@ class Identity:
         self._arguments = names.parse_arguments(argv)
 
     def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
-        """Read the environment, and be the node ``name`` of the command line ``argv``. Raises ROSInitException."""
+        """Read the environment, and be the node ``name`` of the command line ``argv``. Raise ROSInitException."""
         arguments = self._arguments = names.parse_arguments(argv)
         self._is_named = True
         try:
@@ -107,7 +107,7 @@ class Identity:
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, object]:
-    """Return the values of ``_param:=value``, read as YAML. Raises ROSInitException on what is not YAML."""
+    """Return the values of ``_param:=value``, read as YAML. Raise ROSInitException on what is not YAML."""
     if arguments.wrong:
         raise ROSInitException(
             f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="

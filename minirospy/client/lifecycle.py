@@ -82,7 +82,7 @@ class Lifecycle:
     def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
         """Call ``hook`` when the node shuts down, or now where it has; ``hooks``: a list above, by default the first.
 
-        Raises TypeError.
+        Raise TypeError.
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
@@ -162,7 +162,7 @@ class Lifecycle:
         return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
-        """Notify the calling thread, whose sleep a shutdown has cut short. Raises ROSInterruptException.
+        """Notify the calling thread, whose sleep a shutdown has cut short. Raise ROSInterruptException.
 
         In a loop that polls is_shutdown() the sleep just ends early, as with rospy: the loop will poll, and what follows
         it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.

@@ -35,7 +35,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
     A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
     ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
-    written or read is reported in one line. Raises ValueError on a log level that is not one of rospy's.
+    written or read is reported in one line. Raise ValueError on a log level that is not one of rospy's.
     """
     if log_level is not None and log_level not in PYTHON_LEVELS:
         raise ValueError(

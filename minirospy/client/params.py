@@ -53,7 +53,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return a parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
-    Raises KeyError where it is neither set nor has a default, ROSException where the master fails.
+    Raise KeyError where it is neither set nor has a default, ROSException where the master fails.
     """
     value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
@@ -91,7 +91,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 def set_param(param_name: str, param_value: object) -> None:
     """Set a parameter; a dictionary sets a whole namespace.
 
-    Raises TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
+    Raise TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
     fails.
     """
     name = current_session().resolve(param_name)
@@ -106,7 +106,7 @@ def set_param(param_name: str, param_value: object) -> None:
 
 
 def has_param(param_name: str) -> bool:
-    """Return whether a parameter, or a namespace of that name, is set. Raises ROSException."""
+    """Return whether a parameter, or a namespace of that name, is set. Raise ROSException."""
     if not _may_be_name(param_name):
         return False
     name = current_session().resolve(param_name)
@@ -114,7 +114,7 @@ def has_param(param_name: str) -> bool:
 
 
 def delete_param(param_name: str) -> None:
-    """Delete a parameter. Raises KeyError where it is not set, ROSException where the master fails."""
+    """Delete a parameter. Raise KeyError where it is not set, ROSException where the master fails."""
     if not _may_be_name(param_name):
         raise KeyError(param_name)
     name = current_session().resolve(param_name)
@@ -130,7 +130,7 @@ def delete_param(param_name: str) -> None:
 def search_param(param_name: str) -> str | None:
     """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none.
 
-    Raises ROSException where the master fails, or the name is a private one.
+    Raise ROSException where the master fails, or the name is a private one.
     """
     name = current_session().identity.arguments.remappings.get(param_name, param_name)
     check_sendable(name)
@@ -146,7 +146,7 @@ def search_param(param_name: str) -> str | None:
 
 
 def get_param_names() -> list[str]:
-    """Return the names of all parameters. Raises ROSException."""
+    """Return the names of all parameters. Raise ROSException."""
     return _ask("list", "/", current_session().master.get_param_names)
 
 
@@ -161,7 +161,7 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter that get_param_cached was called for before. Raises KeyError."""
+        """Return a parameter that get_param_cached was called for before. Raise KeyError."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)

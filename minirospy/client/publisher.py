@@ -63,7 +63,7 @@ class Publisher(Topic[_M_co]):
     number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets
     the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
     subscribers, in a thread of the library, one event after the other; an object that is not a listener is ignored,
-    with a warning. Raises ValueError on a bad name, class or queue_size.
+    with a warning. Raise ValueError on a bad name, class or queue_size.
     """
 
     impl: PublishedTopic | None
@@ -106,7 +106,7 @@ class Publisher(Topic[_M_co]):
     def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
-        Raises ROSException before init_node and after unregister, ROSSerializationException or TypeError on
+        Raise ROSException before init_node and after unregister, ROSSerializationException or TypeError on
         values that do not fit. Waits for no subscriber longer than a few milliseconds, except with ``queue_size=None``.
         """
         state = self.impl
@@ -126,7 +126,7 @@ class Publisher(Topic[_M_co]):
         """Wait until so many subscribers are connected; False where ``timeout`` seconds were not enough.
 
         What is published before a subscriber is connected does not reach it, unless the topic is latched.
-        Raises ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
+        Raise ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
         """
         if self.impl is None:
             raise ROSException("wait_for_subscribers() on an unregistered() handle")
@@ -398,7 +398,7 @@ def _not_a_listener(value: object) -> str:
 
 
 def _checked_size(queue_size: int | None) -> int | None:
-    """Return a Publisher's queue_size as rospy reads it: a negative one means unlimited. Raises ValueError."""
+    """Return a Publisher's queue_size as rospy reads it: a negative one means unlimited. Raise ValueError."""
     if queue_size is None:
         return None
     try:

@@ -58,7 +58,7 @@ class Service(Generic[_S_co]):
     values, or the value of its only field. What it raises goes to the client as the call's error;
     ``error_handler(error, type, error, traceback)`` is called too, in place of a log line. Each connection has
     a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted and not needed.
-    Raises ValueError on an empty name, ServiceException where this node offers the service already.
+    Raise ValueError on an empty name, ServiceException where this node offers the service already.
     """
 
     def __init__(
@@ -211,7 +211,7 @@ class ServiceProxy(Generic[_S_co]):
     def __call__(self, *args: object, **kwds: object) -> Any:
         """Call the service and return its response.
 
-        Raises ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        Raise ServiceException where the call fails, TypeError or AttributeError where the arguments do not
         fit the request, SerializationError where a value does not.
         """
         return self.call(*args, **kwds)
@@ -233,7 +233,7 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._client, body, keep=True)
 
     def wait_for_service(self, timeout: float | None = None) -> None:
-        """Wait until the service is there. Raises ROSException after ``timeout`` seconds."""
+        """Wait until the service is there. Raise ROSException after ``timeout`` seconds."""
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
@@ -360,7 +360,7 @@ class ServiceProxy(Generic[_S_co]):
 def wait_for_service(service: str, timeout: float | Duration | None = None) -> None:
     """Wait until a service is registered and answers.
 
-    Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down, ValueError
+    Raise ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down, ValueError
     on a timeout of 0.
     """
     session = current_session()

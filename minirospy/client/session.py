@@ -108,7 +108,7 @@ class Session:
         return self._master
 
     def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
-        """Start the loop and the node's servers. Raises ROSInitException."""
+        """Start the loop and the node's servers. Raise ROSInitException."""
         # Imported here: a program that has no node need not pay for asyncio.
         from minirospy.runtime.node.node import Node
         from minirospy.runtime.transport.loop import LoopThread
@@ -169,13 +169,13 @@ class Session:
             logging.getLogger("rosout").error("%s", self.why_fork_has_no_effect(handle))
 
     def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
-        """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
+        """Run ``coroutine`` on the node's loop and wait for it. Raise ROSInterruptException at a shutdown."""
         return self.start(coroutine)()
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
         """Start ``coroutine`` on the node's loop, under a lock that orders the starts; what is returned waits for it.
 
-        Raises as :meth:`run` does.
+        Raise as :meth:`run` does.
         """
         assert self._loop is not None
         loop = self._loop
@@ -209,7 +209,7 @@ class Session:
         return self.lifecycle.poll_shutdown()
 
     def spin(self) -> None:
-        """Wait until the node shuts down. Raises ROSInitException before init_node."""
+        """Wait until the node shuts down. Raise ROSInitException before init_node."""
         if not self.initialized and not self.is_shutdown() and not self.is_fork:
             raise ROSInitException("client code must call rospy.init_node() first")
         if self.is_fork_without_node:

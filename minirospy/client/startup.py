@@ -45,7 +45,7 @@ def init_node(
     """Make this process the node ``name``; waits for a master.
 
     ``anonymous`` adds a number, so that many of a name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
-    Raises ValueError on a name that is empty or has a namespace, ROSException when called again with other
+    Raise ValueError on a name that is empty or has a namespace, ROSException when called again with other
     arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut down while it
     waits.
     """
@@ -83,7 +83,7 @@ def init_node(
 
 
 def start_clock() -> None:
-    """Follow /clock where the master's /use_sim_time is set. Raises ROSInitException where the master fails."""
+    """Follow /clock where the master's /use_sim_time is set. Raise ROSInitException where the master fails."""
     session = current_session()
     try:
         is_simulated = session.master.has_param("/use_sim_time") and session.master.get_param("/use_sim_time")
@@ -102,7 +102,7 @@ def _check_name(name: str) -> None:
 
 
 def _is_repeated(session: Session, arguments: tuple[object, ...]) -> bool:
-    """Return whether init_node was called before with the same arguments. Raises ROSException where with others."""
+    """Return whether init_node was called before with the same arguments. Raise ROSException where with others."""
     if session.init_arguments is None:
         return False
     if session.init_arguments != arguments:
@@ -166,7 +166,7 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _wait_for_master(session: Session) -> None:
-    """Wait until the master answers, and print once that it does not. Raises ROSInterruptException at a shutdown."""
+    """Wait until the master answers, and print once that it does not. Raise ROSInterruptException at a shutdown."""
     uri = session.identity.environment.master_uri
     is_reported = False
 

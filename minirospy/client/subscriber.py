@@ -42,7 +42,7 @@ class Subscriber(Topic[_M_co]):
     busy, keep only so many messages, the newest (None: all, in order). ``buff_size`` is accepted and not
     needed: freshness does not depend on it. Subscribers of one topic in a process share the connections;
     they keep as many messages as the largest queue_size. One that comes later to a latched topic gets
-    its last message before the constructor returns. Raises ValueError on a bad name or class,
+    its last message before the constructor returns. Raise ValueError on a bad name or class,
     ROSException on a bad size.
     """
 
@@ -102,7 +102,7 @@ class Subscriber(Topic[_M_co]):
 def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
     """Return the next message of ``topic``; ``timeout`` in seconds, or a Duration.
 
-    Raises ROSException after ``timeout``, ROSInterruptException where the node shuts down.
+    Raise ROSException after ``timeout``, ROSInterruptException where the node shuts down.
     """
     session = current_session()
     if session.is_fork_without_node:
@@ -224,7 +224,7 @@ class SubscribedTopic(SharedTopic):
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Call ``cb`` no more, which add_callback or a Subscriber was given. Raises KeyError."""
+        """Call ``cb`` no more, which add_callback or a Subscriber was given. Raise KeyError."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)

@@ -60,7 +60,7 @@ class Time(times.Time):
 
     @staticmethod
     def now() -> Time:
-        """Return the current time. Raises ROSInitException before init_node."""
+        """Return the current time. Raise ROSInitException before init_node."""
         return get_rostime()
 
     @classmethod
@@ -70,7 +70,7 @@ class Time(times.Time):
 
 
 def get_rostime() -> Time:
-    """Return the current time. Raises ROSInitException before init_node."""
+    """Return the current time. Raise ROSInitException before init_node."""
     session = current_session()
     if not session.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
@@ -78,7 +78,7 @@ def get_rostime() -> Time:
 
 
 def get_time() -> float:
-    """Return the current time in seconds. Raises ROSInitException before init_node."""
+    """Return the current time in seconds. Raise ROSInitException before init_node."""
     session = current_session()
     if not session.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
@@ -94,7 +94,7 @@ def sleep(duration: float | times.Duration) -> None:
     """Sleep for ``duration`` seconds; not at all where that is negative.
 
     Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that polls
-    is_shutdown(), by returning. Raises ROSTimeMovedBackwardsException where
+    is_shutdown(), by returning. Raise ROSTimeMovedBackwardsException where
     simulated time jumps back to before the sleep's start.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
@@ -110,7 +110,7 @@ class Rate:
     def __init__(self, hz: float, reset: bool = False) -> None:
         """``reset``: start again where simulated time jumps back, instead of raising.
 
-        Raises ZeroDivisionError on a rate of 0, ROSInitException before init_node.
+        Raise ZeroDivisionError on a rate of 0, ROSInitException before init_node.
         """
         self.last_time = get_rostime()
         self.sleep_dur = Duration(0, int(1e9 / hz))
@@ -121,7 +121,7 @@ class Rate:
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
-        """Sleep until the turn is over. Raises as :func:`sleep` does."""
+        """Sleep until the turn is over. Raise as :func:`sleep` does."""
         self._sleep(None)
 
     def _sleep(self, stop: threading.Event | None) -> None:

@@ -23,7 +23,7 @@ __all__ = [
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """[topic, type] of each published topic at or below ``namespace``. Raises ROSException."""
+    """[topic, type] of each published topic at or below ``namespace``. Raise ROSException."""
     try:
         return [list(pair) for pair in current_session().master.get_published_topics(namespace or "")]
     except (MasterUnreachableError, RpcError) as error:

@@ -148,7 +148,7 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, ready for the command's function. Raises CommandLineError."""
+        """Return the arguments by name, ready for the command's function. Raise CommandLineError."""
         parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
         return vars(parsed)
 
@@ -262,7 +262,7 @@ class AssignmentParser(Parser):
     """Takes NAME:=VALUE from among the words, as a launch file's arguments are given."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, what is assigned as ``args``. Raises CommandLineError."""
+        """Return the arguments by name, what is assigned as ``args``. Raise CommandLineError."""
         plain, assigned = split_assignments(words)
         return {**super().parse(plain), "args": assigned}
 

@@ -80,7 +80,7 @@ class Exporter:
         self._declared: list[Later] = []
 
     async def start(self) -> None:
-        """Announce the robot until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        """Announce the robot until :meth:`close`. Raise MasterUnreachableError, RpcError."""
         await self.look()
         network, ends = self._network, f"{self.claim.name}/{self.claim.gateway}"
         self._declared = [
@@ -113,7 +113,7 @@ class Exporter:
         self.outbound, self.inbound = {}, {}
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
+        """Announce the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
         changed = await self.graph.look()
         self._announce()
         await self._adjust()
@@ -194,11 +194,11 @@ class Exporter:
         for topic in list(self._readers):
             token = self.graph.topics.get(topic)
             if token and token.is_published and topic not in self.outbound:
-                lane = self._rules.lane(topic, token.type)
+                priority = self._rules.priority(topic, token.type)
                 outbound = OutboundTopic(
                     self._node,
                     token,
-                    self._sender.flow(lane, self._rules.rate(topic)),
+                    self._sender.flow(priority, self._rules.rate(topic)),
                     await self._definitions.rewriter(token.type, token.md5sum) if token.has_frames else None,
                 )
                 if topic in self._readers and topic not in self.outbound:

@@ -79,14 +79,14 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session, which waits for a router where one is to be there. Needs no started node. Raises BridgeError."""
+        """Open the session, which waits for a router where one is to be there. Needs no started node. Raise BridgeError."""
         if self.network is None:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
         """Connect to the fleet unless :meth:`connect` has, and pass on until :meth:`close`.
 
-        Raises BridgeError, MasterUnreachableError, RpcError, ROSInterruptException where the node is shut down before.
+        Raise BridgeError, MasterUnreachableError, RpcError, ROSInterruptException where the node is shut down before.
         """
         options = self.options
         # A thousand robots have thousands of topics: a master that does not register them is one line.
@@ -287,5 +287,5 @@ def _outflow(flow: Outflow) -> dict[str, object]:
         "bytes": flow.sent_bytes,
         "dropped": flow.dropped,
         "throttled": flow.throttled,
-        "lane": flow.lane.name.lower(),
+        "priority": flow.priority.name.lower(),
     }

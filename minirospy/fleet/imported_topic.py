@@ -285,8 +285,8 @@ class ImportedTopic:
             return
         shared, token = self._shared, self.token
         if self._outflow is None:
-            lane = shared.rules.lane(self.name, token.type)
-            self._outflow = shared.sender.flow(lane, shared.rules.rate(self.name))
+            priority = shared.rules.priority(self.name, token.type)
+            self._outflow = shared.sender.flow(priority, shared.rules.rate(self.name))
         md5sum = ANY if token.md5sum == UNKNOWN_MD5 else token.md5sum
         self._subscription = shared.node.subscribe_raw(
             self.name, self._heard, type_=InterfaceType(token.type, md5sum), on_change=self._offer

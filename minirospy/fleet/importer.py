@@ -129,7 +129,7 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        """Show robots until :meth:`close`. Raise MasterUnreachableError, RpcError."""
         self._node.parameters.listeners.append(self._parameter_changed)
         await self._node.parameters.add(MACHINES)
         await self._read_machines()

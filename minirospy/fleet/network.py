@@ -1,7 +1,7 @@
 """Zenoh, behind one file: the session of a gateway, its tokens, messages and queries.
 
 Zenoh calls back in its own threads; what this file calls back with comes on the event loop, but for messages, which go
-to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a lane's (:mod:`sender`).
+to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a priority's (:mod:`sender`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import TypeVar
 from minirospy.aio.tasks import Faults, keep_running
 from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.base.escape import escaped
-from minirospy.fleet.rules import Lane
+from minirospy.fleet.rules import Priority
 from minirospy.zenoh.library import (
     DEFAULT_ENDPOINT,
     DEFAULT_PORT,
@@ -250,23 +250,23 @@ class FleetNetwork:
     def _to_others(self) -> dict[str, object]:
         return {"allowed_destination": self._zenoh.Locality.REMOTE}
 
-    def outlet_to_others(self, key: str, lane: Lane) -> Outlet:
+    def outlet_to_others(self, key: str, priority: Priority) -> Outlet:
         """Return the same that does not send to this session itself."""
-        return self.outlet(key, lane, **self._to_others)
+        return self.outlet(key, priority, **self._to_others)
 
-    def outlet(self, key: str, lane: Lane, **options: object) -> Outlet:
-        """Return a publisher, with more ``options`` of Zenoh's; may block, as its ``put``: for a lane's thread."""
+    def outlet(self, key: str, priority: Priority, **options: object) -> Outlet:
+        """Return a publisher, with more ``options`` of Zenoh's; may block, as its ``put``: for a priority's thread."""
         zenoh = self._zenoh
         priorities = {
-            Lane.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
-            Lane.DATA: zenoh.Priority.DATA,
-            Lane.BULK: zenoh.Priority.BACKGROUND,
+            Priority.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
+            Priority.DATA: zenoh.Priority.DATA,
+            Priority.BULK: zenoh.Priority.BACKGROUND,
         }
         return self._session.declare_publisher(
             key,
-            priority=priorities[lane],
+            priority=priorities[priority],
             congestion_control=zenoh.CongestionControl.BLOCK,
-            express=lane is Lane.TELEOP,
+            express=priority is Priority.TELEOP,
             **options,
         )
 

@@ -110,7 +110,7 @@ def _robot_lines(answer: Answer, robots: Iterable[Answer], controls: Iterable[An
     found = [", ".join(part for part in parts if part)]
     found += [
         f"  sends {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')} "
-        f"({_size(_number(link, 'bytes'))}, {_text(link, 'lane')}), {_number(link, 'dropped')} dropped, "
+        f"({_size(_number(link, 'bytes'))}, {_text(link, 'priority')}), {_number(link, 'dropped')} dropped, "
         f"{_number(link, 'throttled')} over its rate"
         for link in _tables(status, "sent")
     ]

@@ -111,7 +111,7 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Pass until :meth:`close`. Raises BridgeError, MasterUnreachableError, RpcError."""
+        """Pass until :meth:`close`. Raise BridgeError, MasterUnreachableError, RpcError."""
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()
         if self._others:
@@ -149,7 +149,7 @@ class Ros1Side:
             await marker.close()
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; return whether it has changed. Raises MasterUnreachableError, RpcError."""
+        """Announce the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
         changed = await self.graph.look()
         # What is announced can be used already: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()

@@ -114,7 +114,7 @@ class Ros1Topic:
             self._matching, self._is_matched = None, False
         if self._is_sent and self.outbound is None:
             flow = shared.sender.flow(
-                shared.rules.lane(token.topic, token.type), shared.rules.rate(token.topic), is_bare=True
+                shared.rules.priority(token.topic, token.type), shared.rules.rate(token.topic), is_bare=True
             )
             self.outbound = OutboundTopic(shared.node, token, flow, key=self._key, is_left_out=_is_marked)
             self.outbound.open()

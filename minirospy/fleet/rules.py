@@ -1,4 +1,4 @@
-"""Which topics and services a gateway passes on, how often, and in which lane. Pure."""
+"""Which topics and services a gateway passes on, how often, and in which priority. Pure."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from minirospy.introspect.snapshot import Snapshot
 __all__ = [
     "Export",
     "GatewayRules",
-    "Lane",
+    "Priority",
     "Throttle",
     "exported_services",
     "exported_topics",
     "is_logger_service",
-    "lane_of_type",
-    "parse_lanes",
+    "parse_priorities",
     "parse_rates",
+    "priority_of_type",
 ]
 
 _MAX_HERTZ = 10_000.0
 _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
-class Lane(IntEnum):
-    """A priority, each with a separate queue and thread: what is slow to send does not hold up a lane before it."""
+class Priority(IntEnum):
+    """A priority. Each has its own queue and thread, so that a slow message does not delay one of a higher priority."""
 
     TELEOP = 0
     DATA = 1
@@ -62,14 +62,17 @@ STOP_SECONDS = 0.5  # without a command before a zero is published; two commands
 
 @dataclass(frozen=True)
 class GatewayRules:
-    """What a gateway may pass on, and how. ``rates`` (Hz) and ``lanes`` by patterns of names: the first that matches counts."""
+    """What a gateway may pass on, and how.
+
+    ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches counts.
+    """
 
     topics: NameFilter = field(default_factory=NameFilter)
     services: NameFilter = field(default_factory=NameFilter)
     parameters: NameFilter = field(default_factory=NameFilter)
     robots: NameFilter = field(default_factory=NameFilter)
     rates: Sequence[tuple[str, float]] = ()
-    lanes: Sequence[tuple[str, Lane]] = ()
+    priorities: Sequence[tuple[str, Priority]] = ()
     has_frames: bool = False
     stop_seconds: float = STOP_SECONDS
     """A stream of velocities that comes here and ends is followed by a zero after this; 0: it is not."""
@@ -78,10 +81,10 @@ class GatewayRules:
         """Return the most messages a second of a topic; 0 where it is not limited."""
         return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
 
-    def lane(self, topic: str, type_: str) -> Lane:
-        """Return the lane of a topic."""
-        named = (lane for pattern, lane in self.lanes if fnmatchcase(topic, pattern))
-        return next(named, lane_of_type(type_))
+    def priority(self, topic: str, type_: str) -> Priority:
+        """Return the priority of a topic."""
+        named = (priority for pattern, priority in self.priorities if fnmatchcase(topic, pattern))
+        return next(named, priority_of_type(type_))
 
 
 @dataclass(frozen=True)
@@ -112,11 +115,11 @@ class Throttle:
         return True
 
 
-def lane_of_type(type_: str) -> Lane:
-    """Return the lane of a type where no rule names the topic."""
+def priority_of_type(type_: str) -> Priority:
+    """Return the priority of a type, for a topic that no rule names."""
     if type_ in _TELEOP_TYPES:
-        return Lane.TELEOP
-    return Lane.BULK if type_ in _BULK_TYPES else Lane.DATA
+        return Priority.TELEOP
+    return Priority.BULK if type_ in _BULK_TYPES else Priority.DATA
 
 
 def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
@@ -134,9 +137,9 @@ def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
     return found
 
 
-def parse_lanes(words: Iterable[str]) -> list[tuple[str, Lane]]:
-    """Return patterns and lanes of words such as ``/arm/*=teleop``. Raise BridgeError."""
-    names = {lane.name.lower(): lane for lane in Lane}
+def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
+    """Return patterns and priorities of words such as ``/arm/*=teleop``. Raise BridgeError."""
+    names = {priority.name.lower(): priority for priority in Priority}
     found = []
     for word in words:
         pattern, text = _halves(word, "--priority", "/arm/*=teleop")

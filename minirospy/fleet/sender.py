@@ -9,17 +9,17 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from minirospy.aio.tasks import Faults
+from minirospy.fleet.flows import Flow, FlowQueue
 from minirospy.fleet.keys import Stamp, serialize_stamp
-from minirospy.fleet.lanes import Flow, FlowQueue
 from minirospy.fleet.network import FleetNetwork, Outlet
-from minirospy.fleet.rules import Lane, Throttle
+from minirospy.fleet.rules import Priority, Throttle
 
 __all__ = ["Intake", "Outflow", "Sender"]
 
 _log = logging.getLogger(__name__)
 _CLOSE_SECONDS = 2.0
-_MAX_WAITING = {Lane.TELEOP: 10, Lane.DATA: 100, Lane.BULK: 2}
-_MAX_BYTES = {Lane.TELEOP: 1 << 20, Lane.DATA: 8 << 20, Lane.BULK: 32 << 20}
+_MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
+_MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 _MAX_OUTLETS = 64
 """Publishers of Zenoh that a flow keeps: its own, and those of readers that got latched messages, least recent first to go."""
@@ -56,13 +56,13 @@ class _Worker:
 class Outflow:
     """A topic's messages to the fleet; made by :meth:`Sender.flow`. ``send`` may be called from any thread."""
 
-    def __init__(self, worker: _LaneWorker, lane: Lane, hertz: float, is_bare: bool) -> None:
-        self.lane = lane
+    def __init__(self, worker: _PriorityWorker, priority: Priority, hertz: float, is_bare: bool) -> None:
+        self.priority = priority
         self.is_bare = is_bare
         self.throttled = 0
         self._worker = worker
         self._throttle = Throttle(hertz)
-        self._flow: Flow[tuple[str, bytes]] = Flow(_MAX_WAITING[lane], _MAX_BYTES[lane])
+        self._flow: Flow[tuple[str, bytes]] = Flow(_MAX_WAITING[priority], _MAX_BYTES[priority])
         self._outlets: dict[str, Outlet] = {}
         self._numbers: dict[str, int] = {}
 
@@ -93,10 +93,10 @@ class Outflow:
         self._worker.end(self)
 
 
-class _LaneWorker(_Worker):
-    def __init__(self, lane: Lane, network: FleetNetwork, clock: Callable[[], int]) -> None:
-        super().__init__(f"fleet-{lane.name.lower()}")
-        self._lane = lane
+class _PriorityWorker(_Worker):
+    def __init__(self, priority: Priority, network: FleetNetwork, clock: Callable[[], int]) -> None:
+        super().__init__(f"fleet-{priority.name.lower()}")
+        self._priority = priority
         self._network = network
         self._clock = clock
         self._queue: FlowQueue[tuple[str, bytes]] = FlowQueue()
@@ -144,7 +144,7 @@ class _LaneWorker(_Worker):
                 outflow._numbers.pop(oldest, None)
                 outflow._outlets.pop(oldest).undeclare()
             make = self._network.outlet_to_others if outflow.is_bare else self._network.outlet
-            outlet = make(key, self._lane)
+            outlet = make(key, self._priority)
         outflow._outlets[key] = outlet
         if outflow.is_bare:
             outlet.put(message)
@@ -154,20 +154,20 @@ class _LaneWorker(_Worker):
 
 
 class Sender:
-    """Sends messages, each lane in its own thread: a large one that takes a second does not hold up a command."""
+    """Sends messages, each priority in its own thread: a large one that takes a second does not hold up a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
         """``clock``: returns the time in ns that goes with each message."""
-        self._lanes = {lane: _LaneWorker(lane, network, clock) for lane in Lane}
+        self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
-    def flow(self, lane: Lane, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
+    def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
         """Return a topic's flow, of at most so many messages a second (0: all). ``is_bare``: for others, without stamps."""
-        return Outflow(self._lanes[lane], lane, hertz, is_bare)
+        return Outflow(self._priorities[priority], priority, hertz, is_bare)
 
     def close(self) -> None:
         """End the threads. Idempotent."""
-        for lane in self._lanes.values():
-            lane.close()
+        for worker in self._priorities.values():
+            worker.close()
 
 
 _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]

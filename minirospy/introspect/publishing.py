@@ -25,7 +25,7 @@ def values_to_publish(
 ) -> Iterator[list[object]]:
     """Yield the YAML values of each message with ``fields``; at least one.
 
-    ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raises
+    ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raise
     UsageError without values, NotFoundError if the file does not exist, ValueTextError on what is not YAML.
     """
     if arguments or (file is None and not fields):

@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the present graph; ``call(method, *arguments)`` calls the master. Raises as it does."""
+    """Return the present graph; ``call(method, *arguments)`` calls the master. Raise as it does."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -61,7 +61,7 @@ class ToolNode:
     """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it has to stop.
 
     ``clock`` gives the time of messages: the machine's time; with ``ros_time`` that of /clock where the parameter
-    /use_sim_time requests it, which ``simulated`` says then. Raises MasterUnreachableError where no master answers.
+    /use_sim_time requests it, which ``simulated`` says then. Raise MasterUnreachableError where no master answers.
     """
 
     def __init__(

@@ -37,7 +37,7 @@ def is_private(name: str | None) -> bool | str | None:
 
 
 def namespace(name: str) -> str:
-    """Return the namespace of a name, with a trailing slash. Raises ValueError on None, TypeError on another type."""
+    """Return the namespace of a name, with a trailing slash. Raise ValueError on None, TypeError on another type."""
     if name is None:
         raise ValueError("name")
     if not isinstance(name, str):
@@ -70,7 +70,7 @@ def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] 
 
 
 def make_global_ns(name: str) -> str:
-    """Return a name as a namespace, with a slash on both ends. Raises ValueError on a private one."""
+    """Return a name as a namespace, with a slash on both ends. Raise ValueError on a private one."""
     if is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
     name = name if is_global(name) else SEP + name

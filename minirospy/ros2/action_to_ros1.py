@@ -104,7 +104,7 @@ class GoalsToRos1:
         ]
 
     async def open(self) -> None:
-        """Connect to the server, then offer the action. Raises TypesDiffer."""
+        """Connect to the server, then offer the action. Raise TypesDiffer."""
         for end in (self._goal, self._cancel, *self._subscriptions):
             await end
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)

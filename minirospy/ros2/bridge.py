@@ -149,7 +149,7 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Bridge until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        """Bridge until :meth:`close`. Raise MasterUnreachableError, RpcError."""
         await self._parameters.start()
         await self.look()
         faults = Faults(self.node.log, "the watch of both graphs")
@@ -171,7 +171,7 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return what would be bridged, and why something is not; opens nothing. Raises as :meth:`look`."""
+        """Return what would be bridged, and why something is not; opens nothing. Raise as :meth:`look`."""
         snapshot = await self._snapshot()
         topics = pairs(await self._wanted(snapshot), self._converter)
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
@@ -182,7 +182,7 @@ class Ros2Bridge:
             await self._changed.wait()
 
     async def look(self) -> bool:
-        """Open and close links as the graphs are now; whether any changed. Raises MasterUnreachableError, RpcError."""
+        """Open and close links as the graphs are now; whether any changed. Raise MasterUnreachableError, RpcError."""
         snapshot = await self._snapshot()
         has_changed = await self.topics.update(await self._wanted(snapshot))
         has_changed |= await self.services.look(snapshot.services)

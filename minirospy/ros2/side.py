@@ -110,7 +110,7 @@ class RclpySide:
     """ROS 2 by rclpy: one node, one executor, in one thread."""
 
     def __init__(self, name: str) -> None:
-        """Start the node. Raises BridgeError."""
+        """Start the node. Raise BridgeError."""
         require_rclpy()
         os.environ.update(large_message_settings(os.environ))
         rclpy = importlib.import_module("rclpy")

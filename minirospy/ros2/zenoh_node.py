@@ -86,7 +86,7 @@ class ZenohNode:
     """A session with one node. ``graph``: the nodes and ends of other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
-        """Open the session; waits for the router. Raises BridgeError."""
+        """Open the session; waits for the router. Raise BridgeError."""
         require_zenoh("ros2-bridge --zenoh")
         self.zenoh = importlib.import_module("zenoh")
         self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))

@@ -38,7 +38,7 @@ class ZenohSide:
     """ROS 2 by Zenoh: one session with one node."""
 
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
-        """Open the session; waits for the router. Raises BridgeError."""
+        """Open the session; waits for the router. Raise BridgeError."""
         self._name = name
         self._node = ZenohNode(name, options)
         self._graph = self._node.graph

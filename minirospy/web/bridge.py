@@ -127,7 +127,7 @@ class Bridge:
         self._reporting: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen. Raises BridgeError."""
+        """Listen. Raise BridgeError."""
         tls = self._tls()
         served: list[tuple[str, list[Endpoint], int | None]] = [
             ("foxglove", [self.foxglove, *self._addition.endpoints], self.options.foxglove_port),
@@ -149,7 +149,7 @@ class Bridge:
         tls: ssl.SSLContext | None,
         public: Mapping[str, HttpHandler],
     ) -> Listener:
-        """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
+        """Return a listener of a protocol. Raise BridgeError where the port is in use, unless it is to be tried again."""
         listener = Listener(
             endpoints,
             self.options.access,

@@ -265,7 +265,7 @@ class SharedGraph:
         self._look_soon.set()
 
     async def look(self) -> None:
-        """Look at the graph, and report what has changed. Raises MasterUnreachableError, RpcError."""
+        """Look at the graph, and report what has changed. Raise MasterUnreachableError, RpcError."""
         # One at a time: a look that started earlier must not replace the snapshot of a later one.
         async with self._looking:
             found = await fetch(self.node._node.master)

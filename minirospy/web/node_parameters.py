@@ -34,7 +34,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter. Raises BridgeError where it is of another type."""
+    """Return a parameter. Raise BridgeError where it is of another type."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")
@@ -42,7 +42,7 @@ def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T)
 
 
 def number(private: Mapping[str, object], name: str, default: float) -> float:
-    """Return a parameter that is a number. Raises BridgeError."""
+    """Return a parameter that is a number. Raise BridgeError."""
     found = private.get(name, default)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a number")
@@ -50,7 +50,7 @@ def number(private: Mapping[str, object], name: str, default: float) -> float:
 
 
 def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
-    """Return a parameter that is a list of strings. Raises BridgeError."""
+    """Return a parameter that is a list of strings. Raise BridgeError."""
     found = private.get(name, default)
     if not isinstance(found, list | tuple) or not all(isinstance(each, str) for each in found):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a list of strings")
@@ -66,7 +66,7 @@ def globs(private: Mapping[str, object], name: str) -> list[str]:
 
 
 def address_of(private: Mapping[str, object]) -> str:
-    """Return the address to listen at. Raises BridgeError."""
+    """Return the address to listen at. Raise BridgeError."""
     return value(private, "address", str, "") or "127.0.0.1"
 
 
@@ -75,7 +75,7 @@ def access_of(
 ) -> Access:
     """Return the rules for clients, with the tokens of the environment.
 
-    Where other machines may connect and there are none, the tokens are those that are kept for this user. Raises BridgeError.
+    Where other machines may connect and there are none, the tokens are those that are kept for this user. Raise BridgeError.
     """
     beyond = not is_loopback(address_of(private))
     tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))

@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge next to a player, on a separate loop; a context manager. Raises BridgeError."""
+    """A bridge next to a player, on a separate loop; a context manager. Raise BridgeError."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)

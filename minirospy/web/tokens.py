@@ -45,7 +45,7 @@ def _is_own(found: os.stat_result) -> bool:
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME; new ones where there are none, or with ``renews``. Raises BridgeError."""
+    """Return the tokens in ROS_HOME; new ones where there are none, or with ``renews``. Raise BridgeError."""
     found = None if renews else read_tokens(home)
     if found:
         return found

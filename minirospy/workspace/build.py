@@ -99,7 +99,7 @@ class Workspace(NamedTuple):
 def find_workspace(start: Path) -> Path:
     """Return the workspace that contains ``start``: where it was built before, or where the folder src is.
 
-    Raises BuildError.
+    Raise BuildError.
     """
     start = start.resolve()
     for folder in (start, *start.parents):
@@ -115,7 +115,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
     """Return the plans of all packages below a folder, in the order to build them in.
 
     ``variables`` as in read_plan; CATKIN_BLACKLIST_PACKAGES names those that are not read.
-    Raises BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
+    Raise BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
     """
     plans: dict[str, Plan] = {}
     left_out = (variables or {}).get("CATKIN_BLACKLIST_PACKAGES", "").split(";")
@@ -135,7 +135,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Return each package after those that it is built from. Raises BuildError on a cycle."""
+    """Return each package after those that it is built from. Raise BuildError on a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
@@ -167,7 +167,7 @@ def build(
     """Build the packages (``chosen`` of them, or all) into the devel folder; ``report`` is called with each.
 
     ``outside`` is where the packages of other workspaces and of minirospy are found.
-    Raises BuildError, DefinitionError.
+    Raise BuildError, DefinitionError.
     """
     builder = _Builder(workspace, plans, outside)
     for plan in plans:
@@ -278,7 +278,7 @@ class _Builder:
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """Return the generated modules of a package: file -> text. Raises DefinitionError, BuildError."""
+        """Return the generated modules of a package: file -> text. Raise DefinitionError, BuildError."""
         folder = self._modules / plan.name
         try:
             texts = compile_package(self._catalogue, plan.name)

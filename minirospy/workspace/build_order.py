@@ -26,7 +26,7 @@ def build_order(
 
     A package is built from what it needs to build and test, from what those need to run, and from the packages
     that ``also`` has for its name. Message generators and what they need go before all others.
-    Raises CircularDependencyError.
+    Raise CircularDependencyError.
     """
     routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
     early = _generators(manifests, routes)

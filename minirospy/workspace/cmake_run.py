@@ -53,7 +53,7 @@ class _Leave(Exception):
 def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
     """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is one of the environment.
 
-    Raises BuildError: no such file, a bracket that does not close, a condition or a pattern that does not parse.
+    Raise BuildError: no such file, a bracket that does not close, a condition or a pattern that does not parse.
     """
     return _Run(file.parent, dict(variables), {}, 0).file(file)
 
@@ -120,7 +120,7 @@ class _Run:
         }
 
     def file(self, file: Path) -> Iterator[Command]:
-        """Yield the commands of a file. Raises BuildError."""
+        """Yield the commands of a file. Raise BuildError."""
         try:
             text = file.read_text(encoding="utf-8", errors="replace")
         except OSError as error:

@@ -33,7 +33,7 @@ class NewPackage(NamedTuple):
 
 
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
-    """Make the package's folder below ``parent``; return the files and folders made. Raises UsageError."""
+    """Make the package's folder below ``parent``; return the files and folders made. Raise UsageError."""
     if not _NAME.match(package.name):
         raise UsageError(
             f"[{package.name}] is not a name for a package: lower-case letters, digits and underscores, a letter first"

@@ -75,14 +75,14 @@ class Dependencies:
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """Return the folder of a package. Raises NotFoundError, with the nearest names."""
+        """Return the folder of a package. Raise NotFoundError, with the nearest names."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
         return folder
 
     def manifest(self, name: str) -> Manifest:
-        """Return the manifest of a package or metapackage. Raises NotFoundError, ManifestError."""
+        """Return the manifest of a package or metapackage. Raise NotFoundError, ManifestError."""
         if name not in self._manifests:
             # Not imported above, as `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
@@ -91,7 +91,7 @@ class Dependencies:
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return the packages that a package names, by kind of tag. Raises NotFoundError, ManifestError."""
+        """Return the packages that a package names, by kind of tag. Raise NotFoundError, ManifestError."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
@@ -100,7 +100,7 @@ class Dependencies:
     def all(self, name: str) -> list[str]:
         """Return what a package needs, directly or not; each after what it needs itself.
 
-        Raises CircularDependencyError and as :meth:`direct`.
+        Raise CircularDependencyError and as :meth:`direct`.
         """
         found: dict[str, None] = {}
 
@@ -118,12 +118,12 @@ class Dependencies:
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
         """Yield each dependency below the package that names it, with its depth from 0; repeated where it is named again.
 
-        Raises as :meth:`all`.
+        Raise as :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return each path from a package to another that it needs. Raises as :meth:`all`."""
+        """Return each path from a package to another that it needs. Raise as :meth:`all`."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):
@@ -133,12 +133,12 @@ class Dependencies:
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """Return the packages that name this one, sorted. Raises NotFoundError."""
+        """Return the packages that name this one, sorted. Raise NotFoundError."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """Return the packages that need this one, directly or not, sorted. Raises NotFoundError."""
+        """Return the packages that need this one, directly or not, sorted. Raise NotFoundError."""
         found: dict[str, None] = {}
         waiting = [name]
         while waiting:
@@ -149,7 +149,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return every name that a package depends on, of any kind, sorted. Raises NotFoundError, ManifestError."""
+        """Return every name that a package depends on, of any kind, sorted. Raise NotFoundError, ManifestError."""
         self.folder(name)
         return sorted(self.manifest(name).depends())
 

@@ -19,7 +19,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy what one package installs; return the number of files. Raises BuildError."""
+    """Copy what one package installs; return the number of files. Raise BuildError."""
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():

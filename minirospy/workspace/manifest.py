@@ -140,7 +140,7 @@ def naming_warning(name: str) -> str | None:
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
     """Return the manifest in a file, or in the package.xml of a folder; conditions see ``variables`` above VARIABLES.
 
-    Raises ManifestError: no such file, not XML, not a package, no name, a condition that does not parse.
+    Raise ManifestError: no such file, not XML, not a package, no name, a condition that does not parse.
     """
     if path.is_dir():
         path = path / "package.xml"
@@ -152,7 +152,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Return the manifest of a text; ``path`` is for the errors. Raises ManifestError as read_manifest does."""
+    """Return the manifest of a text; ``path`` is for the errors. Raise ManifestError as read_manifest does."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -162,7 +162,7 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
 def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
     """Return whether ``$ROS_VERSION == 1 and ...`` holds; what is compared is text, and an unknown variable is empty.
 
-    Raises ValueError with what is wrong.
+    Raise ValueError with what is wrong.
     """
     return _Condition(condition, variables).value()
 

@@ -70,7 +70,7 @@ class Packages:
         return packages
 
     def find(self, name: str) -> Path:
-        """Return the folder of a package. Raises NotFoundError with the nearest names."""
+        """Return the folder of a package. Raise NotFoundError with the nearest names."""
         for root in self.roots:
             # Where a folder is named as its package, nothing else need be read.
             if package_name(root / name) == name:
@@ -111,7 +111,7 @@ class Packages:
     def find_executable(self, package: str, name: str) -> list[str]:
         """Return the command that runs a package's program; of several programs of a name, the first.
 
-        Python programs run in this interpreter, not in the one that ``env`` finds. Raises NotFoundError with the nearest names,
+        Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError with the nearest names,
         NotExecutableError.
         """
         return self.find_executables(package, name)[0]
@@ -119,7 +119,7 @@ class Packages:
     def find_executables(self, package: str, name: str) -> list[list[str]]:
         """Return each command that a name, or a path in the package, may mean: more than one where folders share a name.
 
-        Raises as :meth:`find_executable`.
+        Raise as :meth:`find_executable`.
         """
         folder = self.find(package)
         candidates = (
@@ -141,7 +141,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Return a launch file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
+        """Return a launch file of a package, by its path or, below the package, by its name. Raise NotFoundError."""
         folder = self.find(package)
         if (folder / name).is_file():
             return folder / name

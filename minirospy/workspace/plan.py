@@ -140,7 +140,7 @@ class Plan(NamedTuple):
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """Return the plan of the package in ``folder``; ``variables`` are what ``catkin_make -DNAME=VALUE`` sets.
 
-    Raises ManifestError, BuildError.
+    Raise ManifestError, BuildError.
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
@@ -203,7 +203,7 @@ class _Collector:
         }
 
     def read(self, command: Command) -> None:
-        """Record what a command requires. Raises BuildError."""
+        """Record what a command requires. Raise BuildError."""
         reader = self._readers.get(command.name)
         if reader is None:
             return

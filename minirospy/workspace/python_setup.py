@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts that ``folder``/setup.py names. Raises BuildError with its line."""
+    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError with its line."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -70,7 +70,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return an argument of ``setup()``; of None and of nothing, an empty one. Raises BuildError."""
+    """Return an argument of ``setup()``; of None and of nothing, an empty one. Raise BuildError."""
     value = given.get(name) or kind()
     if not isinstance(value, kind):
         raise BuildError(str(file), 0, f"{name} is {value!r}: {name}={form} is its form")
@@ -85,7 +85,7 @@ def _names(file: Path, given: Mapping[str, object], name: str) -> list[str]:
 
 
 def _run(file: Path) -> Mapping[str, object]:
-    """Run a setup.py and return the arguments of its ``setup()``. Raises BuildError."""
+    """Run a setup.py and return the arguments of its ``setup()``. Raise BuildError."""
     given: dict[str, object] = {}
     why = ""
 

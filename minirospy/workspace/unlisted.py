@@ -22,7 +22,7 @@ _FIELD = re.compile(
 
 
 def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
-    """Return the plans; messages that are used and not listed are among their definitions. Raises DefinitionError."""
+    """Return the plans; messages that are used and not listed are among their definitions. Raise DefinitionError."""
     # Which exist: a workspace seldom has any, and then no definition is read.
     unlisted = {
         f"{plan.name}/{path.stem}": path

@@ -28,7 +28,7 @@ from minirospy.fleet.keys import (
 )
 from minirospy.fleet.network import _CONTROL_QUERIES, _QUERIES
 from minirospy.fleet.report import Answer, as_json, lines, parse_answer
-from minirospy.fleet.rules import GatewayRules, Lane
+from minirospy.fleet.rules import GatewayRules, Priority
 from minirospy.fleet.sender import _MAX_OUTLETS, Intake, Sender
 from tests.waiting import until
 
@@ -107,15 +107,15 @@ def test_a_full_table_of_flows_makes_room_for_a_new_writer() -> None:
 def test_readers_that_come_and_go_leave_no_publishers_behind() -> None:
     there: list[str] = []
 
-    def outlet(key: str, _: Lane) -> Any:
+    def outlet(key: str, _: Priority) -> Any:
         there.append(key)
         return stub(put=lambda *_, **__: None, undeclare=lambda: there.remove(key))
 
     sender = Sender(stub(outlet=outlet))
-    flow = sender.flow(Lane.DATA)
+    flow = sender.flow(Priority.DATA)
     for number in range(3 * _MAX_OUTLETS):
-        sender._lanes[Lane.DATA]._put(flow, f"reader{number}", b"")
-        sender._lanes[Lane.DATA]._put(flow, "all", b"")
+        sender._priorities[Priority.DATA]._put(flow, f"reader{number}", b"")
+        sender._priorities[Priority.DATA]._put(flow, "all", b"")
     assert len(there) == len(flow._outlets) == len(flow._numbers) == _MAX_OUTLETS
     assert flow._numbers["all"] == 3 * _MAX_OUTLETS
 

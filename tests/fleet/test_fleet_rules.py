@@ -20,21 +20,21 @@ from minirospy.fleet import keys
 from minirospy.fleet.clocks import ClockOffset, Delay, Ping, offset_of
 from minirospy.fleet.contents import MAX_NAMES, FleetContents
 from minirospy.fleet.definitions import checked_specs
+from minirospy.fleet.flows import Flow, FlowQueue
 from minirospy.fleet.frames import FrameRewriter, prefixed, stripped
 from minirospy.fleet.holders import HOLD_SECONDS
 from minirospy.fleet.keys import ROOT, Claim, Offer, ServiceToken, Stamp, TopicToken, Want
-from minirospy.fleet.lanes import Flow, FlowQueue
 from minirospy.fleet.network import EndpointError, is_loopback_endpoint, to_endpoint
 from minirospy.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.fleet.rules import (
     GatewayRules,
-    Lane,
+    Priority,
     Throttle,
     exported_services,
     exported_topics,
-    lane_of_type,
-    parse_lanes,
+    parse_priorities,
     parse_rates,
+    priority_of_type,
 )
 from minirospy.introspect.snapshot import Snapshot
 
@@ -155,14 +155,17 @@ def test_exports_are_what_others_have() -> None:
     assert exported_services(snapshot, {"/gw"}, NameFilter.of(["/x/*"])).keys() == {"/x/get_loggers"}
 
 
-def test_rates_and_lanes_go_by_the_first_pattern() -> None:
-    rates, lanes = parse_rates(["/camera/*=5", "*=100"]), parse_lanes(["/camera/cmd=teleop"])
-    rules = GatewayRules(rates=rates, lanes=lanes)
+def test_rates_and_priorities_go_by_the_first_pattern() -> None:
+    rates, priorities = parse_rates(["/camera/*=5", "*=100"]), parse_priorities(["/camera/cmd=teleop"])
+    rules = GatewayRules(rates=rates, priorities=priorities)
     assert (rules.rate("/camera/image"), rules.rate("/scan")) == (5.0, 100.0)
     assert GatewayRules().rate("/scan") == 0
-    assert rules.lane("/camera/cmd", "sensor_msgs/Image") is Lane.TELEOP
-    assert rules.lane("/camera/image", "sensor_msgs/Image") is Lane.BULK
-    assert (lane_of_type("geometry_msgs/Twist"), lane_of_type("std_msgs/String")) == (Lane.TELEOP, Lane.DATA)
+    assert rules.priority("/camera/cmd", "sensor_msgs/Image") is Priority.TELEOP
+    assert rules.priority("/camera/image", "sensor_msgs/Image") is Priority.BULK
+    assert (priority_of_type("geometry_msgs/Twist"), priority_of_type("std_msgs/String")) == (
+        Priority.TELEOP,
+        Priority.DATA,
+    )
 
 
 @pytest.mark.parametrize(
@@ -172,7 +175,7 @@ def test_bad_rates_are_refused(word: str) -> None:
     with pytest.raises(BridgeError, match="--rate"):
         parse_rates([word])
     with pytest.raises(BridgeError, match="--priority"):
-        parse_lanes([word])
+        parse_priorities([word])
 
 
 def test_a_throttle_keeps_the_mean_rate() -> None:

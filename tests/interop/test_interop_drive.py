@@ -13,7 +13,7 @@ from tests.interop.browser import Page
 from tests.interop.page_modules import needs_node, run_script
 from tests.interop.test_interop_dashboard import address, browse, is_zero, needs_chromium, press
 from tests.web.dashboard.conftest import Served, serve
-from tests.web.dashboard.test_drive_door import listen
+from tests.web.dashboard.test_drive_endpoint import listen
 
 __all__ = ["browse", "serve"]
 

@@ -64,7 +64,7 @@ class Peer:
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def ask(self, command: str, argument: Any) -> Any:
-        """Return the answer of one of genpy_peer's commands. Raises RealError."""
+        """Return the answer of one of genpy_peer's commands. Raise RealError."""
         assert self._program.stdin
         assert self._program.stdout
         request = pickle.dumps((command, argument))

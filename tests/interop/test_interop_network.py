@@ -36,7 +36,7 @@ HOSTS = f"127.0.0.1 localhost\n::1 localhost\n{ALPHA} alpha\n{BETA} beta\n{ALPHA
 
 
 def sh(command: str) -> None:
-    """Run a command of `ip`. Raises CalledProcessError."""
+    """Run a command of `ip`. Raise CalledProcessError."""
     subprocess.run(command.split(), check=True, capture_output=True, text=True)
 
 
@@ -52,7 +52,7 @@ class Network:
         sh(f"ip -n {self.names[machine]} {command}")
 
     def build(self) -> None:
-        """Make the machines. Raises CalledProcessError where this is not permitted."""
+        """Make the machines. Raise CalledProcessError where this is not permitted."""
         for name in self.names.values():
             sh(f"ip netns add {name}")
 

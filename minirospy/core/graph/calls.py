@@ -86,7 +86,7 @@ class Dispatcher:
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
     def dispatch(self, name: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
         method = self.methods.get(name)
         if method is None:
             return self._dispatch_system(name, args)

@@ -215,7 +215,7 @@ _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
     """Return what a client in ``state`` passes through when it receives ``status``; None where that cannot follow.
 
-    Raises KeyError on a status that servers do not publish.
+    Raise KeyError on a status that servers do not publish.
     """
     if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
         raise KeyError(status)

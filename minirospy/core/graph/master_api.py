@@ -144,7 +144,7 @@ class MasterApi(ABC):
         """Return the state of this master: minirospy's own, for `minirospy master --status`."""
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
     # --- about the master

@@ -37,7 +37,7 @@ class ParameterCache:
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return what was stored for ``key`` and has not changed since. Raises LookupError."""
+        """Return what was stored for ``key`` and has not changed since. Raise LookupError."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:

@@ -90,7 +90,7 @@ class ParameterTree:
         self._bytes = 0
 
     def get(self, key: str) -> object:
-        """Return the value, or the dictionary of a namespace. Raises KeyError."""
+        """Return the value, or the dictionary of a namespace. Raise KeyError."""
         value = self._find(_split(key))
         if value is _UNSET:
             raise KeyError(key)
@@ -124,7 +124,7 @@ class ParameterTree:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Count again, since values that were replaced are still counted. Raises ParametersFullError."""
+        """Count again, since values that were replaced are still counted. Raise ParametersFullError."""
         if not self.has_room(weight):
             before = self._bytes
             counted = yield from weigh_in_steps("/", self.get("/"))
@@ -135,7 +135,7 @@ class ParameterTree:
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
         """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
 
-        A value in the way of a namespace is replaced by it. Raises ValueError where the root would become
+        A value in the way of a namespace is replaced by it. Raise ValueError where the root would become
         something else than a dictionary.
         """
         path = _split(key)
@@ -150,7 +150,7 @@ class ParameterTree:
         return self._updates(path, caller_id)
 
     def delete(self, key: str) -> Iterator[ParameterUpdate]:
-        """Delete a parameter or namespace. Raises KeyError, also for the root."""
+        """Delete a parameter or namespace. Raise KeyError, also for the root."""
         path = _split(key)
         if not path or self._find(path) is _UNSET:
             raise KeyError(key)
@@ -206,7 +206,7 @@ class ParameterTree:
     def subscribe(self, key: str, caller_id: str, uri: str) -> object:
         """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
 
-        Raises ParametersFullError.
+        Raise ParametersFullError.
         """
         full = _with_slash(_split(key))
         subscriber = _Subscriber(caller_id, uri)
@@ -325,7 +325,7 @@ _UNSET = object()
 def weigh_in_steps(key: str, value: object) -> Steps[int]:
     """Return about how many bytes of memory a value takes.
 
-    Raises ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.
+    Raise ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")

@@ -305,7 +305,7 @@ class Registry:
     def _claim(self, node: str, uri: str, name: str, kind: int, text: str = "") -> Iterable[Action]:
         """Make ``node`` known at ``uri``, where it registers ``name`` with a type or a service's URI.
 
-        What is registered under its name at another address is dropped and stopped. Raises RegistryFullError.
+        What is registered under its name at another address is dropped and stopped. Raise RegistryFullError.
         """
         entry = self._nodes.get(node)
         is_new = entry is None or entry.uri != uri

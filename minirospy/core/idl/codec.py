@@ -90,7 +90,7 @@ def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
 def write_serialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None:
     """Add the method ``serialize``."""
     with source.function("def serialize(self, buff: Any) -> None:"):
-        source.line('"""Write the message. Raises genpy.SerializationError."""')
+        source.line('"""Write the message. Raise genpy.SerializationError."""')
         if list(_leaves(spec.fields, "", lookup)):
             with source.block("try:"):
                 if not _is_fixed(spec, lookup):
@@ -108,7 +108,7 @@ def write_serialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None:
 def write_deserialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None:
     """Add the method ``deserialize``."""
     with source.function(f"def deserialize(self, data: Any) -> {spec.name}:"):
-        source.line('"""Read the message from bytes. Raises genpy.DeserializationError."""')
+        source.line('"""Read the message from bytes. Raise genpy.DeserializationError."""')
         if spec.fields:
             with source.block("try:"):
                 _Reader(source, lookup, keeps_buffer(spec, lookup)).message(spec)

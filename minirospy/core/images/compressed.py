@@ -100,7 +100,7 @@ def _check_size(size: tuple[int, int], max_pixels: int) -> None:
 
 
 def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
-    """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raises ValueError."""
+    """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raise ValueError."""
     options = options or Options()
     import numpy as np
 

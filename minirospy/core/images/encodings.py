@@ -37,7 +37,7 @@ _GRAY = (9798, 19235, 3735)
 
 
 def type_of_encoding(encoding: str) -> int:
-    """Return the number of an encoding's type. Raises ValueError where it is unknown."""
+    """Return the number of an encoding's type. Raise ValueError where it is unknown."""
     if encoding == _YUV:
         return _type("8U", 2)
     if match := _COLOR.match(encoding):
@@ -64,7 +64,7 @@ def is_converted_by_opencv(source: str, wanted: str) -> bool:
 def converted(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image in another encoding; the same array where nothing changes.
 
-    Raises ValueError, with ROS's text, where the conversion does not exist.
+    Raise ValueError, with ROS's text, where the conversion does not exist.
     """
     channels = type_of_encoding(source) // 8
     if wanted in ("", source):

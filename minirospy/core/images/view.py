@@ -18,7 +18,7 @@ __all__ = ["pixels"]
 def pixels(message: Image) -> Pixels:
     """Return the image of a message: (height, width) or (height, width, channels), in the message's encoding.
 
-    It is a read-only view unless the order of bytes has to change. Bytes between the rows (``step``) are left out. Raises
+    It is a read-only view unless the order of bytes has to change. Bytes between the rows (``step``) are left out. Raise
     ValueError (an unknown encoding, less data than the size needs).
     """
     import numpy as np

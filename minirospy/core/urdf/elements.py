@@ -11,7 +11,7 @@ __all__ = ["Element", "parse_xml"]
 
 
 def parse_xml(text: str | bytes, file: str) -> Element:
-    """Return the root of an XML text; ``file`` names it in errors. Raises UrdfError."""
+    """Return the root of an XML text; ``file`` names it in errors. Raise UrdfError."""
     if not text.strip():
         raise UrdfError(file, 0, "Error document empty.")
     try:

@@ -32,7 +32,7 @@ _IMMOBILE = (JointType.FIXED, JointType.FLOATING)
 
 
 def read_joint(element: Element) -> Joint:
-    """Return a joint. Raises ElementError."""
+    """Return a joint. Raise ElementError."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "unnamed joint found")
@@ -103,7 +103,7 @@ def _link_of(element: Element, tag: str) -> str:
 
 
 def _part(element: Element, tag: str, read: Callable[[Element], _T], context: str) -> _T | None:
-    """Return what ``read`` makes of the first child of this tag; None where there is none. Raises ElementError."""
+    """Return what ``read`` makes of the first child of this tag; None where there is none. Raise ElementError."""
     part = element.first(tag)
     if part is None:
         return None

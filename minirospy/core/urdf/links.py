@@ -38,7 +38,7 @@ class ElementError(ValueError):
 
 
 def read_link(element: Element, problems: list[Problem]) -> Link:
-    """Return a link without those of its parts that do not read, which become problems. Raises ElementError."""
+    """Return a link without those of its parts that do not read, which become problems. Raise ElementError."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "No name given for the link.")
@@ -60,7 +60,7 @@ def read_link(element: Element, problems: list[Problem]) -> Link:
 
 
 def read_material(element: Element, problems: list[Problem]) -> Material:
-    """Return a material; one that is only named has neither colour nor texture. Raises ElementError."""
+    """Return a material; one that is only named has neither colour nor texture. Raise ElementError."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "Material must contain a name attribute")
@@ -71,7 +71,7 @@ def read_material(element: Element, problems: list[Problem]) -> Material:
 
 
 def read_origin(element: Element) -> Origin:
-    """Return the ``<origin>`` in an element. Raises ElementError."""
+    """Return the ``<origin>`` in an element. Raise ElementError."""
     origin = element.first("origin")
     if origin is None:
         return Origin()

@@ -23,12 +23,12 @@ _ROOT = "Failed to find root link"
 
 
 def read_robot(path: str | Path) -> Robot:
-    """Return the robot of a file. Raises UrdfError, OSError."""
+    """Return the robot of a file. Raise UrdfError, OSError."""
     return parse_robot(Path(path).read_bytes(), str(path))
 
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
-    """Return the robot of a description; ``file`` names it in errors. Raises UrdfError."""
+    """Return the robot of a description; ``file`` names it in errors. Raise UrdfError."""
     root = parse_xml(text, file)
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")
@@ -143,7 +143,7 @@ def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -
 
 
 def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, Joint]) -> str:
-    """Return the link without a parent. Raises UrdfError where there is not one."""
+    """Return the link without a parent. Raise UrdfError where there is not one."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in sorted(links) if name not in children]
     if not roots:

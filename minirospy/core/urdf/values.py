@@ -15,7 +15,7 @@ class NotANumberError(ValueError):
 
 
 def as_float(text: str) -> float:
-    """Return a number. Raises NotANumberError, also for hexadecimal, infinite and not-a-number values, as ROS refuses them."""
+    """Return a number. Raise NotANumberError, also for hexadecimal, infinite and not-a-number values, as ROS refuses them."""
     stripped = text.strip()
     value = float(stripped) if _NUMBER.fullmatch(stripped) else math.nan
     if not math.isfinite(value):
@@ -24,7 +24,7 @@ def as_float(text: str) -> float:
 
 
 def parse_numbers(text: str, what: str = "vector") -> tuple[float, ...]:
-    """Return the numbers of a text. Raises NotANumberError."""
+    """Return the numbers of a text. Raise NotANumberError."""
     numbers = []
     for part in text.split():
         try:
@@ -36,7 +36,7 @@ def parse_numbers(text: str, what: str = "vector") -> tuple[float, ...]:
 
 
 def parse_vector(text: str) -> tuple[float, float, float]:
-    """Return the three numbers of a text. Raises NotANumberError."""
+    """Return the three numbers of a text. Raise NotANumberError."""
     numbers = parse_numbers(text)
     if len(numbers) != 3:
         raise NotANumberError(

@@ -154,7 +154,7 @@ def may_split(head: bytes, tail: int) -> bool:
 
 
 def split_sizes(size: int, tail: int) -> tuple[int, int]:
-    """(bytes before the array, bytes of the array) of a split frame. Raises WireError."""
+    """(bytes before the array, bytes of the array) of a split frame. Raise WireError."""
     if not CHUNK <= tail <= size - 4:
         raise WireError(f"a split message of {size} bytes says that it ends with an array of {tail}")
     return size - tail, tail
@@ -218,7 +218,7 @@ class FrameReader:
         return self._small[self._end :]
 
     def received(self, count: int) -> Iterator[memoryview]:
-        """Return the frames that are complete after ``count`` more bytes in :meth:`space`. Raises WireError."""
+        """Return the frames that are complete after ``count`` more bytes in :meth:`space`. Raise WireError."""
         if self._large is not None:
             self._filled += count
             if self._filled == self._wanted:

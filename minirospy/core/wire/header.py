@@ -28,7 +28,7 @@ def serialize_header(fields: Mapping[str, str]) -> bytes:
 
 
 def parse_header(body: bytes) -> Header:
-    """Return the fields of a header whose length has been taken off. Raises WireError."""
+    """Return the fields of a header whose length has been taken off. Raise WireError."""
     fields: Header = {}
     at = 0
     while at < len(body):

@@ -136,7 +136,7 @@ class HttpReader:
     def feed(self, data: bytes) -> list[HttpMessage]:
         """Return the messages that are complete with ``data``; b"" means that the peer has closed.
 
-        Raises RpcProtocolError.
+        Raise RpcProtocolError.
         """
         messages: list[HttpMessage] = []
         message = self.feed_one(data)
@@ -148,7 +148,7 @@ class HttpReader:
     def feed_one(self, data: bytes) -> HttpMessage | None:
         """Return the first message that is complete with ``data``, and leave the others to :meth:`next_message`.
 
-        None where the first one is not complete. Raises RpcProtocolError.
+        None where the first one is not complete. Raise RpcProtocolError.
         """
         head = self._head
         if head is not None:
@@ -178,7 +178,7 @@ class HttpReader:
         return self.next_message()
 
     def next_message(self) -> HttpMessage | None:
-        """Return the next message that is complete, of the bytes that were fed. Raises RpcProtocolError."""
+        """Return the next message that is complete, of the bytes that were fed. Raise RpcProtocolError."""
         if not self._has_more:
             return None
         assert self._parser

@@ -40,13 +40,13 @@ class Recovered(NamedTuple):
 
 
 def serialize_record(record: list[object]) -> bytes:
-    """Return a record's bytes in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
+    """Return a record's bytes in the file. Raise ValueError or TypeError on a value that msgpack cannot hold."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
 
 def pack_in_steps(value: object) -> Iterator[bytes]:
-    """Yield a large value in pieces, which :func:`unpack` takes all together. Raises as :func:`serialize_record`."""
+    """Yield a large value in pieces, which :func:`unpack` takes all together. Raise as :func:`serialize_record`."""
     packer = msgpack.Packer(default=_encode_other, strict_types=True, autoreset=False)
     yield from _pack_in_steps(value, packer)
     yield packer.bytes()
@@ -103,7 +103,7 @@ def _taken(packer: msgpack.Packer) -> bytes:
 
 
 def unpack(data: bytes) -> object:
-    """Return the value that :func:`pack_in_steps` has packed. Raises ValueError."""
+    """Return the value that :func:`pack_in_steps` has packed. Raise ValueError."""
     try:
         return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
     except (msgpack.UnpackException, TypeError) as error:

@@ -55,7 +55,7 @@ class Serialized:
 
 
 def serialize_call(method: str, args: Sequence[object]) -> bytes:
-    """Return a call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
+    """Return a call as XML. Raise RpcProtocolError on a value that XML-RPC has no type for."""
     parts = [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
         parts.append("<param>")
@@ -96,7 +96,7 @@ def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> S
 
 
 def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
-    """Return a successful answer as pieces of XML. Raises RpcProtocolError where it has more than ``most`` bytes."""
+    """Return a successful answer as pieces of XML. Raise RpcProtocolError where it has more than ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]
     yield from write_in_steps(value, out, 0)
@@ -105,7 +105,7 @@ def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
 
 
 def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
-    """Return the call in a long ``body``. Raises RpcProtocolError."""
+    """Return the call in a long ``body``. Raise RpcProtocolError."""
     plain = read_plain(body) if len(body) <= _PLAIN_BYTES else None
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -121,7 +121,7 @@ def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
 
 
 def parse_call(body: bytes | bytearray) -> Call:
-    """Return the call in ``body``. Raises RpcProtocolError."""
+    """Return the call in ``body``. Raise RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -129,7 +129,7 @@ def parse_call(body: bytes | bytearray) -> Call:
 
 
 def parse_response(body: bytes | bytearray) -> Any:
-    """Return the value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
+    """Return the value in an answer. Raise RpcFault where the peer answered with one, else RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]

@@ -49,7 +49,7 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
 
 
 def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
-    """Return the values that the tokens make up; None where they do not fit each other. Raises ValueError."""
+    """Return the values that the tokens make up; None where they do not fit each other. Raise ValueError."""
     if tokens and tokens[-1][4] not in {"", "</param>"}:
         # The token of what was not expected is always the last one.
         return None

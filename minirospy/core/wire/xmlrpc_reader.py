@@ -120,7 +120,7 @@ class Reader:
         parser.StartDoctypeDeclHandler = self._refuse_doctype
 
     def feed(self, data: bytes | bytearray | memoryview, *, is_last: bool = False) -> None:
-        """Read some more. Raises RpcProtocolError."""
+        """Read some more. Raise RpcProtocolError."""
         try:
             self._parser.Parse(data, is_last)
         except self._errors as error:
@@ -221,7 +221,7 @@ class Reader:
         return self._joined or "".join(self._text)
 
     def _join_text(self) -> None:
-        """Join what has come of a long text, which would take too long at its end. Raises RpcProtocolError."""
+        """Join what has come of a long text, which would take too long at its end. Raise RpcProtocolError."""
         if self._tag == "base64":
             self._decode_base64()
             return
@@ -258,7 +258,7 @@ def _width(text: str) -> int:
 
 
 def read_document(body: bytes | bytearray) -> Reader:
-    """Read a whole document. Raises RpcProtocolError."""
+    """Read a whole document. Raise RpcProtocolError."""
     reader = Reader()
     try:
         reader.feed(body, is_last=True)

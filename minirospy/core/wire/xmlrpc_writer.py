@@ -100,7 +100,7 @@ _WRITERS: dict[type, _Writer] = {
 
 
 def write(value: object, parts: list[str], depth: int) -> None:
-    """Append a value's XML to ``parts``. Raises RpcProtocolError on what XML-RPC has no type for."""
+    """Append a value's XML to ``parts``. Raise RpcProtocolError on what XML-RPC has no type for."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
     writer = _WRITERS.get(type(value))
@@ -120,7 +120,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Put away what was written; return what to yield. Raises RpcProtocolError where it is too much."""
+        """Put away what was written; return what to yield. Raise RpcProtocolError where it is too much."""
         piece = "".join(self.parts).encode()
         self.parts.clear()
         self._pieces.append(piece)

@@ -51,7 +51,7 @@ class Settings:
 
 
 def compressed(image: Image, settings: Settings) -> CompressedImage:
-    """Return an image as JPEG or PNG. Raises CodecError (another format, an encoding of other than 8 or 16 bits)."""
+    """Return an image as JPEG or PNG. Raise CodecError (another format, an encoding of other than 8 or 16 bits)."""
     kind = settings.format
     if kind not in ("jpeg", "png"):
         raise CodecError(f"Unknown compression type '{kind}', valid options are 'jpeg' and 'png'")
@@ -79,7 +79,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Return the image of a compressed one, in the encoding that its format names. Raises CodecError."""
+    """Return the image of a compressed one, in the encoding that its format names. Raise CodecError."""
     pixels = _decoded(bytes(message.data))
     encoding, semicolon, rest = message.format.partition(";")
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
@@ -97,7 +97,7 @@ def uncompressed(message: CompressedImage) -> Image:
 
 
 def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
-    """Return a depth image as PNG: 16 bits without loss, 32 bit floats as inverse depths. Raises CodecError."""
+    """Return a depth image as PNG: 16 bits without loss, 32 bit floats as inverse depths. Raise CodecError."""
     import numpy as np
 
     depth, channels = _type_of(image.encoding)
@@ -128,7 +128,7 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed_depth(message: CompressedImage) -> Image:
-    """Return the depth image of a compressed one; where there was no depth, 0 or NaN. Raises CodecError."""
+    """Return the depth image of a compressed one; where there was no depth, 0 or NaN. Raise CodecError."""
     import numpy as np
 
     encoding, _, rest = message.format.partition(";")

@@ -155,7 +155,7 @@ class Republisher:
 
 
 def settings_of(values: Mapping[str, object]) -> Settings:
-    """Return the settings of parameters; those out of their limits are clamped. Raises CodecError for another type."""
+    """Return the settings of parameters; those out of their limits are clamped. Raise CodecError for another type."""
     chosen: dict[str, object] = {}
     for name, value in values.items():
         if name in _NUMBERS:

@@ -50,17 +50,17 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
+        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+        """Run the motors at shares of their full power for a second. Raise RumbleError."""
 
     def close(self) -> None:
         """Close it."""
 
 
 def open_device(path: str, feedback_path: str = "") -> Device:
-    """Open a joystick by its path; elsewhere than on Linux the path's number counts. Raises DeviceError.
+    """Open a joystick by its path; elsewhere than on Linux the path's number counts. Raise DeviceError.
 
     ``feedback_path``: Linux's device of its motors, where that is not the one which belongs to the joystick.
     """
@@ -86,7 +86,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
+        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -106,7 +106,7 @@ class LinuxDevice:
         return Event(kind, number, value)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+        """Run the motors at shares of their full power for a second. Raise RumbleError."""
         if self._motors is None:
             if not self._feedback_path:
                 raise RumbleError(
@@ -153,7 +153,7 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick of SDL; its hats are axes behind the others, as on Linux. Raises DeviceError."""
+    """A joystick of SDL; its hats are axes behind the others, as on Linux. Raise DeviceError."""
 
     def __init__(self, number: int) -> None:
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
@@ -179,7 +179,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
+        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()
@@ -196,7 +196,7 @@ class PygameDevice:
         return self._events.pop(0)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+        """Run the motors at shares of their full power for a second. Raise RumbleError."""
         if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
             raise RumbleError("the joystick has no motors that SDL knows")
 

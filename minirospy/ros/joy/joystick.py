@@ -85,7 +85,7 @@ class Joystick:
     """When the state is to be published if no event comes; None: then not."""
 
     def handle(self, event: Event, now: float) -> bool:
-        """Take an event in; return whether the state is to be published now. Raises ValueError for an unknown type."""
+        """Take an event in; return whether the state is to be published now. Raise ValueError for an unknown type."""
         is_initial = bool(event.type & EVENT_INIT)
         kind = event.type & ~EVENT_INIT
         if kind == EVENT_BUTTON:

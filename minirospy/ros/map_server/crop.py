@@ -25,7 +25,7 @@ __all__ = ["crop", "main"]
 def crop(
     image: NDArray[np.uint8], resolution: float, origin: tuple[float, float, float]
 ) -> tuple[NDArray[np.uint8], tuple[float, float, float]]:
-    """Return the part of an image (rows from the top) that is not unknown, and its origin. Raises MapError."""
+    """Return the part of an image (rows from the top) that is not unknown, and its origin. Raise MapError."""
     rows, columns = np.nonzero(image != UNKNOWN_GREY)
     if not len(rows):
         raise MapError("every cell of the map is unknown: nothing is left of it")

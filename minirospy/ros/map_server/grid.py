@@ -65,7 +65,7 @@ class MapSettings(NamedTuple):
 
 
 def read_settings(text: str) -> MapSettings:
-    """Return the settings in a map's YAML file. Raises MapError in the real program's words."""
+    """Return the settings in a map's YAML file. Raise MapError in the real program's words."""
     try:
         # As texts: yaml-cpp takes `1e-3` as a number, which YAML 1.1 does not, and refuses `false` as one.
         found = load(text, yaml.BaseLoader)
@@ -175,7 +175,7 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
 def pgm_of_grid(
     data: Sequence[int], width: int, height: int, resolution: float, occupied: int, free: int
 ) -> bytes:
-    """Return the PGM image of a grid: free up to ``free``, occupied from ``occupied`` on. Raises MapError."""
+    """Return the PGM image of a grid: free up to ``free``, occupied from ``occupied`` on. Raise MapError."""
     cells = np.asarray(data, np.int8)
     if len(cells) != width * height:
         raise MapError(f"the map has {len(cells)} cells, where {width} x {height} are {width * height}")

@@ -41,7 +41,7 @@ class Pixels(NamedTuple):
 
 
 def read_image(data: bytes) -> Pixels:
-    """Return the pixels of an image file. Raises ImageError."""
+    """Return the pixels of an image file. Raise ImageError."""
     if not data:
         raise ImageError("Unsupported image format: the file is empty")
     if data[:2] in _CHANNELS and data[2:3].isspace():

@@ -34,7 +34,7 @@ class SaverOptions(NamedTuple):
 
 
 def parse_options(words: Sequence[str]) -> SaverOptions | None:
-    """Return the options; None for ``-h``. Raises UsageError, with a text where ROS has one."""
+    """Return the options; None for ``-h``. Raise UsageError, with a text where ROS has one."""
     options = SaverOptions()
     rest = iter(words)
     for word in rest:
@@ -109,7 +109,7 @@ def _save_one(options: SaverOptions) -> int:
 
 
 def save_map(grid: OccupancyGrid, options: SaverOptions) -> None:
-    """Write a map's two files. Raises MapError."""
+    """Write a map's two files. Raise MapError."""
     info = grid.info
     rospy.loginfo("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
     image = pgm_of_grid(grid.data, info.width, info.height, info.resolution, options.occupied, options.free)

@@ -90,7 +90,7 @@ def _number(name: str, default: float) -> float:
 
 
 def settings_of_file(name: str) -> MapSettings:
-    """Return the settings in a YAML file, the image as a path from here. Raises MapError."""
+    """Return the settings in a YAML file, the image as a path from here. Raise MapError."""
     try:
         text = Path(name).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
@@ -101,7 +101,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map, without its frame and times. Raises MapError."""
+    """Return a map, without its frame and times. Raise MapError."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())
@@ -124,7 +124,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
 
 
 class MapServer:
-    """The map as a node: two latched topics and two services. Raises MapError where there is no map."""
+    """The map as a node: two latched topics and two services. Raise MapError where there is no map."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))

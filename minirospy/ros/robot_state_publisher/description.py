@@ -24,7 +24,7 @@ class DescriptionError(MinirospyError):
 
 
 def robot_of_parameter(name: str = NAME) -> Robot:
-    """Return the robot of a parameter, which is searched from the node's namespace upwards. Raises DescriptionError."""
+    """Return the robot of a parameter, which is searched from the node's namespace upwards. Raise DescriptionError."""
     key = rospy.resolve_name(name)
     if not rospy.has_param(key):
         found = rospy.search_param(name)

@@ -33,7 +33,7 @@ class JointParameters(NamedTuple):
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
     """Return the parameters; ``param(name, default)`` returns the value of one, ``zeros`` are those trees in order.
 
-    Raises JointError.
+    Raise JointError.
     """
     description = param("robot_description", None)
     if not isinstance(description, str):

@@ -49,7 +49,7 @@ def param(name: str, default: object = None) -> object:
 
 
 class JointPublisher:
-    """The joints as a node: publishes them, and follows the topics of source_list. Raises JointError.
+    """The joints as a node: publishes them, and follows the topics of source_list. Raise JointError.
 
     ``on_update`` is called when a message of a source has come.
     """

@@ -103,7 +103,7 @@ class JointStates:
         self._has_dependent = bool(dependent)
 
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
-        """Return how a joint depends on one that can be set. Raises JointError."""
+        """Return how a joint depends on one that can be set. Raise JointError."""
         if name not in dependent:
             # Its limits are missing, which was warned of.
             return Dependent("")
@@ -170,7 +170,7 @@ class JointStates:
 
 
 def read_joints(text: str, options: JointOptions, warn: Callable[[str], object]) -> JointStates:
-    """Return the joints of a description; ``warn`` gets a line for each that is left out. Raises JointError."""
+    """Return the joints of a description; ``warn`` gets a line for each that is left out. Raise JointError."""
     try:
         root = parse_xml(text, "robot_description")
         if root.tag == "COLLADA":

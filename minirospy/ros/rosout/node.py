@@ -70,7 +70,7 @@ class RosoutNode:
         self._limited_log = RateLimitedLogger(_log)
 
     async def start(self) -> None:
-        """Join the graph. Raises OSError, MasterUnreachableError."""
+        """Join the graph. Raise OSError, MasterUnreachableError."""
         prefer_ros1()
         from rosgraph_msgs.msg import Log
 

@@ -143,7 +143,7 @@ class World:
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:
-        """Return where a turtle is. Raises WorldError where there is none."""
+        """Return where a turtle is. Raise WorldError where there is none."""
         return self._turtle(name).pose
 
     def clear(self, background: Color) -> None:
@@ -156,7 +156,7 @@ class World:
         self._last_number = 0
 
     def spawn(self, name: str, x: float, y: float, theta: float) -> str:
-        """Add a turtle; return its name, a new one where it is empty. Raises WorldError on a name in use or not legal."""
+        """Add a turtle; return its name, a new one where it is empty. Raise WorldError on a name in use or not legal."""
         _check_finite(x=x, y=y, theta=theta)
         if not is_legal_name(name):
             raise WorldError(f"[{name}] is not a legal name of a turtle: letters, digits, _ and /")
@@ -173,7 +173,7 @@ class World:
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:
-        """Remove a turtle. Raises WorldError where there is none."""
+        """Remove a turtle. Raise WorldError where there is none."""
         if name not in self._turtles:
             raise WorldError(f"Tried to kill turtle [{name}], which does not exist")
         del self._turtles[name]
@@ -196,7 +196,7 @@ class World:
         self._turtle(name).teleports.append(_Teleport(True, linear, 0.0, angular))
 
     def command(self, name: str, velocity: Velocity, now: float) -> None:
-        """Set a turtle's velocity for one second after ``now`` (seconds). Raises WorldError on one that is not finite."""
+        """Set a turtle's velocity for one second after ``now`` (seconds). Raise WorldError on one that is not finite."""
         _check_finite(**velocity._asdict())
         turtle = self._turtle(name)
         turtle.velocity, turtle.command_time = velocity, now

@@ -105,7 +105,7 @@ class Journal:
         return self._size
 
     def lock(self) -> None:
-        """Make this process the only one that writes the journal. Raises OSError or JournalBusyError."""
+        """Make this process the only one that writes the journal. Raise OSError or JournalBusyError."""
         if self._lock is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
@@ -139,7 +139,7 @@ class Journal:
             self._fail(error)
 
     def rewrite(self) -> None:
-        """Write the present state and nothing else. Raises OSError; the old file then remains."""
+        """Write the present state and nothing else. Raise OSError; the old file then remains."""
         head = HEAD + serialize_record(["boot", boot_id()])
         data = head + b"".join(serialize_record(record) for record in self._snapshot())
         self._abandon()
@@ -253,14 +253,14 @@ class Journal:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write what was appended since to the new file; return how many bytes. Raises OSError."""
+        """Write what was appended since to the new file; return how many bytes. Raise OSError."""
         data = b"".join(self._since or ())
         _write_all(file, data)
         self._since = []
         return len(data)
 
     def _put_in_place(self, file: int) -> int:
-        """Give the new file, which is synced, the journal's name; return it, open. Raises OSError."""
+        """Give the new file, which is synced, the journal's name; return it, open. Raise OSError."""
         if sys.platform == "win32":
             # Windows replaces no file that is open, and with none that is.
             self._close_file()
@@ -409,7 +409,7 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """Return a lock that the system releases with this process; the file holds its pid. Raises as Journal.lock."""
+    """Return a lock that the system releases with this process; the file holds its pid. Raise as Journal.lock."""
     file = private_files.open_file(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
         if sys.platform == "win32":

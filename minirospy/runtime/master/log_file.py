@@ -28,7 +28,7 @@ class LogFileHandler(RotatingFileHandler):
     """A logging handler that follows no link: the name of a log file can be predicted."""
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """``most_bytes`` 0: no limit. Raises OSError."""
+        """``most_bytes`` 0: no limit. Raise OSError."""
         super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:

@@ -143,7 +143,7 @@ class Master(MasterApi):
         return self.parameters.has(key) and self.parameters.get(key) is True
 
     async def start(self) -> None:
-        """Take the port, recover what a killed master left, and serve. Raises OSError."""
+        """Take the port, recover what a killed master left, and serve. Raise OSError."""
         # The port first: of two masters that are started together, the one that gets it has the journal too.
         self._server.listen()
         try:
@@ -186,7 +186,7 @@ class Master(MasterApi):
         self._notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
+        """Return the answer to one call of a client, perhaps as XML already. Raise RpcFault as :meth:`dispatch`."""
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
             if self._state[0] == self.registry.changes:

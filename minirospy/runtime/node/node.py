@@ -115,7 +115,7 @@ class Node:
         return any(publication.is_sending for publication in list(self.publications.values()))
 
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
-        """Open the node's servers; port 0 takes a free one. Raises OSError."""
+        """Open the node's servers; port 0 takes a free one. Raise OSError."""
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
@@ -182,7 +182,7 @@ class Node:
     async def master(self, method: str, *args: object) -> Any:
         """Call the master as this node and return the value of its answer.
 
-        Raises MasterUnreachableError, or RpcRefused with the master's text.
+        Raise MasterUnreachableError, or RpcRefused with the master's text.
         """
         return await self._registrations.call(method, *args)
 

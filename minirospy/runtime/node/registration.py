@@ -126,12 +126,12 @@ class Registrations:
     async def call(self, method: str, *args: object) -> Any:
         """Call the master as the node and return the value of its answer.
 
-        Raises MasterUnreachableError, or RpcRefused with the master's text.
+        Raise MasterUnreachableError, or RpcRefused with the master's text.
         """
         return unwrap(method, await self._call_master(method, self._name, *args))
 
     async def _call_master(self, method: str, *args: object) -> object:
-        """Call any method of the master. Raises MasterUnreachableError, RpcError."""
+        """Call any method of the master. Raise MasterUnreachableError, RpcError."""
         uri = self._environment.master_uri
         # Of a node that closes _wait_for_answers() decides.
         seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
@@ -145,7 +145,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> None:
-        """Look up this node, or one of its services. Raises MasterUnreachableError, RpcError."""
+        """Look up this node, or one of its services. Raise MasterUnreachableError, RpcError."""
         try:
             await asyncio.wait_for(self.call(method, name), _LOOK_SECONDS)
         except asyncio.TimeoutError as error:
@@ -285,7 +285,7 @@ class Registrations:
                 _log.warning("the master does not know this node, and refuses to")
 
     async def _register_all(self, *, again: bool = False) -> None:
-        """Register all that the master does not know. Raises MasterUnreachableError."""
+        """Register all that the master does not know. Raise MasterUnreachableError."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
             # One that the master never accepts must not block the others.
@@ -348,7 +348,7 @@ class Registrations:
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, whatever is answered; many in one where the master has system.multicall (not all masters do).
 
-        Raises MasterUnreachableError.
+        Raise MasterUnreachableError.
         """
         for start in range(0, len(calls), _CALLS_AT_ONCE):
             part = calls[start : start + _CALLS_AT_ONCE]

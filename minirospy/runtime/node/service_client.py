@@ -51,7 +51,7 @@ class ServiceClient:
         """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` by a Unix socket where possible, and exchange headers.
 
         With ``waits`` false the server's header is left for :meth:`finish`, so that the caller can do something
-        else meanwhile. Raises HandshakeRefused where the server says no, OSError or WireError where it cannot be
+        else meanwhile. Raise HandshakeRefused where the server says no, OSError or WireError where it cannot be
         talked to.
         """
         self.header: Header = {}
@@ -78,7 +78,7 @@ class ServiceClient:
             self.finish()
 
     def finish(self, request: bytes | None = None) -> None:
-        """Receive the server's header. Raises as the constructor does; the connection is closed then.
+        """Receive the server's header. Raise as the constructor does; the connection is closed then.
 
         The ``request`` of the :meth:`call` that follows is sent first where the server is known to accept that:
         so both answers need one wait. A server that sends no header has not started on it.
@@ -96,7 +96,7 @@ class ServiceClient:
             raise
 
     def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raise CallFailed where the handler failed, OSError, WireError."""
         if self._is_asked:
             self._is_asked = False
         else:
@@ -142,7 +142,7 @@ class ServiceClient:
 
 
 def parse_service_uri(uri: str) -> tuple[str, int]:
-    """(host, port) of ``rosrpc://host:port``. Raises WireError."""
+    """(host, port) of ``rosrpc://host:port``. Raise WireError."""
     try:
         host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
@@ -174,7 +174,7 @@ class Reader:
         """The bytes behind the last read."""
 
     def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
-        """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
+        """``count`` bytes; b"" where the peer ended before the first and that is in order. Raise WireError."""
         data = self.rest
         while len(data) < count:
             more = self._some(max(count - len(data), _RECEIVE))
@@ -211,7 +211,7 @@ class Reader:
 
 
 def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> socket.socket:
-    """Return a tuned blocking socket. Raises OSError."""
+    """Return a tuned blocking socket. Raise OSError."""
     unix = local.reach(*address) if same_host else None
     if unix:
         unix.settimeout(timeout)

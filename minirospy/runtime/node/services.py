@@ -289,7 +289,7 @@ class AsyncServiceClient:
         timeout: float = sockets.HANDSHAKE_SECONDS,
         same_host: bool = True,
     ) -> AsyncServiceClient:
-        """Connect to ``uri`` and exchange headers. Raises as :class:`ServiceClient` does."""
+        """Connect to ``uri`` and exchange headers. Raise as :class:`ServiceClient` does."""
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
@@ -308,7 +308,7 @@ class AsyncServiceClient:
         return cls(sock, header)
 
     async def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raise CallFailed where the handler failed, OSError, WireError."""
         await asyncio.get_running_loop().sock_sendall(self._sock, serialize_request(request))
         ok, length = parse_response_head(await _receive(self._sock, RESPONSE_HEAD))
         body = await _receive(self._sock, length)
@@ -338,7 +338,7 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Return exactly ``count`` bytes, on the loop. Raises WireError where the peer ends before."""
+    """Return exactly ``count`` bytes, on the loop. Raise WireError where the peer ends before."""
     loop = asyncio.get_running_loop()
     try:
         buffer = bytearray(count)

@@ -101,7 +101,7 @@ class SlaveApi:
         )
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:

@@ -639,7 +639,7 @@ class _NoPublisher(WireError):
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
-    """(host, port) out of a publisher's answer to requestTopic. Raises WireError."""
+    """(host, port) out of a publisher's answer to requestTopic. Raise WireError."""
     match answer:
         case [1, _, ["TCPROS", str(host), int(port), *_]]:
             return host, port

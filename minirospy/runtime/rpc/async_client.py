@@ -59,7 +59,7 @@ class AsyncRpcClient:
     async def call(self, uri: str, method: str, *args: object, timeout: float = 5.0) -> Any:
         """Return the value that ``method`` at ``uri`` answers, within ``timeout`` seconds.
 
-        Raises RpcUnreachable, RpcFault, or RpcProtocolError.
+        Raise RpcUnreachable, RpcFault, or RpcProtocolError.
         """
         answer: asyncio.Future[Body] = asyncio.get_running_loop().create_future()
         call = self.start(uri, serialize_call(method, args), timeout, partial(_settle, answer))
@@ -478,7 +478,7 @@ def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
 
 
 def _parts(uri: str) -> tuple[str, int, str]:
-    """Host, port and path. Raises RpcUnreachable."""
+    """Host, port and path. Raise RpcUnreachable."""
     usual = _USUAL_URI.fullmatch(uri)
     return (usual[1], int(usual[2]), usual[3] or "/") if usual else parse_http_uri(uri)
 

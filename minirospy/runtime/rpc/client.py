@@ -34,7 +34,7 @@ class RpcClient:
 
         ``same_host``: a Unix socket is tried first.
 
-        Raises RpcUnreachable on a bad URI.
+        Raise RpcUnreachable on a bad URI.
         """
         self.uri = uri
         self._host, self._port, self._path = parse_http_uri(uri)
@@ -45,7 +45,7 @@ class RpcClient:
     def call(self, method: str, *args: object) -> Any:
         """Return the value that ``method`` answers.
 
-        Raises RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
+        Raise RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
         """
         request = serialize_request(f"{self._host}:{self._port}", self._path, serialize_call(method, args))
         message = self._exchange(request)
@@ -123,7 +123,7 @@ class RpcClient:
 
 
 def parse_http_uri(uri: str) -> tuple[str, int, str]:
-    """(host, port, path) of ``http://host:port/path``. Raises RpcUnreachable."""
+    """(host, port, path) of ``http://host:port/path``. Raise RpcUnreachable."""
     try:
         return split_uri(uri)
     except ValueError as error:

@@ -38,7 +38,7 @@ class BusConnection(NamedTuple):
 
 
 def unwrap(method: str, answer: object) -> Any:
-    """Return the value of a ROS API answer. Raises RpcRefused where its status is not 1."""
+    """Return the value of a ROS API answer. Raise RpcRefused where its status is not 1."""
     match answer:
         case [1, _, value]:
             return value

@@ -28,7 +28,7 @@ class Outbox:
         return self.size > 0
 
     def write(self, pieces: Sequence[bytes]) -> int:
-        """Send what the socket takes, and keep the rest; return how many bytes that is. Raises OSError."""
+        """Send what the socket takes, and keep the rest; return how many bytes that is. Raise OSError."""
         sent = 0
         if not self.size:
             try:
@@ -49,7 +49,7 @@ class Outbox:
         return kept
 
     def flush(self) -> int:
-        """Send what the socket takes of the queue; return how many bytes it took. Raises OSError."""
+        """Send what the socket takes of the queue; return how many bytes it took. Raise OSError."""
         sent = 0
         try:
             while self._pieces and sent < MAX_UNREAD:

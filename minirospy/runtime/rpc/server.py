@@ -131,7 +131,7 @@ class RpcServer:
         return len(self.connections)
 
     def listen(self) -> None:
-        """Take the port, alone; clients that connect wait until :meth:`start`. Idempotent. Raises OSError.
+        """Take the port, alone; clients that connect wait until :meth:`start`. Idempotent. Raise OSError.
 
         With port 0 ``port`` is the one that was free from here on.
         """
@@ -150,7 +150,7 @@ class RpcServer:
         self._sock = sock
 
     async def start(self) -> None:
-        """Serve clients, after :meth:`listen`. Raises OSError."""
+        """Serve clients, after :meth:`listen`. Raise OSError."""
         self.listen()
         assert self._sock
         self._watch(self._sock)

@@ -18,14 +18,14 @@ class Access:
     """Peers of these networks may connect, and this machine itself; without any network everybody may."""
 
     def __init__(self, networks: Iterable[str] = ()) -> None:
-        """``networks``: as 192.168.65.0/24 or a single address. Raises UsageError."""
+        """``networks``: as 192.168.65.0/24 or a single address. Raise UsageError."""
         self.networks = tuple(_network(text) for text in networks)
         # A robot's peers are few and come often.
         self._known: dict[str, bool] = {}
 
     @classmethod
     def parse(cls, text: str) -> Access:
-        """Return the access of networks with commas or spaces between them; "" admits everybody. Raises UsageError."""
+        """Return the access of networks with commas or spaces between them; "" admits everybody. Raise UsageError."""
         networks = text.replace(",", " ").split()
         if text and not networks:
             # Perhaps variables that are not set: they must not admit everybody.

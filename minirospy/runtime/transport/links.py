@@ -227,7 +227,7 @@ class OutLink:
         return self._is_same_host and threading.get_ident() != self._loop_thread
 
     def _gather(self, buffers: list[bytes | memoryview]) -> int:
-        """Write some of ``buffers``, take it off them, and return how many bytes it was. Raises OSError."""
+        """Write some of ``buffers``, take it off them, and return how many bytes it was. Raise OSError."""
         # Windows has no sendmsg.
         gather = getattr(self._sock, "sendmsg", None)
         count: int = gather(buffers) if gather else self._sock.send(buffers[0])
@@ -268,7 +268,7 @@ class OutLink:
             self._drained.release()
 
     def _write_some(self) -> None:
-        """Write some of what waits. Raises OSError."""
+        """Write some of what waits. Raise OSError."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
             # A partly sent frame, and a large one, is sent alone.

@@ -61,7 +61,7 @@ def bind(host: str, port: int) -> socket.socket | None:
 
 
 def connect(name: str) -> socket.socket:
-    """Return a connected, non-blocking socket; a Unix socket needs no waiting. Raises OSError."""
+    """Return a connected, non-blocking socket; a Unix socket needs no waiting. Raise OSError."""
     return _open(name, lambda sock, address: sock.connect(address))
 
 
@@ -94,7 +94,7 @@ def parse_answer(answer: object) -> UnixAddress | None:
 
 
 def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.socket:
-    """Return a non-blocking socket, bound or connected to ``name``. Raises OSError."""
+    """Return a non-blocking socket, bound or connected to ``name``. Raise OSError."""
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)

@@ -51,7 +51,7 @@ class LoopThread:
     def run(self, coroutine: Coroutine[object, object, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.
 
-        Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
+        Raise TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
         and RuntimeError on the loop's own thread, which would wait for itself.
         """
         return self.start(coroutine)(timeout)

@@ -67,7 +67,7 @@ def read_frames(
     """Read frames in the calling thread until the peer ends; closes the socket.
 
     ``size.newest``: of what is ready when the thread reads, only so many frames, the newest, are
-    delivered (0: all), so that a slow receiver sees the present. Raises OSError or WireError.
+    delivered (0: all), so that a slow receiver sees the present. Raise OSError or WireError.
     """
     source = _FrameSource(sock, readers)
     try:
@@ -180,7 +180,7 @@ class _FrameSource:
     def read(self) -> Iterable[Frame]:
         """Wait for the next frames; they are valid until the next call, large ones for good.
 
-        Raises _Ended, OSError, WireError.
+        Raise _Ended, OSError, WireError.
         """
         reader = self._reader
         if self._was_large:
@@ -234,7 +234,7 @@ class _FrameSource:
         return SplitFrame(head, tail)
 
     def _take(self, count: int) -> bytes:
-        """Return exactly ``count`` bytes. Raises _Ended, OSError."""
+        """Return exactly ``count`` bytes. Raise _Ended, OSError."""
         if not self._rest:
             data = self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
             if len(data) == count:

@@ -46,7 +46,7 @@ _log = logging.getLogger(__name__)
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
     """Return a socket that is bound to an address of this machine; port 0 takes a free one, out of ``ports`` if given.
 
-    Raises OSError.
+    Raise OSError.
     """
     if port or not ports:
         return _bind(host, port)
@@ -60,7 +60,7 @@ def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
 
 
 async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECONDS) -> socket.socket:
-    """Return a connected, non-blocking socket. Raises OSError, also where the time is up."""
+    """Return a connected, non-blocking socket. Raise OSError, also where the time is up."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
 
@@ -94,7 +94,7 @@ class HeaderMemory:
         self._most = most
 
     def reserve(self, count: int) -> None:
-        """Reserve memory, to be returned by :meth:`free`. Raises WireError where it is too much."""
+        """Reserve memory, to be returned by :meth:`free`. Raise WireError where it is too much."""
         if self.held + count > self._most:
             raise WireError("too many long connection headers are being received at the same time")
         self.held += count
@@ -107,7 +107,7 @@ class HeaderMemory:
 async def receive_header(
     sock: socket.socket, timeout: float = sockets.HANDSHAKE_SECONDS, *, memory: HeaderMemory | None = None
 ) -> Header:
-    """Return the peer's connection header. Raises WireError or OSError.
+    """Return the peer's connection header. Raise WireError or OSError.
 
     With ``memory``, a long header is refused where others take it all.
     """
@@ -152,13 +152,13 @@ class Listener:
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
-        """Listen on ``host``; port 0 takes a free one, out of ``ports`` if given. Raises OSError."""
+        """Listen on ``host``; port 0 takes a free one, out of ``ports`` if given. Raise OSError."""
         sock = bind(host, port, ports)
         self.listen(sock)
         self.port = sock.getsockname()[1]
 
     def listen(self, sock: socket.socket) -> None:
-        """Listen on a bound socket. Raises OSError."""
+        """Listen on a bound socket. Raise OSError."""
         try:
             sock.listen(socket.SOMAXCONN)
         except BaseException:
@@ -263,7 +263,7 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | int | bytes, ...]]]:
-    """(family, address) of a host; an address or "localhost" needs no resolver. Raises OSError.
+    """(family, address) of a host; an address or "localhost" needs no resolver. Raise OSError.
 
     IPv4 comes first: there the servers of ROS 1 listen, and many resolvers name IPv6 first.
     """
@@ -307,7 +307,7 @@ async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
 async def _receive_exactly(
     sock: socket.socket, count: int, memory: HeaderMemory, nothing: type[WireError] = WireError
 ) -> bytes:
-    """``count`` bytes. Raises WireError, or ``nothing`` where not one came."""
+    """``count`` bytes. Raise WireError, or ``nothing`` where not one came."""
     loop = asyncio.get_running_loop()
     data = bytearray()
     taken = 0

@@ -45,7 +45,7 @@ class LinkFile:
     """The page of a link in a folder that only this user may enter."""
 
     def __init__(self, link: str) -> None:
-        """Create the file. Raises OSError."""
+        """Create the file. Raise OSError."""
         # mkdtemp gives the folder to this user alone, on Windows by its access list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"

@@ -60,7 +60,7 @@ class Dashboard:
         return self.bridge.listeners["foxglove"].port
 
     async def start(self) -> None:
-        """Listen. Raises BridgeError."""
+        """Listen. Raise BridgeError."""
         await self.bridge.start()
         if self._joints.always_publishes:
             self._joints.start_work()

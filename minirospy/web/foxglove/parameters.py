@@ -32,7 +32,7 @@ class Parameters:
         self._at_master = asyncio.Lock()
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
-        """Return parameters, all that are set where ``names`` is empty. Raises MasterUnreachableError, RpcError."""
+        """Return parameters, all that are set where ``names`` is empty. Raise MasterUnreachableError, RpcError."""
         master = self._graph.node._node.master
         allowed = self._graph.filters.parameters
         if not names:

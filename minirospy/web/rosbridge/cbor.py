@@ -36,13 +36,13 @@ _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 
 
 def encode_cbor(value: object) -> bytes:
-    """Return a value as CBOR. Raises BridgeProtocolError without cbor2."""
+    """Return a value as CBOR. Raise BridgeProtocolError without cbor2."""
     data: bytes = _library().dumps(value)
     return data
 
 
 def decode_cbor(data: bytes) -> object:
-    """Return the value of CBOR; typed arrays become lists. Raises ValueError, BridgeProtocolError without cbor2."""
+    """Return the value of CBOR; typed arrays become lists. Raise ValueError, BridgeProtocolError without cbor2."""
     library = _library()
     _check_heads(data)
     stream = BytesIO(data)

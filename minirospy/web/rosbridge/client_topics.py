@@ -29,7 +29,7 @@ class ClientTopics:
         self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
-        """Publish what is connected now. Raises MasterUnreachableError, RpcError."""
+        """Publish what is connected now. Raise MasterUnreachableError, RpcError."""
         from rosbridge_msgs.msg import ConnectedClients
         from std_msgs.msg import Int32
 

@@ -133,7 +133,7 @@ def _time(found: Time | Duration) -> dict[str, int]:
 def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
     """Set a message's fields to the values of a dictionary; a header in it without ``stamp`` gets the present time.
 
-    Raises ConversionError with rosbridge's text: an unknown field, a value of another type.
+    Raise ConversionError with rosbridge's text: an unknown field, a value of another type.
     """
     _fill(message, found, message._type, message._type, (), now)
 

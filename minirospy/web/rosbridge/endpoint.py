@@ -133,7 +133,7 @@ class RosbridgeEndpoint:
         return self._types.of(arrival.header)
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients get it, encoded once for all of them. Raises BridgeError where it cannot be."""
+        """Return a message as clients get it, encoded once for all of them. Raise BridgeError where it cannot be."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}

@@ -20,7 +20,7 @@ _MAX_PIXELS = 5_600_000
 
 
 def encode(text: str) -> str:
-    """Return a text as PNG in base64: about as wide as high, newlines at its end. Raises BridgeProtocolError without Pillow."""
+    """Return a text as PNG in base64: about as wide as high, newlines at its end. Raise BridgeProtocolError without Pillow."""
     data = text.encode()
     width = max(1, math.isqrt(len(data) // 3))
     height = max(1, -(-len(data) // (3 * width)))
@@ -31,7 +31,7 @@ def encode(text: str) -> str:
 
 
 def decode(data: str) -> str:
-    """Return the text of a PNG in base64. Raises BridgeProtocolError."""
+    """Return the text of a PNG in base64. Raise BridgeProtocolError."""
     pillow = _pillow()
     try:
         picture = pillow.open(BytesIO(base64.b64decode(data, validate=True)), formats=("PNG",))

@@ -198,7 +198,7 @@ def is_quick(data: str | bytes) -> bool:
 
 
 def decode(data: str | bytes) -> Fields:
-    """Return the object that a message is: JSON as text, CBOR as bytes. Raises OperationError."""
+    """Return the object that a message is: JSON as text, CBOR as bytes. Raise OperationError."""
     return _decode(data, load_json)
 
 
@@ -220,7 +220,7 @@ def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
 
 
 def parse(fields: Fields) -> Event:
-    """Return the event of an operation; a PNG's content is that of the operation in it. Raises OperationError."""
+    """Return the event of an operation; a PNG's content is that of the operation in it. Raise OperationError."""
     id_ = _id(fields)
     op = fields.get("op")
     if op is None:
@@ -289,7 +289,7 @@ def _id(fields: Fields) -> Id:
 
 
 def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
-    """Return a field, ``default`` where it is absent. Raises BridgeProtocolError, with rosbridge's texts."""
+    """Return a field, ``default`` where it is absent. Raise BridgeProtocolError, with rosbridge's texts."""
     found = fields.get(name)
     if found is None:
         if default is ...:

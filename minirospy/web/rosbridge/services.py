@@ -33,7 +33,7 @@ class InThread(Protocol):
 async def call(
     graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
 ) -> Message:
-    """Return a service's response. Raises BridgeError, ServiceException, ROSSerializationException.
+    """Return a service's response. Raise BridgeError, ServiceException, ROSSerializationException.
 
     ``in_thread`` runs the conversion of arguments that are large.
     """
@@ -85,7 +85,7 @@ class ClientService:
         self._graph.look_soon()
 
     def answered(self, event: protocol.ServiceResponse) -> None:
-        """Take over a client's answer. Raises BridgeError: values that do not fit, or no call waits for it."""
+        """Take over a client's answer. Raise BridgeError: values that do not fit, or no call waits for it."""
         future = self._taken(event)
         if not event.result:
             future.set_exception(ServiceException(str(event.values)))

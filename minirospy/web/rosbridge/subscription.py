@@ -138,7 +138,7 @@ class Fragments:
         """Bytes of memory that all of them take."""
 
     def add(self, fragment: Fragment, now: float) -> str | None:
-        """Return the message that a fragment completes. Raises OperationError."""
+        """Return the message that a fragment completes. Raise OperationError."""
         self._forget_old(now)
         known = self._messages.get(fragment.id)
         if known is None:

@@ -21,12 +21,12 @@ class UnknownTypeError(BridgeError):
 
 
 def message_class(name: str) -> type[Message]:
-    """Return a message's class. Raises UnknownTypeError."""
+    """Return a message's class. Raise UnknownTypeError."""
     return _installed(get_message_class, name, "msg")
 
 
 def service_class(name: str) -> ServiceClass:
-    """Return a service's class. Raises UnknownTypeError."""
+    """Return a service's class. Raise UnknownTypeError."""
     return _installed(get_service_class, name, "srv")
 
 

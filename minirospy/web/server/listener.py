@@ -91,7 +91,7 @@ class Listener:
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
-        """Listen; port 0 takes a free one. Raises BridgeError."""
+        """Listen; port 0 takes a free one. Raise BridgeError."""
         loop = asyncio.get_running_loop()
         try:
             sock = tcp.bind(host, port)

@@ -58,7 +58,7 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
 
 
 def _by_query(end: _End, other_end: _End) -> int | None:
-    """Return the user by a query for one socket. Raises OSError. Source: sock_diag(7)."""
+    """Return the user by a query for one socket. Raise OSError. Source: sock_diag(7)."""
     family = socket.AF_INET if end[0].version == 4 else socket.AF_INET6
     addresses = b"".join(each[0].packed.ljust(16, b"\0") for each in (end, other_end))
     id_ = _PORTS.pack(end[1], other_end[1]) + addresses + _REST_OF_ID.pack(0, _ANY, _ANY)

@@ -282,7 +282,7 @@ class TlsPipe(asyncio.Protocol):
 
 
 def tls_context(certificate: str, key: str) -> ssl.SSLContext:
-    """Return what serves with a certificate and its key, both PEM files. Raises OSError, ssl.SSLError."""
+    """Return what serves with a certificate and its key, both PEM files. Raise OSError, ssl.SSLError."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.load_cert_chain(certificate, key or None)

@@ -44,7 +44,7 @@ class VideoRequest:
 
 
 def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoRequest:
-    """Return what a query asks for. Raises BridgeError: no topic, a type that is not offered, a number that is none."""
+    """Return what a query asks for. Raise BridgeError: no topic, a type that is not offered, a number that is none."""
     topic = query.get("topic", "")
     if not topic:
         raise BridgeError("the topic is missing: give ?topic=/camera/image_raw")

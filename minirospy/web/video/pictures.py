@@ -31,7 +31,7 @@ _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return a serialized message's image as a file and its content type. Raises BridgeError."""
+    """Return a serialized message's image as a file and its content type. Raise BridgeError."""
     from sensor_msgs.msg import CompressedImage, Image
 
     try:

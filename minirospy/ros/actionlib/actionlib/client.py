@@ -34,7 +34,7 @@ class ActionClient:
     """The client of the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
 
     The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set the lengths
-    of its queues. Raises ActionException on a class that is not an action.
+    of its queues. Raise ActionException on a class that is not an action.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:

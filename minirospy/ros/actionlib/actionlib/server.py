@@ -62,7 +62,7 @@ class ActionServer:
     ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each that a client wants
     canceled, one after the other, in threads of the library. Parameters: ``actionlib_status_frequency`` in Hz,
     ``<ns>/status_list_timeout`` in seconds (how long the status of a goal is published after its end),
-    ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raises ActionException.
+    ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raise ActionException.
     """
 
     def __init__(

@@ -29,7 +29,7 @@ FeedbackCallback = Callable[[Any], object]
 class SimpleActionClient:
     """The client of one goal at a time: a new one takes the place of the one before.
 
-    ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raises ActionException.
+    ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raise ActionException.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:

@@ -33,7 +33,7 @@ class SimpleActionServer:
 
     ``execute_cb(goal)`` is called with each goal in a separate thread, and has to set a terminal state
     (``set_succeeded``, ``set_aborted``, ``set_preempted``). Without it, ``register_goal_callback`` notifies of
-    goals, and ``accept_new_goal`` takes them. The program lives on while an ``execute_cb`` serves. Raises
+    goals, and ``accept_new_goal`` takes them. The program lives on while an ``execute_cb`` serves. Raise
     ActionException on a class that is not an action.
     """
 

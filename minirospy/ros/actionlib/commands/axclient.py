@@ -35,7 +35,7 @@ class NodeParser(Parser):
     """Leaves out the remapping arguments, which the node reads itself."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raises CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError."""
         from minirospy import client as rospy
 
         return super().parse(rospy.myargv(["", *words])[1:])
@@ -95,7 +95,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 def action_class(type_: str) -> type[Action]:
     """Return the class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
-    Raises NotFoundError.
+    Raise NotFoundError.
     """
     from minirospy.core.idl.load import get_message_class, message_class
 
@@ -121,7 +121,7 @@ def _complain(error: Exception) -> None:
 
 
 def _found_type(action: str, timeout: float | None) -> str:
-    """Wait for the action's server; return the action's type. Raises ROSException after ``timeout`` seconds."""
+    """Wait for the action's server; return the action's type. Raise ROSException after ``timeout`` seconds."""
     from minirospy.introspect.graph import Graph
 
     waiting = threading.Event()

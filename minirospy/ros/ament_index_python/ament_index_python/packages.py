@@ -24,7 +24,7 @@ class PackageNotFoundError(KeyError):
 
 
 def get_package_share_directory(package_name: str, print_warning: bool = True) -> str:
-    """Return the folder of a package. Raises PackageNotFoundError."""
+    """Return the folder of a package. Raise PackageNotFoundError."""
     try:
         return str(Packages().find(package_name))
     except NotFoundError as error:
@@ -33,12 +33,12 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
 
 
 def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
-    """Return the folder of a package. Raises PackageNotFoundError."""
+    """Return the folder of a package. Raise PackageNotFoundError."""
     return Path(get_package_share_directory(package_name))
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Return the folder of a package: ROS 1 has no folder that several share. Raises PackageNotFoundError."""
+    """Return the folder of a package: ROS 1 has no folder that several share. Raise PackageNotFoundError."""
     return get_package_share_directory(package_name)
 
 

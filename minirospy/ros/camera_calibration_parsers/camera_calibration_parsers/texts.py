@@ -33,7 +33,7 @@ class CalibrationError(ValueError):
 
 
 def parse_yaml(text: str) -> tuple[str, CameraInfo]:
-    """Return the camera's name and parameters. Raises CalibrationError."""
+    """Return the camera's name and parameters. Raise CalibrationError."""
     import yaml
 
     try:
@@ -71,7 +71,7 @@ def yaml_of(name: str, info: CameraInfo) -> str:
 
 
 def parse_ini(text: str) -> tuple[str, CameraInfo]:
-    """Return the camera's name and parameters. Raises CalibrationError."""
+    """Return the camera's name and parameters. Raise CalibrationError."""
     name, found = "unknown", {}
     key = ""
     for line in (each.partition("#")[0].strip() for each in text.splitlines()):
@@ -99,7 +99,7 @@ def parse_ini(text: str) -> tuple[str, CameraInfo]:
 
 
 def ini_of(name: str, info: CameraInfo) -> str:
-    """Return the .ini file of a calibration, as ROS writes it. Raises CalibrationError for another model than plumb_bob."""
+    """Return the .ini file of a calibration, as ROS writes it. Raise CalibrationError for another model than plumb_bob."""
     if info.distortion_model != "plumb_bob" or len(info.D) != 5:
         raise CalibrationError("an .ini file holds the distortion model plumb_bob with 5 numbers alone")
 

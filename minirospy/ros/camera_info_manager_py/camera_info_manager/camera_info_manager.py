@@ -72,7 +72,7 @@ class CameraInfoManager:
         self.svc = rospy.Service(service, SetCameraInfo, self.setCameraInfo)
 
     def getCameraInfo(self) -> CameraInfo:
-        """Return the calibration; an empty one where the file is missing. Raises CameraInfoMissingError before it is loaded."""
+        """Return the calibration; an empty one where the file is missing. Raise CameraInfoMissingError before it is loaded."""
         if self.camera_info is None:
             raise CameraInfoMissingError("Calibration missing, loadCameraInfo() needed.")
         return self.camera_info
@@ -86,7 +86,7 @@ class CameraInfoManager:
         return self.url
 
     def isCalibrated(self) -> bool:
-        """Return whether the camera is calibrated. Raises CameraInfoMissingError before it is loaded."""
+        """Return whether the camera is calibrated. Raise CameraInfoMissingError before it is loaded."""
         return bool(self.getCameraInfo().K[0] != 0.0)
 
     def loadCameraInfo(self) -> None:

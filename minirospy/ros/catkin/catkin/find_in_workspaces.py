@@ -29,7 +29,7 @@ def find_in_workspaces(
     """Return the folders, or files ``path`` in them, that the workspaces have in ``search_dirs`` (of the package ``project``).
 
     ``search_dirs``: of etc, include, libexec and share, without a project also of bin and lib. What is searched is
-    added to ``considered_paths``. Raises ValueError on other folders.
+    added to ``considered_paths``. Raise ValueError on other folders.
     """
     chosen = _checked(search_dirs, project)
     found: list[str] = []

@@ -17,7 +17,7 @@ def get_workspaces() -> list[str]:
 
 
 def get_source_paths(workspace: str) -> list[str]:
-    """Return the source folders that a devel folder is built from; none of an install folder. Raises ValueError."""
+    """Return the source folders that a devel folder is built from; none of an install folder. Raise ValueError."""
     marker = Path(workspace, CATKIN_MARKER_FILE)
     if not marker.is_file():
         raise ValueError(f'Not a catkin workspace: "{workspace}", missing file {marker}')

@@ -48,7 +48,7 @@ class _MakeParser(Parser):
     """Leaves out the words for CMake; what they set becomes ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raises CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError."""
         return {**super().parse(without_cmake(words)), "variables": cmake_variables(words)}
 
 

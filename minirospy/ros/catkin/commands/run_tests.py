@@ -30,7 +30,7 @@ _END_SECONDS = 20.0
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
     """Run the tests of the chosen packages, or of all; return 1 where one failed.
 
-    Raises BuildError, NotFoundError; MinirospyError at Ctrl-C.
+    Raise BuildError, NotFoundError; MinirospyError at Ctrl-C.
 
     One test is chosen by catkin's name for it: ``PACKAGE_rostest_test_x.test``. The results are JUnit XML files in
     ``build/test_results/PACKAGE``.
@@ -73,7 +73,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
-    """Run a test; return its exit status. Raises MinirospyError at Ctrl-C, after the test has ended its nodes."""
+    """Run a test; return its exit status. Raise MinirospyError at Ctrl-C, after the test has ended its nodes."""
     with (
         interrupt_noted() as interrupted,
         guard_children(),

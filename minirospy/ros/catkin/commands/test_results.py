@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_counts(file: Path) -> Counts:
-    """Return the counts of a file, summed over its suites. Raises ValueError with the reason where it is not a result file."""
+    """Return the counts of a file, summed over its suites. Raise ValueError with the reason where it is not a result file."""
     try:
         check_xml(text := file.read_bytes())
         root = ElementTree.fromstring(text)

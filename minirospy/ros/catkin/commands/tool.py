@@ -103,7 +103,7 @@ class _CatkinParser(Parser):
         )
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raises CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError."""
         if not self._takes_cmake_words:
             return super().parse(words)
         options = super().parse(without_cmake(words))

@@ -41,7 +41,7 @@ class CvBridge:
         }
 
     def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[numpy.generic], n_channels: int) -> str:
-        """Return the name of an array's type, such as 8UC3. Raises CvBridgeError where OpenCV has none."""
+        """Return the name of an array's type, such as 8UC3. Raise CvBridgeError where OpenCV has none."""
         if dtype.name not in self.numpy_type_to_cvtype:
             raise CvBridgeError(
                 f"images of {dtype.name} have no encoding: there is {', '.join(DEPTHS.values())}"
@@ -53,21 +53,21 @@ class CvBridge:
         return self.cvdepth_to_numpy_depth[cvtype % 8], cvtype // 8 + 1
 
     def encoding_to_cvtype2(self, encoding: str) -> int:
-        """Return OpenCV's number of an encoding's type. Raises CvBridgeError."""
+        """Return OpenCV's number of an encoding's type. Raise CvBridgeError."""
         try:
             return type_of_encoding(encoding)
         except ValueError as error:
             raise CvBridgeError(error) from error
 
     def encoding_to_dtype_with_channels(self, encoding: str) -> tuple[str, int]:
-        """Return numpy's type and the number of channels of an encoding. Raises CvBridgeError."""
+        """Return numpy's type and the number of channels of an encoding. Raise CvBridgeError."""
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
     def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> Pixels:
         """Return the image of a message.
 
         It is a read-only view of the message's data, without a copy, unless the encoding or the order of bytes has to
-        change. Bytes between the rows (``step``) are left out. Raises CvBridgeError (an unknown encoding, no such
+        change. Bytes between the rows (``step``) are left out. Raise CvBridgeError (an unknown encoding, no such
         conversion, less data than the size needs).
         """
         try:
@@ -83,7 +83,7 @@ class CvBridge:
     ) -> Image:
         """Return the message of an image.
 
-        Raises CvBridgeError where its type is not that of the encoding, TypeError where it is not an array.
+        Raise CvBridgeError where its type is not that of the encoding, TypeError where it is not an array.
         """
         _check_array(cvim)
         message = Image()
@@ -103,7 +103,7 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
     ) -> Pixels:
-        """Return the image of a compressed message. Raises CvBridgeError (not an image; unknown conversion)."""
+        """Return the image of a compressed message. Raise CvBridgeError (not an image; unknown conversion)."""
         try:
             image = decode(bytes(cmprs_img_msg.data))
         except ValueError as error:
@@ -117,7 +117,7 @@ class CvBridge:
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
         """Return the compressed message of an image: jpg, png, bmp, tiff, webp, ...
 
-        Raises CvBridgeError where the format cannot hold it, TypeError where it is not an array.
+        Raise CvBridgeError where the format cannot hold it, TypeError where it is not an array.
         """
         _check_array(cvim)
         try:
@@ -136,7 +136,7 @@ def _check_array(image: object) -> None:
 
 
 def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image in another encoding. Raises CvBridgeError."""
+    """Return an image in another encoding. Raise CvBridgeError."""
     try:
         if is_converted_by_opencv(source, wanted):
             image, source = _by_opencv(image, source, wanted)
@@ -146,7 +146,7 @@ def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
-    """Return an image of a Bayer pattern or YUV in colors of the same depth, and its encoding then. Raises ValueError."""
+    """Return an image of a Bayer pattern or YUV in colors of the same depth, and its encoding then. Raise ValueError."""
     cv2 = opencv()
     if cv2 is None:
         raise ValueError(

@@ -59,7 +59,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
 
 
 def _summary_of(args: tuple[object, ...]) -> tuple[int, str]:
-    """Return level and message. Raises TypeError for what is neither a status nor a level and a message."""
+    """Return level and message. Raise TypeError for what is neither a status nor a level and a message."""
     if len(args) == 2:
         level, message = args
     elif len(args) == 1 and isinstance(args[0], DiagnosticStatus):

@@ -111,7 +111,7 @@ class DiagnosticTaskVector:
         """Do what a derived class does when a task is added."""
 
     def add(self, *args: Any) -> None:
-        """Add a task: ``add(task)``, or ``add(name, function)``. Raises TypeError for anything else."""
+        """Add a task: ``add(task)``, or ``add(name, function)``. Raise TypeError for anything else."""
         if len(args) == 1:
             name, fill = args[0].getName(), args[0].run
         elif len(args) == 2:

@@ -67,7 +67,7 @@ class ConfigType(Protocol):
 
 
 def find_reconfigure_services() -> list[str]:
-    """Return the names of all servers, sorted. Raises ROSServiceIOException without a master."""
+    """Return the names of all servers, sorted. Raise ROSServiceIOException without a master."""
     from minirospy.ros.rosservice import rosservice
 
     names = rosservice.get_service_list()

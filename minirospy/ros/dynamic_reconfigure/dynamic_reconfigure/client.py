@@ -52,7 +52,7 @@ class Client:
     ) -> None:
         """Wait ``timeout`` seconds for the server of this name; without a limit where that is None or 0.
 
-        ``config_callback(config)`` is called with each change. Raises ROSException if the server is not there in time.
+        ``config_callback(config)`` is called with each change. Raise ROSException if the server is not there in time.
         """
         if not isinstance(name, str):
             # It would wait for a server that cannot be.
@@ -99,7 +99,7 @@ class Client:
         """Change values at the server; return the configuration that it has then.
 
         Texts are converted to the type of the parameter; of one with an enum the name of a constant will do.
-        Raises DynamicReconfigureParameterException (a name or value that the server does not have),
+        Raise DynamicReconfigureParameterException (a name or value that the server does not have),
         DynamicReconfigureCallbackException (the server failed, or has left).
         """
         descriptions = self.get_parameter_descriptions() or []
@@ -222,7 +222,7 @@ def _constants(edit_method: str) -> list[dict[str, Any]]:
 
 
 def _wait_for(service: str, timeout: float | None) -> None:
-    """Wait for a service. Raises ROSException."""
+    """Wait for a service. Raise ROSException."""
     if timeout:
         rospy.wait_for_service(service, timeout)
         return

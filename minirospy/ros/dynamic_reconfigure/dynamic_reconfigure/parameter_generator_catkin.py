@@ -90,7 +90,7 @@ class ParameterGenerator:
             gen._groups[id] = self
 
         def get_group(self, id: int) -> ParameterGenerator.Group:
-            """Return a group by its number. Raises KeyError."""
+            """Return a group by its number. Raise KeyError."""
             return self.gen._groups[id]
 
         def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
@@ -112,7 +112,7 @@ class ParameterGenerator:
         ) -> None:
             """Add a parameter; ``level``: the bits that the server's callback gets when it changes.
 
-            Raises Exception (a wrong name, limits of a text), TypeError (a value of another type).
+            Raise Exception (a wrong name, limits of a text), TypeError (a value of another type).
             """
             if paramtype in (str_t, bool_t) and (max is not None or min is not None):
                 raise Exception(f"Max or min specified for {name}, which is of '{paramtype}' type")
@@ -178,7 +178,7 @@ class ParameterGenerator:
             }
 
     def __init__(self) -> None:
-        """Take the folders from the command line. Raises SystemExit where it has none."""
+        """Take the folders from the command line. Raise SystemExit where it has none."""
         self._groups: dict[int, ParameterGenerator.Group] = {}
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants: list[Entry] = []
@@ -187,18 +187,18 @@ class ParameterGenerator:
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
 
     def pytype(self, drtype: str) -> type[Value]:
-        """Return the Python type of a parameter's type. Raises KeyError."""
+        """Return the Python type of a parameter's type. Raise KeyError."""
         return _PYTHON_TYPES[drtype]
 
     def check_type(self, param: Entry, field: _ValueKey) -> None:
-        """Convert a parameter's value to its type. Raises TypeError where it has another."""
+        """Convert a parameter's value to its type. Raise TypeError where it has another."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
         param[field] = float(value) if type(value) is int and wanted is float else value
 
     def fill_type(self, param: Entry) -> None:
-        """Add the C++ types of a parameter or constant. Raises TypeError where its type is unknown."""
+        """Add the C++ types of a parameter or constant. Raise TypeError where its type is unknown."""
         if param["type"] not in _CPP_TYPES:
             raise TypeError(
                 f"'{param['name']}' has type {param['type']!r}: a type is {', '.join(_CPP_TYPES)}"
@@ -207,14 +207,14 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set the default where there is none. Raises TypeError."""
+        """Convert a parameter's value, or set the default where there is none. Raise TypeError."""
         if param[field] is None:
             param[field] = default
         else:
             self.check_type(param, field)
 
     def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
-        """Add a constant ``NAME_name`` to the module; return what ``enum`` takes. Raises Exception, TypeError."""
+        """Add a constant ``NAME_name`` to the module; return what ``enum`` takes. Raise Exception, TypeError."""
         srcfile, srcline = _source_line()
         constant: Entry = {
             "name": name,
@@ -231,7 +231,7 @@ class ParameterGenerator:
         return constant
 
     def enum(self, constants: Sequence[Entry], description: str) -> str:
-        """Return the ``edit_method`` of a parameter that is one of some constants. Raises Exception."""
+        """Return the ``edit_method`` of a parameter that is one of some constants. Raise Exception."""
         if len({constant["type"] for constant in constants}) != 1:
             raise Exception("Inconsistent types in enum!")
         check_description(description)

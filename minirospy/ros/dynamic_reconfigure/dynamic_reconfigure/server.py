@@ -54,7 +54,7 @@ class Server:
     ) -> None:
         """``type``: the module package.cfg.NAMEConfig; ``namespace``: of its names, in the node's own one.
 
-        Raises DynamicReconfigureCallbackException where the callback returns None, and what it raises.
+        Raise DynamicReconfigureCallbackException where the callback returns None, and what it raises.
         """
         self.mutex = threading.Lock()
         if not namespace or namespace == "~":
@@ -83,7 +83,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values; return the configuration that the callback returned. Raises what the callback raises."""
+        """Change values; return the configuration that the callback returned. Raise what the callback raises."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)

@@ -11,12 +11,12 @@ __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 
 
 def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
-    """Return what the md5sum of a message counts. Raises KeyError where it needs what is not known."""
+    """Return what the md5sum of a message counts. Raise KeyError where it needs what is not known."""
     return digest.md5_text(parsed_message(spec), lookup_in(msg_context))
 
 
 def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the md5sum of a message or service. Raises KeyError where it needs what is not known."""
+    """Return the md5sum of a message or service. Raise KeyError where it needs what is not known."""
     if isinstance(spec, SrvSpec):
         return digest.service_md5(parsed_service(spec.text, spec.full_name), lookup_in(msg_context))
     return digest.message_md5(parsed_message(spec), lookup_in(msg_context))
@@ -25,7 +25,7 @@ def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
 def compute_full_text(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
     """Return the text of a message or service and of all that it needs, as connection headers and bags hold it.
 
-    Raises KeyError before :func:`load_depends`.
+    Raise KeyError before :func:`load_depends`.
     """
     needed = msg_context.get_all_depends(spec.full_name)
     return digest.joined_texts(spec.text, ((name, msg_context.get_registered(name).text) for name in needed))

@@ -92,7 +92,7 @@ class MsgContext:
         return bare_msg_type(full_msg_type) in self._specs
 
     def get_registered(self, full_msg_type: str) -> MsgSpec:
-        """Return a message that is known. Raises KeyError."""
+        """Return a message that is known. Raise KeyError."""
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
@@ -112,7 +112,7 @@ class MsgContext:
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return the messages that one needs, each before those that it needs itself. Raises KeyError."""
+        """Return the messages that one needs, each before those that it needs itself. Raise KeyError."""
         found: list[str] = []
         for name in self._depends[full_msg_type]:
             found += [each for each in (name, *self.get_all_depends(name)) if each not in found]
@@ -120,7 +120,7 @@ class MsgContext:
 
 
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
-    """Return the file of a definition. Raises MsgNotFound, ValueError where the search path is not a dictionary."""
+    """Return the file of a definition. Raise MsgNotFound, ValueError where the search path is not a dictionary."""
     if not isinstance(search_path, Mapping):
         raise ValueError("search_path must be a dictionary of namespaces to lists of folders")
     if package not in search_path:
@@ -145,19 +145,19 @@ def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str
 
 
 def get_srv_file(package: str, base_type: str, search_path: SearchPath) -> str:
-    """Return the file of a service's definition. Raises MsgNotFound."""
+    """Return the file of a service's definition. Raise MsgNotFound."""
     return get_msg_file(package, base_type, search_path, ".srv")
 
 
 def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> MsgSpec:
-    """Add the message of a text to the context, and return it. Raises InvalidMsgSpec."""
+    """Add the message of a text to the context, and return it. Raise InvalidMsgSpec."""
     spec = _msg_spec(_parsed(text, full_name))
     msg_context.register(full_name, spec)
     return spec
 
 
 def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> MsgSpec:
-    """Add the message of a file to the context, and return it. Raises InvalidMsgSpec, OSError."""
+    """Add the message of a file to the context, and return it. Raise InvalidMsgSpec, OSError."""
     text = _text(file_path)
     try:
         spec = load_msg_from_string(msg_context, text, full_name)
@@ -168,14 +168,14 @@ def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 
 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
-    """Add a message to the context by its name, and return it. Raises InvalidMsgSpec, MsgNotFound."""
+    """Add a message to the context by its name, and return it. Raise InvalidMsgSpec, MsgNotFound."""
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
     package, base = package_resource_name(name)
     return load_msg_from_file(msg_context, get_msg_file(package, base, search_path), name)
 
 
 def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> SrvSpec:
-    """Return the service of a text; add its request and response to the context. Raises InvalidMsgSpec."""
+    """Return the service of a text; add its request and response to the context. Raise InvalidMsgSpec."""
     parsed = parsed_service(text, full_name)
     request, response = _msg_spec(parsed.request), _msg_spec(parsed.response)
     for spec in (request, response):
@@ -184,14 +184,14 @@ def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> 
 
 
 def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> SrvSpec:
-    """Return the service of a file. Raises InvalidMsgSpec, OSError."""
+    """Return the service of a file. Raise InvalidMsgSpec, OSError."""
     spec = load_srv_from_string(msg_context, _text(file_path), full_name)
     msg_context.set_file(full_name, file_path)
     return spec
 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
-    """Return a service by its name. Raises InvalidMsgSpec, MsgNotFound."""
+    """Return a service by its name. Raise InvalidMsgSpec, MsgNotFound."""
     package, base = package_resource_name(srv_type)
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
@@ -199,7 +199,7 @@ def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: Search
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
     """Add all that a message or service needs to the context; return the messages of its fields, each once.
 
-    Raises InvalidMsgSpec, MsgNotFound, ValueError where the spec is something else.
+    Raise InvalidMsgSpec, MsgNotFound, ValueError where the spec is something else.
     """
     if not isinstance(spec, MsgSpec | SrvSpec):
         raise ValueError(f"spec does not appear to be a message or service: {spec}")
@@ -233,7 +233,7 @@ def lookup_in(msg_context: MsgContext) -> digest.Lookup:
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Return our spec of a message. Raises InvalidMsgSpec."""
+    """Return our spec of a message. Raise InvalidMsgSpec."""
     return _parsed(spec.text, spec.full_name)
 
 

@@ -61,7 +61,7 @@ class _Constant(NamedTuple):
 
 
 class Constant(_Constant):
-    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raises ValueError where one is None."""
+    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raise ValueError where one is None."""
 
     __slots__ = ()
 
@@ -193,7 +193,7 @@ def resolve_type(msg_type: str, package_context: str) -> str:
 
 
 def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
-    """Return (type without brackets, whether it is an array, its length where that is fixed). Raises ValueError."""
+    """Return (type without brackets, whether it is an array, its length where that is fixed). Raise ValueError."""
     if not msg_type:
         raise ValueError("Invalid empty type")
     if "[" not in msg_type:

@@ -15,7 +15,7 @@ __all__ = ["generate_dynamic"]
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
     """Return the classes of a full text and of all types in it, by name.
 
-    Raises InvalidMsgSpec, MsgNotFound where the text lacks a type, MsgGenerationException where a part of it is unnamed.
+    Raise InvalidMsgSpec, MsgNotFound where the text lacks a type, MsgGenerationException where a part of it is unnamed.
     """
     from minirospy.core.idl import load
 

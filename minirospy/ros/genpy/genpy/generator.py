@@ -43,7 +43,7 @@ _Emitter = Callable[..., Iterator[str]]
 
 
 def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPath) -> Iterator[str]:
-    """Yield the lines of a message's module. Raises MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
+    """Yield the lines of a message's module. Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
     load_depends(msg_context, spec, search_path)
     try:
         yield from emit_message(parsed_message(spec), lookup_in(msg_context)).splitlines()
@@ -52,7 +52,7 @@ def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPat
 
 
 def srv_generator(msg_context: MsgContext, spec: SrvSpec, search_path: SearchPath) -> Iterator[str]:
-    """Yield the lines of a service's module. Raises MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
+    """Yield the lines of a service's module. Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
     load_depends(msg_context, spec, search_path)
     try:
         yield from emit_service(
@@ -73,7 +73,7 @@ def compute_outfile_name(outdir: str, infile_name: str, ext: str) -> str:
 
 
 def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
-    """Return package and name of a type that definitions in ``package`` use. Raises MsgGenerationException."""
+    """Return package and name of a type that definitions in ``package`` use. Raise MsgGenerationException."""
     words = type_.split("/")
     if len(words) > 2:
         raise MsgGenerationException(f"illegal message type: {type_}")
@@ -109,7 +109,7 @@ class Generator:
     ) -> str:
         """Write the module of the definition in the file ``f``, and return its path.
 
-        Raises MsgGenerationException, InvalidMsgSpec, MsgNotFound, OSError.
+        Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound, OSError.
         """
         spec = self.spec_loader_fn(msg_context, f, full_type)
         lines = list(self.generator_fn(msg_context, spec, search_path))

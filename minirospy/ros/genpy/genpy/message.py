@@ -54,14 +54,14 @@ def register_unicode_errors() -> None:
 
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Message] | None:
-    """Return the class of ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
+    """Return the class of ``pkg/Name``, or None. Raise ValueError on an invalid type name."""
     from minirospy.core.idl import load
 
     return load.get_message_class(_checked(message_type))
 
 
 def get_service_class(service_type: str, reload_on_error: bool = False) -> ServiceClass | None:
-    """Return the class of the service ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
+    """Return the class of the service ``pkg/Name``, or None. Raise ValueError on an invalid type name."""
     from minirospy.core.idl import load
 
     return load.get_service_class(_checked(service_type))
@@ -75,7 +75,7 @@ def isstring(s: object) -> bool:
 def _get_message_or_service_class(
     type_str: str, message_type: str, reload_on_error: bool = False
 ) -> type[Message] | ServiceClass | None:
-    """Return the class of a ``message`` or ``service``, or None. Raises ValueError on an invalid type name."""
+    """Return the class of a ``message`` or ``service``, or None. Raise ValueError on an invalid type name."""
     if type_str == "service":
         return get_service_class(message_type, reload_on_error)
     return get_message_class(message_type, reload_on_error)

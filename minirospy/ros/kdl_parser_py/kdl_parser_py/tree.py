@@ -110,7 +110,7 @@ class Tree:
         return sum(segment.is_moving for segment in self._segments.values())
 
     def getChain(self, chain_root: str, chain_tip: str) -> Chain:
-        """Return the segments from a link down to one below it. Raises ValueError where it is not below."""
+        """Return the segments from a link down to one below it. Raise ValueError where it is not below."""
         found: list[Segment] = []
         link = chain_tip
         while link != chain_root:

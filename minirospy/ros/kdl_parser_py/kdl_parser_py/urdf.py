@@ -18,24 +18,24 @@ class Writable(Protocol):
 
 
 def treeFromFile(filename: str) -> tuple[bool, Tree]:
-    """Return the tree of a file. Raises UrdfError, OSError."""
+    """Return the tree of a file. Raise UrdfError, OSError."""
     return True, tree_of(read_robot(filename))
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Return the tree of a parameter. Raises KeyError where it is not set, UrdfError."""
+    """Return the tree of a parameter. Raise KeyError where it is not set, UrdfError."""
     from minirospy import client as rospy
 
     return True, tree_of(parse_robot(rospy.get_param(param), param))
 
 
 def treeFromString(xml: str | bytes) -> tuple[bool, Tree]:
-    """Return the tree of a description. Raises UrdfError."""
+    """Return the tree of a description. Raise UrdfError."""
     return True, tree_of(parse_robot(xml))
 
 
 def treeFromUrdfModel(robot_model: Writable, quiet: bool = False) -> tuple[bool, Tree]:
-    """Return the tree of urdf_parser_py's robot; a root with an inertia is warned of unless ``quiet``. Raises UrdfError."""
+    """Return the tree of urdf_parser_py's robot; a root with an inertia is warned of unless ``quiet``. Raise UrdfError."""
     robot = parse_robot(robot_model.to_xml_string())
     if robot.links[robot.root].inertial and not quiet:
         print(

@@ -62,7 +62,7 @@ class LaserProjection:
 
         ``range_cutoff``: meters from which on points are left out, too; negative for the scan's own limit.
         ``channel_options``: the fields, of ``ChannelOption``; ``INTENSITY`` only where the scan has any.
-        Raises IndexError where the scan has fewer intensities than ranges.
+        Raise IndexError where the scan has fewer intensities than ranges.
         """
         import numpy as np
 
@@ -106,7 +106,7 @@ class LaserProjection:
         """Return the cloud of a scan in another frame, each point by where the laser was when it was measured.
 
         The transforms of the scan's first and last beam are looked up in a tf2 buffer, and interpolated between, as the
-        C++ class does; ROS's Python module lacks this method. Raises what ``lookup_transform`` raises.
+        C++ class does; ROS's Python module lacks this method. Raise what ``lookup_transform`` raises.
         """
         import numpy as np
 

@@ -111,7 +111,7 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[object]:
-        """Return the messages of a span of time, both ends included. Raises AssertionError if it is turned round."""
+        """Return the messages of a span of time, both ends included. Raise AssertionError if it is turned round."""
         assert from_stamp <= to_stamp
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
@@ -180,7 +180,7 @@ class TimeSynchronizer(SimpleFilter):
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
         """Store a message of an input; pass on each set that is complete.
 
-        Raises AttributeError where it has no header.
+        Raise AttributeError where it has no header.
         """
         stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         with self.lock:
@@ -306,7 +306,7 @@ def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
 
 
 def _now() -> int:
-    """Return the node's time in nanoseconds. Raises ROSInitException before init_node."""
+    """Return the node's time in nanoseconds. Raise ROSInitException before init_node."""
     session = current_session()
     return session.clock.now() if session.has_time else rospy.Time.now().to_nsec()
 

@@ -62,14 +62,14 @@ class StampQueue(MutableMapping[Time, object]):
         self._entries.clear()
 
     def take(self, nanoseconds: int) -> object:
-        """Remove a message by its stamp in nanoseconds, and return it. Raises KeyError."""
+        """Remove a message by its stamp in nanoseconds, and return it. Raise KeyError."""
         message = self._entries.pop(nanoseconds)[1]
         order = self.order
         del order[bisect_left(order, nanoseconds) if nanoseconds > order[0] else 0]
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
-        """Return the stamp as it was given. Raises KeyError."""
+        """Return the stamp as it was given. Raise KeyError."""
         return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
@@ -78,7 +78,7 @@ class StampQueue(MutableMapping[Time, object]):
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stamp that is closest to another one; of two, that which arrived first. Raises IndexError if empty."""
+        """Return the stamp that is closest to another one; of two, that which arrived first. Raise IndexError if empty."""
         order = self.order
         if order[-1] <= stamp:
             return order[-1]

@@ -19,7 +19,7 @@ _TIMEOUT = 60.0
 def get(url: str) -> bytes:
     """Return what is at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or what urllib opens, as http and https.
 
-    Raises Exception, as ROS does, where there is nothing; ResourceNotFound where the package is not found, ValueError
+    Raise Exception, as ROS does, where there is nothing; ResourceNotFound where the package is not found, ValueError
     where it is not a URL.
     """
     try:
@@ -35,7 +35,7 @@ def get(url: str) -> bytes:
 def get_filename(url: str, use_protocol: bool = True) -> str:
     """Return a package:// URL as one of the file; any other as it is.
 
-    Without ``use_protocol`` the result is the file's path. Raises ResourceNotFound (no such package), Exception (no file).
+    Without ``use_protocol`` the result is the file's path. Raise ResourceNotFound (no such package), Exception (no file).
     """
     if not url.startswith(PACKAGE_PREFIX):
         return url

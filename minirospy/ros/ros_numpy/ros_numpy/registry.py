@@ -44,7 +44,7 @@ def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callabl
 
 
 def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
-    """Return a message, or a list of messages, as an array; None for None. Raises ValueError without a conversion."""
+    """Return a message, or a list of messages, as an array; None for None. Raise ValueError without a conversion."""
     if msg is None:
         return None
     plural = isinstance(msg, Sequence)
@@ -60,7 +60,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Return an array as a message of a type, with ``plural`` as a list. Raises ValueError without a conversion."""
+    """Return an array as a message of a type, with ``plural`` as a list. Raise ValueError without a conversion."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

@@ -80,7 +80,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raises NotFoundError where neither is known."""
+    """Return a hint for a missing program or package. Raise NotFoundError where neither is known."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -95,7 +95,7 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
 
 
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
-    """Return the commands that run a program. Raises WordedError, with the exit status of ROS's rosrun."""
+    """Return the commands that run a program. Raise WordedError, with the exit status of ROS's rosrun."""
     try:
         folder = packages.find(package)
     except NotFoundError as error:
@@ -121,7 +121,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Prompt for one of several programs of the same name, and return it. Raises UsageError at the input's end."""
+    """Prompt for one of several programs of the same name, and return it. Raise UsageError at the input's end."""
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):

@@ -16,14 +16,14 @@ class CleanupException(Exception):
 
 
 def get_disk_usage(d: str) -> int:
-    """Return the bytes that a folder takes. Raises CleanupException."""
+    """Return the bytes that a folder takes. Raise CleanupException."""
     if not isinstance(d, str | Path) or not Path(d).is_dir():
         raise CleanupException(f"[{d}] is not a folder")
     return disk_usage(Path(d))
 
 
 def get_human_readable_disk_usage(d: str) -> str:
-    """Return the bytes that a folder takes, as `du -h` prints them. Raises CleanupException."""
+    """Return the bytes that a folder takes, as `du -h` prints them. Raise CleanupException."""
     return human_size(get_disk_usage(d))
 
 

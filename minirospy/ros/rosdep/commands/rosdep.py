@@ -100,7 +100,7 @@ def _missing(
 ) -> dict[str, list[str]]:
     """Return the missing keys, each with the packages that need it.
 
-    Raises NotFoundError, ManifestError, UsageError.
+    Raise NotFoundError, ManifestError, UsageError.
     """
     from minirospy.workspace.build import PROVIDED
     from minirospy.workspace.manifest import Kind, read_manifest

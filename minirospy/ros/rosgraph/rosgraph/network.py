@@ -100,7 +100,7 @@ def create_local_xmlrpc_uri(port: int) -> str:
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
-    """Return (host, port) of a URL; port 80 where it has none. Raises ValueError."""
+    """Return (host, port) of a URL; port 80 where it has none. Raise ValueError."""
     from urllib.parse import urlsplit
 
     if not url:
@@ -114,7 +114,7 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
     """Return a connection header's bytes, its length in front, fields sorted; names and values are str or bytes.
 
-    Raises TypeError.
+    Raise TypeError.
     """
     pairs = sorted((_as_bytes(name), _as_bytes(value)) for name, value in header.items())
     fields = [name + b"=" + value for name, value in pairs]
@@ -131,7 +131,7 @@ def _as_bytes(text: object) -> bytes:
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """Return the fields of a connection header, its length in front. Raises ROSHandshakeException, struct.error."""
+    """Return the fields of a connection header, its length in front. Raise ROSHandshakeException, struct.error."""
     (size,) = struct.unpack("<I", header_str[:LENGTH_BYTES])
     body = header_str[LENGTH_BYTES : LENGTH_BYTES + size]
     if len(body) < size:
@@ -147,7 +147,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
     """Return the connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
 
-    Raises ROSHandshakeException where the peer ends before.
+    Raise ROSHandshakeException where the peer ends before.
     """
     data = b.getvalue()
     while len(data) < LENGTH_BYTES or len(data) < LENGTH_BYTES + parse_length(data):

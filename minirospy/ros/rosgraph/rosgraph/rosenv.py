@@ -29,7 +29,7 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
     """Return the URI of the master that the command line (the first ``__master:=``) or else the environment names.
 
-    Raises ValueError for one that is empty, or has another ``:=`` in it.
+    Raise ValueError for one that is empty, or has another ``:=`` in it.
     """
     for argument in sys.argv if argv is None else argv:
         if argument.startswith("__master:="):

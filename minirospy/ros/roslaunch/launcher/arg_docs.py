@@ -16,7 +16,7 @@ __all__ = ["describe_args", "resolved_arg_docs"]
 
 
 def describe_args(file: str) -> list[ArgDoc]:
-    """Return the arguments that a file declares, without loading what it includes. Raises LaunchError."""
+    """Return the arguments that a file declares, without loading what it includes. Raise LaunchError."""
     root = parse_document(read_launch_file(file), file)
     return [
         ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
@@ -28,7 +28,7 @@ def describe_args(file: str) -> list[ArgDoc]:
 def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
     """Return the same as describe_args(), with the defaults' values where ``args`` are given, and without what does not apply.
 
-    What cannot be resolved stays as it is written. Raises LaunchError.
+    What cannot be resolved stays as it is written. Raise LaunchError.
     """
     substitution = Substitution(packages, os.environ, file, dict(args))
     found: dict[str, ArgDoc] = {}

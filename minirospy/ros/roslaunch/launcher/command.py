@@ -16,7 +16,7 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
-    """Return the words that run a node's program, its path last. Raises MinirospyError."""
+    """Return the words that run a node's program, its path last. Raise MinirospyError."""
     try:
         return packages.find_executable(node.package, node.type)
     except (NotFoundError, NotExecutableError) as error:
@@ -24,7 +24,7 @@ def node_program(node: NodeSpec, packages: Packages) -> list[str]:
 
 
 def node_command(node: NodeSpec, packages: Packages) -> list[str]:
-    """Return the command that runs a node, with its name and remappings. Raises MinirospyError."""
+    """Return the command that runs a node, with its name and remappings. Raise MinirospyError."""
     program = node_program(node, packages)
     try:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
@@ -50,12 +50,12 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the folder that a node's process starts in. Raises MinirospyError."""
+    """Return the folder that a node's process starts in. Raise MinirospyError."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """Return a node's command as `roslaunch --args` prints it, with the variables that it sets. Raises MinirospyError."""
+    """Return a node's command as `roslaunch --args` prints it, with the variables that it sets. Raise MinirospyError."""
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
     if not os.environ.get("ROS_MASTER_URI"):

@@ -29,7 +29,7 @@ class FileNeeds(NamedTuple):
 def file_needs(
     files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
 ) -> dict[str, FileNeeds]:
-    """Return the needs of each launch file, and of those that they include. Raises LaunchError.
+    """Return the needs of each launch file, and of those that they include. Raise LaunchError.
 
     An arg without a value or a missing parameter file is not an error: they may be generated later. ``warn``
     is called for each file that cannot be included.
@@ -57,7 +57,7 @@ def file_needs(
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
     """Return the packages that launch files need and the package.xml of their package does not name, by package, sorted.
 
-    ``tests``: what it names for tests counts, too. Raises ManifestError.
+    ``tests``: what it names for tests counts, too. Raise ManifestError.
     """
     found: dict[str, set[str]] = {}
     for file, what in needs.items():

@@ -45,7 +45,7 @@ _CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
 
 def parse_document(text: bytes, file: str) -> Element:
-    """Return the ``<launch>`` of a launch file. Raises LaunchError."""
+    """Return the ``<launch>`` of a launch file. Raise LaunchError."""
     try:
         root = parse_xml(text)
     except XmlSyntaxError as error:
@@ -85,19 +85,19 @@ class Tag:
         return key in self.element.attributes
 
     def resolve(self, text: str) -> str:
-        """Return a text with its substitutions made. Raises LaunchError."""
+        """Return a text with its substitutions made. Raise LaunchError."""
         try:
             return self._substitution.apply(text)
         except (SubstitutionError, NotFoundError) as error:
             raise self.error(str(error)) from error
 
     def optional(self, key: str) -> str | None:
-        """Return an attribute, substitutions made; None where it is not there. Raises LaunchError."""
+        """Return an attribute, substitutions made; None where it is not there. Raise LaunchError."""
         text = self.element.attributes.get(key)
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """Return an attribute that has to be there. Raises LaunchError."""
+        """Return an attribute that has to be there. Raise LaunchError."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -109,7 +109,7 @@ class Tag:
         return text
 
     def flag(self, key: str) -> bool:
-        """Return an attribute that is true or false (where it is not there). Raises LaunchError."""
+        """Return an attribute that is true or false (where it is not there). Raise LaunchError."""
         text = self.optional(key)
         if text is None:
             return False
@@ -119,7 +119,7 @@ class Tag:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """Return an attribute that is a number. Raises LaunchError."""
+        """Return an attribute that is a number. Raise LaunchError."""
         text = self.optional(key)
         try:
             return default if text is None else float(text)
@@ -127,7 +127,7 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return an attribute that is a number of a kind; the default where it is empty. Raises LaunchError."""
+        """Return an attribute that is a number of a kind; the default where it is empty. Raise LaunchError."""
         text = self.optional(key)
         try:
             return kind(text) if text else default
@@ -135,14 +135,14 @@ class Tag:
             raise self.error(f"'{key}' must be a number: [{text}]") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Return an attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
+        """Return an attribute that is one of ``choices`` (the first where it is not there). Raise LaunchError."""
         text = self.optional(key)
         if text is not None and text not in choices:
             raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return the value of its ``if`` or ``unless``. Raises LaunchError."""
+        """Return the value of its ``if`` or ``unless``. Raise LaunchError."""
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
         for key in ("if", "unless"):

@@ -34,7 +34,7 @@ class LaunchFileNotFoundError(MinirospyError):
 
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
-    """Return the launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
+    """Return the launch files that a command line names: PACKAGE FILE, or files. Raise MinirospyError."""
     for word in what:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not Path(word).exists():

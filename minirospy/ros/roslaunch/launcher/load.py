@@ -85,14 +85,14 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files one after another, with ``args`` as on the command line. Raises LaunchError."""
+    """Load launch files one after another, with ``args`` as on the command line. Raise LaunchError."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load one launch file from its text, as from standard input. Raises LaunchError."""
+    """Load one launch file from its text, as from standard input. Raise LaunchError."""
     return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
@@ -174,7 +174,7 @@ class _File:
         }
 
     def read(self, text: bytes, scope: _Scope) -> _Scope:
-        """Read the file's text; return the scope at its end. Raises LaunchError."""
+        """Read the file's text; return the scope at its end. Raise LaunchError."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
         if path not in self._spec.files:
             self._spec.files.append(path)
@@ -501,7 +501,7 @@ class _File:
 
 
 def _folder(tag: Tag) -> str:
-    """Return the ``cwd`` of a node; "" where it is not there. Raises LaunchError."""
+    """Return the ``cwd`` of a node; "" where it is not there. Raise LaunchError."""
     text = tag.optional("cwd")
     if text is None:
         return ""
@@ -510,7 +510,7 @@ def _folder(tag: Tag) -> str:
 
 
 def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
-    """Return the name, value and default of an ``<arg>``. Raises LaunchError."""
+    """Return the name, value and default of an ``<arg>``. Raise LaunchError."""
     name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
     if value is not None and default is not None:
         raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")

@@ -62,7 +62,7 @@ class LaunchMaster:
         self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
-        """Start a master on this machine. Raises MasterUnreachableError where it belongs on another, MinirospyError."""
+        """Start a master on this machine. Raise MasterUnreachableError where it belongs on another, MinirospyError."""
         if not self._environment.master_is_local:
             # Its error names what is wrong: a name without an address, a master that is suspended.
             self._proxy.get_pid()
@@ -81,7 +81,7 @@ class LaunchMaster:
         return start_process("master", command, environ=os.environ)
 
     def wait_for_start(self, process: Process) -> None:
-        """Wait until a master that was started answers, and set its /run_id. Raises MinirospyError."""
+        """Wait until a master that was started answers, and set its /run_id. Raise MinirospyError."""
         end = time.monotonic() + _START_SECONDS
         while not self.is_online():
             if not process.is_running:
@@ -123,7 +123,7 @@ class LaunchMaster:
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Set the parameters, after what <rosparam> commands and clear_params delete. Raises MinirospyError."""
+        """Set the parameters, after what <rosparam> commands and clear_params delete. Raise MinirospyError."""
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):
                 self._proxy.delete_param(namespace)

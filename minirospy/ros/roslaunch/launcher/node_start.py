@@ -31,7 +31,7 @@ class NodeStarter:
         self._has_warned = False
 
     def start(self, node: NodeSpec, name: str) -> Process:
-        """Start a node as the process ``name``. Raises MinirospyError."""
+        """Start a node as the process ``name``. Raise MinirospyError."""
         command = node_command(node, self._packages)
         folder = node_folder(node, self._packages, self._environment)
         environ = node_environment(node, self._environment)

@@ -52,7 +52,7 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all lines, those before, too, into roslaunch-HOST-PID.log of ``folder``; its path. Raises OSError."""
+        """Write all lines, those before, too, into roslaunch-HOST-PID.log of ``folder``; its path. Raise OSError."""
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -38,7 +38,7 @@ _WAYS = ("value", "textfile", "binfile", "command")
 
 
 def param_value(tag: Tag) -> object:
-    """Return the value of a ``<param>``. Raises LaunchError."""
+    """Return the value of a ``<param>``. Raise LaunchError."""
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
         raise tag.error(f"<param> tag must have one and only one of {'/'.join(_WAYS)}")
@@ -64,7 +64,7 @@ def param_value(tag: Tag) -> object:
 
 
 def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, object]]:
-    """Return each single parameter that a ``<rosparam>`` loads, and its value. Raises LaunchError."""
+    """Return each single parameter that a ``<rosparam>`` loads, and its value. Raise LaunchError."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
     if tag.flag("subst_value"):

@@ -143,7 +143,7 @@ def start_process(
 ) -> Process:
     """Start a process. Its output goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
 
-    Raises MinirospyError.
+    Raise MinirospyError.
     """
     try:
         with _opened(stdout_file) as output:

@@ -83,7 +83,7 @@ class Api:
 
 
 def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -> object:
-    """Call a method of another roslaunch. Raises RpcError."""
+    """Call a method of another roslaunch. Raise RpcError."""
     client = RpcClient(uri, timeout)
     try:
         return unwrap(method, client.call(method, *args))
@@ -126,7 +126,7 @@ class RemoteMachines:
         return any(child.running and child.ssh.is_running for child in self._children.values())
 
     def start(self, nodes: Sequence[tuple[NodeSpec, MachineSpec]]) -> None:
-        """Start nodes on their machines. Raises LaunchError where a machine cannot be reached."""
+        """Start nodes on their machines. Raise LaunchError where a machine cannot be reached."""
         if self._environment.master_address[0] in ("localhost", "127.0.0.1", "::1"):
             self._output.warn(
                 f"WARNING: ROS_MASTER_URI [{self._environment.master_uri}] means another master on another machine: "

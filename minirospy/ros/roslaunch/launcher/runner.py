@@ -94,7 +94,7 @@ class Launcher:
     def run(self, *, wait: bool = False) -> int:
         """Run until the end; return the exit status: 0, or 1 where a required node died of a fault.
 
-        ``wait``: wait for a master instead of starting one. Raises LaunchError, MasterUnreachableError.
+        ``wait``: wait for a master instead of starting one. Raise LaunchError, MasterUnreachableError.
         """
         with self.signals():
             try:
@@ -110,7 +110,7 @@ class Launcher:
     def start(self, *, wait: bool = False) -> None:
         """Show the summary, find or start a master, set the parameters, start the nodes.
 
-        Raises LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt where it was stopped meanwhile.
+        Raise LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt where it was stopped meanwhile.
         """
         here, elsewhere = self._nodes()
         self._check(here, elsewhere)
@@ -141,7 +141,7 @@ class Launcher:
             self.start_node(node)
 
     def set_parameters(self) -> None:
-        """Set the parameters, after what <rosparam> commands and clear_params delete. Raises MinirospyError."""
+        """Set the parameters, after what <rosparam> commands and clear_params delete. Raise MinirospyError."""
         self._master.set_parameters(self._spec)
 
     def process_name(self, node: NodeSpec) -> str:
@@ -163,7 +163,7 @@ class Launcher:
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
-        """Return the nodes of this machine, and those of others. Raises LaunchError on an unknown machine."""
+        """Return the nodes of this machine, and those of others. Raise LaunchError on an unknown machine."""
         here: list[NodeSpec] = []
         elsewhere: list[NodeSpec] = []
         for node in self._spec.nodes:

@@ -149,7 +149,7 @@ class LaunchSpec:
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine that a node is to run on; None is this one. Raises LaunchError."""
+        """Return the machine that a node is to run on; None is this one. Raise LaunchError."""
         name = node.machine
         if name in ("", "localhost"):
             return None

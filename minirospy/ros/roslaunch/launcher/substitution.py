@@ -54,7 +54,7 @@ class Substitution:
     """The characters that substitutions have given so far, in all files of a load."""
 
     def apply(self, text: str) -> str:
-        """``text`` with every substitution made. Raises SubstitutionError, NotFoundError."""
+        """``text`` with every substitution made. Raise SubstitutionError, NotFoundError."""
         if "$(" not in text:
             return text
         whole = _EVAL.match(text)
@@ -168,7 +168,7 @@ class _Names(dict[str, object]):
 
 
 def convert(text: str, type_: str) -> object:
-    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
+    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
     kind = type_.lower()
     if kind in ("", "auto"):
         return _guess(text)

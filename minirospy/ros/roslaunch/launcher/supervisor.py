@@ -162,7 +162,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Wait. Raises KeyboardInterrupt where stop() is called meanwhile."""
+        """Wait. Raise KeyboardInterrupt where stop() is called meanwhile."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:

@@ -57,7 +57,7 @@ class ROSLaunchConfig:
         return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
-        """Add a node. Raises RLException where there is one of its name."""
+        """Add a node. Raise RLException where there is one of its name."""
         if node.name and node.spec.name in self.resolved_node_names:
             raise RLException(
                 f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
@@ -80,7 +80,7 @@ class ROSLaunchConfig:
         self.master = m
 
     def assign_machines(self) -> None:
-        """Set ``machine`` of each node to the one of its ``machine_name``. Raises RLException."""
+        """Set ``machine`` of each node to the one of its ``machine_name``. Raise RLException."""
         spec = self.spec
         for node in (*self.nodes, *self.tests):
             try:
@@ -112,7 +112,7 @@ class ROSLaunchConfig:
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> bool:
-        """Add a machine; False where the same is there already. Raises RLException where another of its name is."""
+        """Add a machine; False where the same is there already. Raise RLException where another of its name is."""
         if m.name not in self.machines:
             self.machines[m.name] = m
             return True
@@ -164,7 +164,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """Return the configuration of launch files and texts together. Raises RLException."""
+    """Return the configuration of launch files and texts together. Raise RLException."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()

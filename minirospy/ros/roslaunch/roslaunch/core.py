@@ -72,11 +72,11 @@ class Master:
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the host of its URI. Raises ValueError on one that is not a URL."""
+        """Return the host of its URI. Raise ValueError on one that is not a URL."""
         return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the port of its URI, 80 where it has none. Raises ValueError on one that is not a URL."""
+        """Return the port of its URI, 80 where it has none. Raise ValueError on one that is not a URL."""
         return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
@@ -188,7 +188,7 @@ def local_machine() -> Machine:
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raises RLException on an address that is not found."""
+    """Return whether a machine is this one. Raise RLException on an address that is not found."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:

@@ -51,7 +51,7 @@ def roslaunch_deps(
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
     """Return the package of the first file, what each file needs, and the packages that no package.xml names, by package.
 
-    Raises RoslaunchDepsException.
+    Raise RoslaunchDepsException.
     """
     try:
         needs = file_needs(files, chosen_packages())

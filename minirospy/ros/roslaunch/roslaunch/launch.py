@@ -88,7 +88,7 @@ class ROSLaunchRunner:
     def launch(self) -> tuple[list[str], list[str]]:
         """Start everything; the names of the processes that were started, and those of the nodes that were not.
 
-        Raises RLException.
+        Raise RLException.
         """
         monitor = self._monitor()
         replacement_of("roslaunch.pmon", "_init_signal_handlers", init_signal_handlers)()
@@ -106,7 +106,7 @@ class ROSLaunchRunner:
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start one more node: (its process, True), or (its name, False) where that cannot be. Raises RLException."""
+        """Start one more node: (its process, True), or (its name, False) where that cannot be. Raise RLException."""
         if self._monitor().done:
             raise RLException(f"cannot add process [{node.name}] after process monitor has been shut down")
         node.give_name()
@@ -116,7 +116,7 @@ class ROSLaunchRunner:
     def run_test(self, test: Test) -> bool:
         """Start a test and wait until it exits; return whether its status is 0.
 
-        Raises RLTestTimeoutException where it takes longer than its time limit, after which it is ended; RLException where
+        Raise RLTestTimeoutException where it takes longer than its time limit, after which it is ended; RLException where
         it cannot be started.
         """
         process, has_started = self.launch_node(test)
@@ -183,7 +183,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Set the parameters, and nothing else. Raises RLException."""
+        """Set the parameters, and nothing else. Raise RLException."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:

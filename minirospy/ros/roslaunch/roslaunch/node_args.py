@@ -29,7 +29,7 @@ def get_node_list(config: ROSLaunchConfig) -> list[str]:
 
 
 def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list[str]:
-    """Return the command of a node, the variables of its environment in front. Raises NodeParamsException."""
+    """Return the command of a node, the variables of its environment in front. Raise NodeParamsException."""
     spec = _find(node_name, roslaunch_files).spec
     environment = node_environment(spec, Environment.read(), {})
     environment.pop("ROS_MASTER_URI")
@@ -37,7 +37,7 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list
 
 
 def create_local_process_args(node: Node, machine: Machine | None, env: object = None) -> list[str]:
-    """Return the command of a node. Raises NodeParamsException."""
+    """Return the command of a node. Raise NodeParamsException."""
     node.give_name()
     return _command(node.spec)
 

@@ -71,7 +71,7 @@ class ROSLaunchParent:
         self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything, and return when all nodes were started. Raises RLException.
+        """Start everything, and return when all nodes were started. Raise RLException.
 
         Without ``auto_terminate`` it does not end with the last node.
         """

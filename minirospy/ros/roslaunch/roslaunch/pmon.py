@@ -61,7 +61,7 @@ class ApiLauncher(Launcher):
         self.known: dict[str, Process] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """Return the command of a node. Raises LaunchError."""
+        """Return the command of a node. Raise LaunchError."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
@@ -347,7 +347,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """Return a process for a node, to be started with its start(). Raises NodeParamsException where it has no program."""
+    """Return a process for a node, to be started with its start(). Raise NodeParamsException where it has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""

@@ -67,7 +67,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """Return the paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
+    """Return the paths of the launch files that a command line (package and file, or files) names. Raise RLException."""
     try:
         return find_files([word for word in args if ":=" not in word], chosen_packages())
     except MinirospyError as error:

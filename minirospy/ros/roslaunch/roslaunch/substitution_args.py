@@ -51,7 +51,7 @@ def resolve_args(
 ) -> str:
     """Return a text with its substitution arguments resolved; ``context`` may hold the args as ``{"arg": {name: value}}``.
 
-    Raises SubstitutionException, ArgException where an arg is not set, rospkg.ResourceNotFound where a package is not found,
+    Raise SubstitutionException, ArgException where an arg is not set, rospkg.ResourceNotFound where a package is not found,
     and what the expression of an ``$(eval ...)`` raises.
     """
     context = {} if context is None else context
@@ -81,7 +81,7 @@ def chosen_packages() -> Packages:
 
 
 def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: Mapping[str, Command]) -> str:
-    """Return a text, of whose substitution arguments those of ``commands`` are resolved. Raises SubstitutionException."""
+    """Return a text, of whose substitution arguments those of ``commands`` are resolved. Raise SubstitutionException."""
     resolved = arg_str
     for each in _collect_args(arg_str):
         verb, *words = [word for word in each.split(" ") if word] or [""]
@@ -93,7 +93,7 @@ def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: 
 
 
 def _collect_args(arg_str: str) -> list[str]:
-    """Return the substitution arguments of a text, without ``$(`` and ``)``. Raises SubstitutionException."""
+    """Return the substitution arguments of a text, without ``$(`` and ``)``. Raise SubstitutionException."""
     found = []
     for match in re.finditer(r"\$\(([^)]*)(\)?)", arg_str):
         inside, is_closed = match.groups()
@@ -275,7 +275,7 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Return the text of a Python expression's value. Raises SubstitutionException, and what the expression raises."""
+    """Return the text of a Python expression's value. Raise SubstitutionException, and what the expression raises."""
     anons, args = context.setdefault("anon", {}), context.setdefault("arg", {})
     functions: dict[str, object] = {
         "anon": lambda id: _eval_anon(id, anons),

@@ -42,13 +42,13 @@ class XmlLoader:
         argv: Sequence[str] | None = None,
         verbose: bool = True,
     ) -> None:
-        """Load a file, its args given as ``["name:=value", ...]``. Raises XmlParseException."""
+        """Load a file, its args given as ``["name:=value", ...]``. Raise XmlParseException."""
         self._load(LaunchSource(filename, None, names.parse_launch_arguments(argv or ())), ros_config)
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
-        """Load a text. Raises XmlParseException."""
+        """Load a text. Raise XmlParseException."""
         self._load(LaunchSource(STDIN, xml_text.encode(), {}), ros_config)
 
     def _load(self, source: LaunchSource, config: Configuration) -> None:

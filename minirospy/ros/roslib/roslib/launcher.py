@@ -19,7 +19,7 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     """Add the ``src`` folders of a package and of all that it needs to sys.path, unless it can be imported already.
 
     The package that contains the script, or one that can be imported, need not be on ROS_PACKAGE_PATH.
-    Raises ResourceNotFound.
+    Raise ResourceNotFound.
     """
     rospack = RosPack()
     try:

@@ -88,7 +88,7 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
     """Return the path of a package's manifest.xml, not ``required`` also where it has none.
 
-    Raises InvalidROSPkgException.
+    Raise InvalidROSPkgException.
     """
     for path in (os.environ if env is None else env).get("ROS_PACKAGE_PATH", "").split(os.pathsep):
         for folder in folders_with(MANIFEST_FILE, path) if path else ():
@@ -102,12 +102,12 @@ def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | 
 
 
 def load_manifest(package: str) -> Manifest:
-    """Return the manifest of a package. Raises InvalidROSPkgException, ManifestException."""
+    """Return the manifest of a package. Raise InvalidROSPkgException, ManifestException."""
     return parse_file(manifest_file(package))
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raises ValueError where there is none, ManifestException."""
+    """Return the manifest in a file. Raise ValueError where there is none, ManifestException."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -117,7 +117,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a text. Raises ManifestException."""
+    """Return the manifest in a text. Raise ManifestException."""
     from xml.dom.minidom import parseString
 
     try:

@@ -49,7 +49,7 @@ class MultipleNodesException(ROSPkgException):
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """Return the folder of a package. Raises InvalidROSPkgException where there is none and ``required``; else None."""
+    """Return the folder of a package. Raise InvalidROSPkgException where there is none and ``required``; else None."""
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:
@@ -71,7 +71,7 @@ def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
 def get_pkg_subdir(
     package: str, subdir: str, required: bool = True, env: dict[str, str] | None = None
 ) -> str | None:
-    """Return a folder in a package, made where it is not there if ``required``; else None. Raises InvalidROSPkgException."""
+    """Return a folder in a package, made where it is not there if ``required``; else None. Raise InvalidROSPkgException."""
     folder = get_pkg_dir(package, required)
     if folder is None:
         return None
@@ -82,12 +82,12 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path that a file in a folder of a package has, or would have. Raises InvalidROSPkgException."""
+    """Return the path that a file in a folder of a package has, or would have. Raise InvalidROSPkgException."""
     return os.path.join(str(get_pkg_dir(package)), subdir, resource_name)
 
 
 def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[str]:
-    """Return the programs of a name in a package. Raises ResourceNotFound."""
+    """Return the programs of a name in a package. Raise ResourceNotFound."""
     return find_resource(pkg, node_type, _is_program, rospack)
 
 
@@ -97,7 +97,7 @@ def find_resource(
     filter_fn: Callable[[str], bool] | None = None,
     rospack: RosPack | None = None,
 ) -> list[str]:
-    """Return the files of a name in a package, and where its workspace puts what it builds. Raises ResourceNotFound."""
+    """Return the files of a name in a package, and where its workspace puts what it builds. Raise ResourceNotFound."""
     folder = Path((rospack or RosPack()).get_path(pkg))
     if len(Path(resource_name).parts) > 1:
         found: Iterator[Path] = filter(Path.is_file, [folder / resource_name])
@@ -149,7 +149,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder of a package by the package's path, made where it is not there if ``required``. Raises OSError."""
+    """Return a folder of a package by the package's path, made where it is not there if ``required``. Raise OSError."""
     path = os.path.join(package_dir, subdir)
     if required:
         os.makedirs(path, exist_ok=True)

@@ -55,7 +55,7 @@ def list_stacks(env: Mapping[str, str] | None = None) -> list[str]:
 
 
 def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of a stack or metapackage. Raises InvalidROSStackException."""
+    """Return the folder of a stack or metapackage. Raise InvalidROSStackException."""
     folders = _stacks(env)
     if stack in folders:
         return folders[stack]
@@ -66,12 +66,12 @@ def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
 
 
 def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the version of a metapackage; None of a stack, which has none. Raises ResourceNotFound."""
+    """Return the version of a metapackage; None of a stack, which has none. Raise ResourceNotFound."""
     return None if stack in _stacks(env) else RosStack(_paths(env)).get_stack_version(stack)
 
 
 def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the stack that contains a package; None where none does. Raises InvalidROSPkgException."""
+    """Return the stack that contains a package; None where none does. Raise InvalidROSPkgException."""
     folder = _packages(env).get(pkg) or str(get_pkg_dir(pkg))
     while os.path.dirname(folder) != folder:
         if os.path.exists(os.path.join(folder, STACK_FILE)):

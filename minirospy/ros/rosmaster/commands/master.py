@@ -75,7 +75,7 @@ class _MasterParser(Parser):
     """Leaves out the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raises CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError."""
         return super().parse(split_assignments(words)[0])
 
 

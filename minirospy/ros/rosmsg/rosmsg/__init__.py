@@ -47,27 +47,27 @@ class ROSMsgException(Exception):
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a message type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
+    """Return the text of a message type, expanded, or with ``raw`` as in its file. Raise ROSMsgException."""
     return _text(type_, raw, Kind.MESSAGE)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a service type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
+    """Return the text of a service type, expanded, or with ``raw`` as in its file. Raise ROSMsgException."""
     return _text(type_, raw, Kind.SERVICE)
 
 
 def list_msgs(package: str, rospack: object = None) -> list[str]:
-    """Return the message types of a package. Raises rospkg.ResourceNotFound."""
+    """Return the message types of a package. Raise rospkg.ResourceNotFound."""
     return list_types(package, MODE_MSG)
 
 
 def list_srvs(package: str, rospack: object = None) -> list[str]:
-    """Return the service types of a package. Raises rospkg.ResourceNotFound."""
+    """Return the service types of a package. Raise rospkg.ResourceNotFound."""
     return list_types(package, MODE_SRV)
 
 
 def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
-    """Return the types of a package. Raises rospkg.ResourceNotFound, ValueError on an unknown mode."""
+    """Return the types of a package. Raise rospkg.ResourceNotFound, ValueError on an unknown mode."""
     from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
 
     if not isinstance(package, str):
@@ -79,7 +79,7 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> li
 
 
 def rosmsg_md5(mode: str, type_: str) -> str:
-    """Return the md5sum of a type. Raises ROSMsgException."""
+    """Return the md5sum of a type. Raise ROSMsgException."""
     try:
         return _interfaces(_kind(mode)).md5sum(type_)
     except (NotFoundError, DefinitionError) as error:
@@ -102,7 +102,7 @@ def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
     """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
 
-    Raises KeyError where it needs a message that is not in the context.
+    Raise KeyError where it needs a message that is not in the context.
     """
     from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
 

@@ -53,7 +53,7 @@ class ROSNodeIOException(ROSNodeException):
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:
-    """Return the names of the nodes at or below ``namespace``. Raises ROSNodeIOException."""
+    """Return the names of the nodes at or below ``namespace``. Raise ROSNodeIOException."""
     with _graph() as graph:
         return nodes.list_nodes(graph, graph.resolve(namespace) if namespace else "/")
 
@@ -65,7 +65,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return what the master knows of a node, as `rosnode info` prints it. Raises ROSNodeIOException."""
+    """Return what the master knows of a node, as `rosnode info` prints it. Raise ROSNodeIOException."""
     with _graph() as graph:
         name = graph.resolve(node_name)
         try:
@@ -77,7 +77,7 @@ def get_node_info_description(node_name: str) -> str:
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
     """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
 
-    Raises ROSNodeIOException where the node does not answer.
+    Raise ROSNodeIOException where the node does not answer.
     """
     with _graph(master) as graph:
         try:
@@ -89,7 +89,7 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node answers ``max_count`` pings (None: pings until it does not). Raises ROSNodeIOException.
+    """Return whether a node answers ``max_count`` pings (None: pings until it does not). Raise ROSNodeIOException.
 
     Why it does not is printed on stderr, all else with ``verbose`` alone.
     """
@@ -115,7 +115,7 @@ def rosnode_ping(
 
 
 def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
-    """Return (nodes that answer, nodes that do not). Raises ROSNodeIOException."""
+    """Return (nodes that answer, nodes that do not). Raise ROSNodeIOException."""
     answering: list[str] = []
     silent: list[str] = []
     with _graph() as graph:
@@ -153,7 +153,7 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Take what the nodes in ``blacklist`` registered out of the master, and print their names.
 
-    Raises ConnectionRefusedError where no master answers, as ROS's does.
+    Raise ConnectionRefusedError where no master answers, as ROS's does.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         # Also where nothing is on the list: a master that does not answer is an error.
@@ -166,7 +166,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Take what all nodes but those in ``whitelist`` registered out of the master.
 
-    Raises ConnectionRefusedError where no master answers, as ROS's does.
+    Raise ConnectionRefusedError where no master answers, as ROS's does.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -181,7 +181,7 @@ def get_machines_by_nodes() -> list[str]:
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """Return the nodes on a machine. Raises ROSNodeException where its name does not resolve."""
+    """Return the nodes on a machine. Raise ROSNodeException where its name does not resolve."""
     try:
         wanted = socket.gethostbyname(machine)
     except OSError as error:
@@ -200,7 +200,7 @@ def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print what `rosnode info` prints; ``quiet``: without asking the node. Raises ROSNodeIOException."""
+    """Print what `rosnode info` prints; ``quiet``: without asking the node. Raise ROSNodeIOException."""
     print(f"{_RULE}\n{get_node_info_description(node_name)}")
     if quiet:
         return
@@ -215,7 +215,7 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
 
 
 def rosnode_cleanup() -> None:
-    """Run `rosnode cleanup` with its confirmation prompt. Raises ROSNodeIOException."""
+    """Run `rosnode cleanup` with its confirmation prompt. Raise ROSNodeIOException."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     with _graph() as graph:
@@ -264,7 +264,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value of an answer (code, text, value). Raises ROSNodeException where it is an error."""
+    """Return the value of an answer (code, text, value). Raise ROSNodeException where it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")

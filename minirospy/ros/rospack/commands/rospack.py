@@ -145,7 +145,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return the verb of a line. Raises _RospackError where it does not exist or does not take the line's options."""
+    """Return the verb of a line. Raise _RospackError where it does not exist or does not take the line's options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
@@ -168,7 +168,7 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 
 
 def _package(line: _Line, *others: str, said: str = "package") -> str:
-    """Return the package of a line, or the current folder's. Raises _RospackError without one, or one of ``others``."""
+    """Return the package of a line, or the current folder's. Raise _RospackError without one, or one of ``others``."""
     package = line.package or _package_here()
     if not package or not all(line.options.get(name) for name in others):
         raise _RospackError(f"no {said} given")

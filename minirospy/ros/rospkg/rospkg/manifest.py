@@ -91,7 +91,7 @@ def _people(read: manifest.Manifest) -> str:
 
 
 def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: object = None) -> Manifest:
-    """Return the package.xml in a folder; every dependency counts as a package. Raises InvalidManifest."""
+    """Return the package.xml in a folder; every dependency counts as a package. Raise InvalidManifest."""
     from minirospy.workspace.manifest import read_manifest
 
     try:

@@ -67,20 +67,20 @@ class ManifestManager:
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """Return the folder of one. Raises ResourceNotFound."""
+        """Return the folder of one. Raise ResourceNotFound."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
         return str(folders[name])
 
     def get_manifest(self, name: str) -> Manifest:
-        """Return the manifest of one. Raises ResourceNotFound, InvalidManifest."""
+        """Return the manifest of one. Raise ResourceNotFound, InvalidManifest."""
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
         """Return the packages that one names, or with ``implicit`` also what those need.
 
-        Raises ResourceNotFound, InvalidManifest.
+        Raise ResourceNotFound, InvalidManifest.
         """
         if not implicit:
             return self._split(name)[0]
@@ -147,13 +147,13 @@ class RosPack(ManifestManager):
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
         """Return the names in a manifest, or with ``implicit`` also in those that it needs, that are not packages.
 
-        Raises ResourceNotFound, InvalidManifest.
+        Raise ResourceNotFound, InvalidManifest.
         """
         names = [package, *(self.get_depends(package) if implicit else [])]
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """Return the stack of a package: None, as catkin has no stacks. Raises ResourceNotFound."""
+        """Return the stack of a package: None, as catkin has no stacks. Raise ResourceNotFound."""
         self.get_path(package)
         return None
 
@@ -165,11 +165,11 @@ class RosStack(ManifestManager):
     """Metapackages."""
 
     def packages_of(self, stack: str) -> Names:
-        """Return the packages that a metapackage names. Raises ResourceNotFound, InvalidManifest."""
+        """Return the packages that a metapackage names. Raise ResourceNotFound, InvalidManifest."""
         return self.get_depends(stack, implicit=False)
 
     def get_stack_version(self, stack: str) -> str:
-        """Return the version of a metapackage. Raises ResourceNotFound, InvalidManifest."""
+        """Return the version of a metapackage. Raise ResourceNotFound, InvalidManifest."""
         return self._read(stack).version
 
     def _folders(self) -> dict[str, Path]:
@@ -211,5 +211,5 @@ def expand_to_packages(
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str:
-    """Return the version in the package.xml of a folder. Raises InvalidManifest."""
+    """Return the version in the package.xml of a folder. Raise InvalidManifest."""
     return parse_manifest_file(stack_dir).version

@@ -101,13 +101,13 @@ def is_shutdown_requested() -> bool:
 
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
+    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raise TypeError."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.late_hooks)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
+    """Call ``h(reason)`` when is_shutdown() has become true. Raise TypeError."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
@@ -123,7 +123,7 @@ def register_signals() -> None:
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT of the environment. Raises ROSException where it is ``required`` and not set."""
+    """Return ROS_ROOT of the environment. Raise ROSException where it is ``required`` and not set."""
     root = (os.environ if env is None else env).get("ROS_ROOT")
     if required and not root:
         raise ROSException("ROS_ROOT is not set")
@@ -131,7 +131,7 @@ def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -
 
 
 def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
-    """Return (host, port) of a service's ``rosrpc://host:port``. Raises ParameterInvalid."""
+    """Return (host, port) of a service's ``rosrpc://host:port``. Raise ParameterInvalid."""
     if not uri.startswith(ROSRPC):
         raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
     try:
@@ -147,7 +147,7 @@ def is_topic(param_name: str) -> Validator:
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
-    """Return ``h`` as a hook without an argument, for the lifecycle. Raises TypeError."""
+    """Return ``h`` as a hook without an argument, for the lifecycle. Raise TypeError."""
     if not callable(h):
         raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
     lifecycle = current_session().lifecycle

@@ -35,7 +35,7 @@ class LoggerLevelServiceCaller:
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
     def get_loggers(self, node: str) -> list[str]:
-        """Return the names of a node's loggers, and keep their levels. Raises ROSConsoleException."""
+        """Return the names of a node's loggers, and keep their levels. Raise ROSConsoleException."""
         try:
             _, response = rosservice.call_service(_service(node, _GET), [])
         except rosservice.ROSServiceException as error:
@@ -49,7 +49,7 @@ class LoggerLevelServiceCaller:
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
         """Set a level; return False where get_loggers() found it set already.
 
-        Raises rosservice.ROSServiceException.
+        Raise rosservice.ROSServiceException.
         """
         if self._current_levels.get(logger) == level:
             return False

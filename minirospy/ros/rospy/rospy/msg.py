@@ -40,7 +40,7 @@ def deserialize_messages(
     """Move the complete messages of ``b``, from ``start`` to its position, to ``msg_queue``.
 
     At most ``max_msgs`` of them; ``queue_size`` keeps only so many, the newest. What is incomplete moves to the
-    front of ``b``. Raises DeserializationError.
+    front of ``b``. Raise DeserializationError.
     """
     data, position, count = b.getvalue()[: b.tell()], start, 0
     while (max_msgs is None or count < max_msgs) and len(data) - position >= 4:

@@ -123,7 +123,7 @@ class MasterProxy:
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
-        """Return a parameter's value from this node's cache. Raises KeyError."""
+        """Return a parameter's value from this node's cache. Raise KeyError."""
         return get_param_cached(key)
 
 

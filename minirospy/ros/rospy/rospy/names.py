@@ -77,14 +77,14 @@ def initialize_mappings(node_name: str) -> None:
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return the global name of a topic before init_node. Raises ValueError on a private one."""
+    """Return the global name of a topic before init_node. Raise ValueError on a private one."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")
 
 
 def scoped_name(caller_id: str, name: str) -> str:
-    """Return ``name`` without the namespace of ``caller_id``. Raises ROSException where that is not global."""
+    """Return ``name`` without the namespace of ``caller_id``. Raise ROSException where that is not global."""
     if not is_global(caller_id):
         raise ROSException("caller_id must be global")
     return names.canonicalize(name)[len(names.namespace_of(caller_id)) :]
@@ -109,12 +109,12 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the global name of an argument, not remapped. Raises ParameterInvalid."""
+    """Return the global name of an argument, not remapped. Raise ParameterInvalid."""
     return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument that is a name. Raises ParameterInvalid."""
+    """Return an argument that is a name. Raise ParameterInvalid."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

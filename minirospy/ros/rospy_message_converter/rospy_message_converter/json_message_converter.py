@@ -21,7 +21,7 @@ def convert_json_to_ros_message(
     check_types: bool = True,
     log_level: str = "error",
 ) -> object:
-    """Return a message of a type with the values of a JSON object. Raises ValueError, TypeError, NotFoundError."""
+    """Return a message of a type with the values of a JSON object. Raise ValueError, TypeError, NotFoundError."""
     return convert_dictionary_to_ros_message(
         message_type,
         json.loads(json_message),

@@ -48,7 +48,7 @@ def convert_dictionary_to_ros_message(
 
     ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError, without ``strict_mode``
     they are logged. With ``check_missing_fields`` a field without a value raises ValueError, with ``check_types`` a value of
-    another type TypeError. Raises NotFoundError where the type is unknown.
+    another type TypeError. Raise NotFoundError where the type is unknown.
     """
     if kind == "message":
         message = message_class(message_type)()
@@ -84,7 +84,7 @@ def convert_ros_message_to_dictionary(
 
 
 def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
-    """Return a value of a dict as a field has it. Raises TypeError, ValueError."""
+    """Return a value of a dict as a field has it. Raise TypeError, ValueError."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             return _bytes_of(name, value)

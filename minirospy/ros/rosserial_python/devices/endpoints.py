@@ -49,7 +49,7 @@ def _compare(ours: str, theirs: str) -> None:
 
 
 class Publisher:
-    """Passes messages of the device on to ROS. Raises EndpointError."""
+    """Passes messages of the device on to ROS. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo) -> None:
         self.topic = info.topic_name
@@ -68,7 +68,7 @@ class Publisher:
 
 
 class Subscriber:
-    """Passes messages of ROS on to the device. Raises EndpointError."""
+    """Passes messages of ROS on to the device. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -89,7 +89,7 @@ class Subscriber:
 
 
 class _Service:
-    """A service's classes, and the id under which the device gets its half of a call. Raises EndpointError."""
+    """A service's classes, and the id under which the device gets its half of a call. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name

@@ -42,7 +42,7 @@ def _checksum(data: bytes) -> int:
 
 
 def encode(topic_id: int, data: bytes) -> bytes:
-    """Return a packet. Raises ValueError for data that is too long for one."""
+    """Return a packet. Raise ValueError for data that is too long for one."""
     if len(data) > LONGEST:
         raise ValueError(f"{len(data)} bytes: a packet holds {LONGEST}")
     length, topic = struct.pack("<H", len(data)), struct.pack("<H", topic_id)

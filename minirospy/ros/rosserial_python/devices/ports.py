@@ -25,10 +25,10 @@ class Port(Protocol):
     """A line to a device."""
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raises PortError where the line has broken."""
+        """Return what has come, nothing after a moment. Raise PortError where the line has broken."""
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raises PortError."""
+        """Write all of it. Raise PortError."""
 
     def flush_input(self) -> None:
         """Forget what has come and is not read."""
@@ -52,7 +52,7 @@ class File(Protocol):
 
 
 class SerialPort:
-    """A serial port. Raises PortError where it cannot be opened, ImportError without pyserial."""
+    """A serial port. Raise PortError where it cannot be opened, ImportError without pyserial."""
 
     def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
         try:
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raises PortError where the line has broken."""
+        """Return what has come, nothing after a moment. Raise PortError where the line has broken."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -85,7 +85,7 @@ class SerialPort:
             raise PortError(f"Serial Port read failure: {error}") from error
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raises PortError."""
+        """Write all of it. Raise PortError."""
         try:
             self._serial.write(data)
         except self._errors as error:
@@ -111,7 +111,7 @@ class SocketPort:
         connection.settimeout(_WRITE_SECONDS)
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raises PortError where the connection is closed."""
+        """Return what has come, nothing after a moment. Raise PortError where the connection is closed."""
         try:
             ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
             if not ready:
@@ -124,7 +124,7 @@ class SocketPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raises PortError."""
+        """Write all of it. Raise PortError."""
         try:
             self._socket.sendall(data)
         except OSError as error:
@@ -145,7 +145,7 @@ class FilePort:
         self._file = file
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raises PortError for what the object raises."""
+        """Return what has come, nothing after a moment. Raise PortError for what the object raises."""
         try:
             waiting = int(self._file.inWaiting())
             if waiting < 1:
@@ -156,7 +156,7 @@ class FilePort:
             raise PortError(str(error)) from error
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raises PortError."""
+        """Write all of it. Raise PortError."""
         try:
             self._file.write(data)
         except (OSError, RuntimeError) as error:

@@ -63,7 +63,7 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return the type of a service; None where it does not exist. Raises ROSServiceIOException where it does not answer."""
+    """Return the type of a service; None where it does not exist. Raise ROSServiceIOException where it does not answer."""
     with _graph() as graph:
         try:
             return services.service_type(graph, _sent(graph, service_name))
@@ -88,13 +88,13 @@ def get_service_node(service_name: str) -> str | None:
 
 
 def get_service_args(service_name: str) -> str:
-    """Return the names of the fields of a service's request, with spaces between. Raises ROSServiceException."""
+    """Return the names of the fields of a service's request, with spaces between. Raise ROSServiceException."""
     with _graph() as graph:
         return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
 
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
-    """Return the class of a running service. Raises ROSServiceException where it does not exist or is not installed."""
+    """Return the class of a running service. Raise ROSServiceException where it does not exist or is not installed."""
     from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
@@ -114,7 +114,7 @@ def rosservice_find(service_type: str) -> list[str]:
 def call_service(
     service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
 ) -> tuple[Message, Any]:
-    """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
+    """Call a service and return (request, response), with the request's values. Raise ROSServiceException."""
     with _graph() as graph:
         name = _sent(graph, service_name)
         type_ = service_class._type if service_class else services.service_type(graph, name)
@@ -123,7 +123,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    """Return the connection header that a service answers with. Raise ROSServiceIOException where it does not."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -162,7 +162,7 @@ def _resolved(graph: Graph, name: str) -> str:
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the same of a name that is sent to the master. Raises TypeError where XML-RPC has no type for it."""
+    """Return the same of a name that is sent to the master. Raise TypeError where XML-RPC has no type for it."""
     check_sendable(name)
     return _resolved(graph, name)
 

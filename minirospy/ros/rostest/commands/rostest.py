@@ -205,7 +205,7 @@ def _base(folder: str | None) -> Path:
 
 
 def _file(what: list[str], packages: Packages) -> Path:
-    """Return the launch file that the command line names. Raises MinirospyError."""
+    """Return the launch file that the command line names. Raise MinirospyError."""
     if len(what) == 1:
         if Path(what[0]).is_file():
             return Path(what[0]).resolve()
@@ -222,7 +222,7 @@ def _file(what: list[str], packages: Packages) -> Path:
 
 
 def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
-    """Return the package that a file is in, and its folder. Raises MinirospyError."""
+    """Return the package that a file is in, and its folder. Raise MinirospyError."""
     for folder in file.resolve().parents:
         name = package_name(folder)
         if name:

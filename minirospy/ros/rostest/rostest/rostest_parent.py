@@ -39,7 +39,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open = ExitStack()
 
     def setUp(self) -> None:
-        """Have the master ready. Raises RLException, MasterUnreachableError where one that is reused does not answer."""
+        """Have the master ready. Raise RLException, MasterUnreachableError where one that is reused does not answer."""
         environment = self._open.enter_context(
             master_of_tests(Environment.read(), self.run_id, reuse=self.reuse_master, clear=self.clear)
         )
@@ -55,7 +55,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         return self.runner.launch()
 
     def run_test(self, test: Test) -> bool:
-        """Run a test until it exits; return whether its status is 0. Raises RLTestTimeoutException."""
+        """Run a test until it exits; return whether its status is 0. Raise RLTestTimeoutException."""
         assert self.runner
         return self.runner.run_test(test)
 

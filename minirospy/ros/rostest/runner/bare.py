@@ -80,7 +80,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """Return the exit status; None after the time limit. Raises MinirospyError at Ctrl-C."""
+    """Return the exit status; None after the time limit. Raise MinirospyError at Ctrl-C."""
     with interrupt_noted() as interrupted, guard_children(), subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:

@@ -26,7 +26,7 @@ def rosrun(
 ) -> None:
     """Run a TestCase whose tests are a node, as the main function of the file that a ``<test>`` names.
 
-    As rosunit.unitrun; then the node, if it was one, leaves the graph. Raises SystemExit(1) where a test fails.
+    As rosunit.unitrun; then the node, if it was one, leaves the graph. Raise SystemExit(1) where a test fails.
     """
     try:
         unit.unitrun(package, test_name, test, sysargs)

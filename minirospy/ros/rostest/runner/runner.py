@@ -210,7 +210,7 @@ def master_of_tests(
     """Provide the environment with a new master on a free port, whose run_id this is; it ends with the block.
 
     ``reuse``: with the master that the environment names; ``clear`` deletes its parameters first.
-    Raises MasterUnreachableError where that one does not answer.
+    Raise MasterUnreachableError where that one does not answer.
     """
     if reuse:
         with contextlib.closing(MasterProxy(environment.master_uri, "/rostest")) as master:

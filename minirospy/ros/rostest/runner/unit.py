@@ -60,7 +60,7 @@ def unitrun(
     """Run a TestCase, given as its class or its name, as the main function of a test's file.
 
     ``--text`` in ``sysargs`` (default: ``sys.argv``) prints as unittest does; else the results go to
-    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or where ``--gtest_output=xml:FILE`` says. Raises SystemExit(1)
+    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or where ``--gtest_output=xml:FILE`` says. Raise SystemExit(1)
     where a test fails. ``coverage_packages`` is accepted: run the file under coverage.py instead.
     """
     arguments = sys.argv if sysargs is None else sysargs

@@ -217,7 +217,7 @@ def _message_class(type_: str) -> type[Message]:
 
 
 def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> list[object]:
-    """Return the values of the first message. Raises WordedError, and Misuse where an argument is not YAML."""
+    """Return the values of the first message. Raise WordedError, and Misuse where an argument is not YAML."""
     try:
         return next(all_values)
     except NotFoundError as error:

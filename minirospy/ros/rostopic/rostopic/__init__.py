@@ -83,7 +83,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return the same as :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
+    """Return the same as :func:`get_topic_type`, with the message's class. Raise ROSTopicException where it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -157,7 +157,7 @@ def _slice_fault(field: str) -> str:
 
 
 def get_info_text(topic: str) -> str:
-    """Return the type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
+    """Return the type, publishers and subscribers of a topic, as `rostopic info` prints them. Raise ROSTopicException."""
     from minirospy.introspect.texts import topic_text
 
     if topic is not None and not isinstance(topic, str):
@@ -170,7 +170,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return the URI of a node, or `unknown address` and its name. Raises ROSTopicIOException."""
+    """Return the URI of a node, or `unknown address` and its name. Raise ROSTopicIOException."""
     try:
         return master.lookupNode(caller_id)
     except masterapi.MasterException:
@@ -184,7 +184,7 @@ def create_publisher(
 ) -> tuple[Publisher[Message], type[Message]]:
     """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
 
-    Raises ROSTopicException where the type is not installed.
+    Raise ROSTopicException where the type is not installed.
     """
     import rospy
 
@@ -213,7 +213,7 @@ def publish_message(
 ) -> None:
     """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
 
-    ``substitute_keywords``: `now` and `auto` are replaced in each message. Raises ROSTopicException on values that do
+    ``substitute_keywords``: `now` and `auto` are replaced in each message. Raise ROSTopicException on values that do
     not fit.
     """
     import rospy
@@ -300,7 +300,7 @@ def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
 
 
 def _sleep(duration: float) -> None:
-    """Wait for these seconds of ROS's clock. Raises ROSInterruptException."""
+    """Wait for these seconds of ROS's clock. Raise ROSInterruptException."""
     import rospy
 
     rospy.rostime.wallsleep(duration)
@@ -316,19 +316,19 @@ def _rostopic_list(
     publishers_only: bool = False,
     group_by_host: bool = False,
 ) -> None:
-    """Print what `rostopic list` prints. Raises ROSTopicIOException."""
+    """Print what `rostopic list` prints. Raise ROSTopicIOException."""
     _check_master()
     chosen = {"-v": verbose, "-s": subscribers_only, "-p": publishers_only, "--host": group_by_host}
     _command(["list", *(option for option, on in chosen.items() if on), *([topic] if topic else [])])
 
 
 def _rostopic_info(topic: str) -> None:
-    """Print what `rostopic info` prints. Raises ROSTopicException."""
+    """Print what `rostopic info` prints. Raise ROSTopicException."""
     print(get_info_text(topic))
 
 
 def _rostopic_type(topic: str) -> None:
-    """Print what `rostopic type` prints. Raises ROSTopicIOException."""
+    """Print what `rostopic type` prints. Raise ROSTopicIOException."""
     _check_master()
     _command(["type", topic])
 

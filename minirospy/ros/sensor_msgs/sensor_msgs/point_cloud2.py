@@ -72,7 +72,7 @@ def read_points(
     """Yield a tuple of values for each point: those of ``field_names``, in the order of their offsets.
 
     ``skip_nans`` leaves out points with a NaN in one of them; ``uvs`` names the points to yield, as (column, row).
-    Raises AssertionError where it is not a PointCloud2, struct.error where the data ends before the last point.
+    Raise AssertionError where it is not a PointCloud2, struct.error where the data ends before the last point.
     """
     _check_type(cloud)
     columns = _columns(cloud.fields, field_names)
@@ -94,14 +94,14 @@ def read_points_list(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] = (),
 ) -> list[Point]:
-    """Return what ``read_points`` yields as a list of namedtuples. Raises what it raises, and TypeError."""
+    """Return what ``read_points`` yields as a list of namedtuples. Raise what it raises, and TypeError."""
     _check_type(cloud)
     if field_names is None:
         field_names = [field.name for field in cloud.fields]
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Raises TypeError where a field has more than one value; all points have as many.
+    # Raise TypeError where a field has more than one value; all points have as many.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -117,7 +117,7 @@ def read_points_numpy(
 
     With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
     data where the values have one type and are evenly spaced, as x, y, z; else a copy, of the type that holds all of them.
-    Raises AssertionError where it is not a PointCloud2, ValueError where it lacks a field or data.
+    Raise AssertionError where it is not a PointCloud2, ValueError where it lacks a field or data.
     """
     _check_type(cloud)
     fields = {field.name: field for field in cloud.fields}
@@ -146,7 +146,7 @@ def create_cloud(
 ) -> PointCloud2:
     """Return a cloud of these points, each with one value for each of its fields; an array's rows are points.
 
-    Raises struct.error where a point has another number of values, or one that does not fit the field's type.
+    Raise struct.error where a point has another number of values, or one that does not fit the field's type.
     """
     columns = _columns(fields, None)
     point = struct.Struct(_format(False, columns))
@@ -170,7 +170,7 @@ def create_cloud(
 
 
 def create_cloud_xyz32(header: Header, points: Sequence[Iterable[float]] | Values) -> PointCloud2:
-    """Return a cloud of points with x, y and z as 32 bit floats. Raises struct.error."""
+    """Return a cloud of points with x, y and z as 32 bit floats. Raise struct.error."""
     return create_cloud(
         header, [PointField(name, 4 * at, PointField.FLOAT32, 1) for at, name in enumerate("xyz")], points
     )

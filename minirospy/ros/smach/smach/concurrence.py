@@ -110,7 +110,7 @@ class Concurrence(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute all states; return the outcome. Raises InvalidStateError where one of them fails."""
+        """Execute all states; return the outcome. Raise InvalidStateError where one of them fails."""
         if not self._states:
             raise InvalidStateError("No states was added to concurrence")
         self._copy_input_keys(parent_ud, self.userdata)

@@ -70,7 +70,7 @@ class StateMachine(Container):
         """Add a state to the open machine, and return it.
 
         ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's;
-        ``constants``: values that are put into the userdata before the state executes. Raises InvalidStateError where
+        ``constants``: values that are put into the userdata before the state executes. Raise InvalidStateError where
         the label is taken, InvalidTransitionError for an outcome that the state does not have.
         """
         return StateMachine._currently_opened_container()._add(

@@ -46,7 +46,7 @@ def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
 
 
 def unpickle_userdata(text: str) -> dict[str, object]:
-    """Return the values of a text. Raises ValueError for what is not one, or holds values that may not be made."""
+    """Return the values of a text. Raise ValueError for what is not one, or holds values that may not be made."""
     try:
         data = _Unpickler(io.BytesIO(base64.b64decode(text, validate=True))).load()
     except Exception as error:

@@ -171,7 +171,7 @@ def _positive(text: str) -> float:
 
 
 def _precision() -> int | None:
-    """Return the parameter ~precision. Raises ToolError."""
+    """Return the parameter ~precision. Raise ToolError."""
     value = rospy.get_param("~precision", None)
     if value is None:
         return None

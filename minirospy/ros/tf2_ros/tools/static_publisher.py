@@ -96,7 +96,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _transform(numbers: Sequence[str], parent: str, child: str) -> TransformStamped:
-    """Return the transform of x y z yaw pitch roll, or x y z qx qy qz qw. Raises ToolError."""
+    """Return the transform of x y z yaw pitch roll, or x y z qx qy qz qw. Raise ToolError."""
     x, y, z, *turn = (
         _number(number, what) for number, what in zip(numbers, _names(len(numbers)), strict=True)
     )
@@ -124,7 +124,7 @@ def _number(text: str, what: str) -> float:
 
 
 def _checked(transform: TransformStamped) -> TransformStamped:
-    """Return a transform that listeners take. Raises ToolError."""
+    """Return a transform that listeners take. Raise ToolError."""
     parent, child = transform.header.frame_id, transform.child_frame_id
     # Listeners drop a leading slash.
     if parent.removeprefix("/") == child.removeprefix("/"):
@@ -141,7 +141,7 @@ def _checked(transform: TransformStamped) -> TransformStamped:
 
 
 def _transform_of_parameter(name: str) -> TransformStamped:
-    """Return the transform of a parameter, which is as a TransformStamped in YAML. Raises ToolError."""
+    """Return the transform of a parameter, which is as a TransformStamped in YAML. Raise ToolError."""
     rospy.loginfo("Looking for TF in parameter: %s", name)
     try:
         value = rospy.get_param(name, None)

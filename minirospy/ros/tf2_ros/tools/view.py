@@ -107,7 +107,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _listen() -> None:
-    """Wait for the transforms to come, in real time: a bag may be paused. Raises ROSInterruptException at a shutdown."""
+    """Wait for the transforms to come, in real time: a bag may be paused. Raise ROSInterruptException at a shutdown."""
     end = time.monotonic() + _SECONDS
     while time.monotonic() < end:
         if rospy.is_shutdown():
@@ -116,7 +116,7 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Return the graph that a node of tf or tf2 offers; wait for the service. Raises ToolError."""
+    """Return the graph that a node of tf or tf2 offers; wait for the service. Raise ToolError."""
     from tf.srv import FrameGraph
 
     rospy.init_node("view_frames", anonymous=True)
@@ -204,7 +204,7 @@ def _draw_svg(dot: str) -> None:
 
 
 def _save(name: str, text: str) -> None:
-    """Write a file of the current folder. Raises ToolError."""
+    """Write a file of the current folder. Raise ToolError."""
     try:
         Path(name).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -130,7 +130,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
 
 
 def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:
-    """Call a function with each message, or with the field of it that is named. Raises MinirospyError without the topic."""
+    """Call a function with each message, or with the field of it that is named. Raise MinirospyError without the topic."""
     name = rospy.resolve_name(options.input)
     cls, topic, field = rostopic.get_topic_class(name, blocking=options.wait_for_start)
     if cls is None or topic is None:

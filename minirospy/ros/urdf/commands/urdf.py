@@ -118,7 +118,7 @@ def _picture(robot: Robot) -> str:
 
 
 def _read(file: str) -> Robot:
-    """Return the robot of a file, its problems printed. Raises WordedError."""
+    """Return the robot of a file, its problems printed. Raise WordedError."""
     from minirospy.core.urdf.read import read_robot
 
     try:

@@ -115,7 +115,7 @@ class ClientGoal(Generic[_R, _F]):
 class ActionClient(ActionEnd, Generic[_G, _R, _F]):
     """A client of the action ``name`` of the class ``action``, such as ``runningLedAction``.
 
-    ``async with`` it, or ``await client.close()`` in the end. Raises ActionException on a class that is not an action.
+    ``async with`` it, or ``await client.close()`` in the end. Raise ActionException on a class that is not an action.
     """
 
     _numbers = itertools.count(1)

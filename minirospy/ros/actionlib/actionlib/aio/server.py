@@ -95,7 +95,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     One goal runs at a time, and a newer one takes its place, as in SimpleActionServer; with ``concurrent`` each
     runs beside the others. ``accepts(goal)`` may refuse a goal by returning False.
 
-    ``async with`` it, or ``await server.close()`` in the end. Raises ActionException on a class that is not an action.
+    ``async with`` it, or ``await server.close()`` in the end. Raise ActionException on a class that is not an action.
     """
 
     def __init__(

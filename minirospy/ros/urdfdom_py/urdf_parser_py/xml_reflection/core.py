@@ -66,7 +66,7 @@ class Codec(Generic[_V]):
     """Between an element, or an attribute's text, and a value."""
 
     def from_string(self, text: str) -> _V:
-        """Return the value of a text. Raises ValueError."""
+        """Return the value of a text. Raise ValueError."""
         raise NotImplementedError
 
     def to_string(self, value: _V) -> str:
@@ -94,7 +94,7 @@ class Number(Codec[float]):
     """A number."""
 
     def from_string(self, text: str) -> float:
-        """Return the number. Raises ValueError."""
+        """Return the number. Raise ValueError."""
         return float(text)
 
 
@@ -105,7 +105,7 @@ class VectorOf(Codec[Iterable[float]]):
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Return the numbers. Raises AssertionError where they are too few or too many, ValueError."""
+        """Return the numbers. Raise AssertionError where they are too few or too many, ValueError."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
@@ -209,28 +209,28 @@ class Object:
 
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
-        """Return the object of an XML text. Raises ParseError, xml.etree.ElementTree.ParseError."""
+        """Return the object of an XML text. Raise ParseError, xml.etree.ElementTree.ParseError."""
         return cls.from_xml(_root(xml_string), Path(cls.TAG))
 
     @classmethod
     def from_xml_file(cls: type[_T], file_path: str) -> _T:
-        """Return the object of a file. Raises as from_xml_string, and OSError."""
+        """Return the object of a file. Raise as from_xml_string, and OSError."""
         return cls.from_xml_string(File(file_path).read_bytes())
 
     @classmethod
     def from_xml(cls: type[_T], node: ET.Element, path: Path) -> _T:
-        """Return the object of an element. Raises ParseError."""
+        """Return the object of an element. Raise ParseError."""
         found = cls()
         found.read_xml(node, path)
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML text into this object, and return it. Raises as from_xml_string."""
+        """Read an XML text into this object, and return it. Raise as from_xml_string."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
     def read_xml(self, node: ET.Element, path: Path) -> None:
-        """Read an element into this object. Raises ParseError."""
+        """Read an element into this object. Raise ParseError."""
         self._read_attributes(node, path)
         self._read_elements(node, path)
         attributes = {each.name for each in self.FIELDS if isinstance(each, Attribute)}
@@ -312,7 +312,7 @@ class Object:
         return xml_string(self.to_xml(), addHeader)
 
     def write_xml(self, node: ET.Element) -> None:
-        """Write the object into an element. Raises an exception where a required part is None."""
+        """Write the object into an element. Raise an exception where a required part is None."""
         self.check_valid()
         self.pre_write_xml()
 
