@@ -35,7 +35,7 @@ _CODE_AND_COMMENT = re.compile(r"(.*[;,{}(\[>)])\s+// [^`]*")
 def project_urls(address: str) -> dict[str, str]:
     """Return ``project.urls`` of a repository at ``address``, with the paths of GitHub or, by the host's name, of GitLab.
 
-    Raise ValueError where the address is not one of a repository: PyPI shows it to everyone.
+    Raise ValueError if the address is not one of a repository: PyPI shows it to everyone.
     """
     address = address.rstrip("/").removesuffix(".git")
     try:

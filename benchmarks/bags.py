@@ -139,7 +139,7 @@ def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
 
 
 def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
-    """Return how many were done, CPU seconds, seconds and MB of one process; None where the peer is missing."""
+    """Return how many were done, CPU seconds, seconds and MB of one process; None if the peer is missing."""
     if case in ("info", "info_mcap", "start", "filter"):
         return command(case, stack, path)
     python, program = {

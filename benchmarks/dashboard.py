@@ -307,7 +307,7 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
 
 
 def memory_of(process: psutil.Process) -> float:
-    """Return what a process has for itself, in MB; 0 where it has ended."""
+    """Return what a process has for itself, in MB; 0 if it has ended."""
     with contextlib.suppress(psutil.NoSuchProcess):
         full = process.memory_full_info()
         return float(getattr(full, "uss", full.rss)) / 1e6

@@ -219,9 +219,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=10.0, help="how long")
-    parser.add_argument(
-        "--mutations", action="store_true", help="without atheris, also where it is installed"
-    )
+    parser.add_argument("--mutations", action="store_true", help="without atheris, also if it is installed")
     parser.add_argument("finding", nargs="?", type=Path, help="an input to run again")
     options = parser.parse_args()
 

@@ -17,7 +17,7 @@ _PAUSE = 0.005
 
 
 def wait_until(condition: Callable[[], object]) -> None:
-    """Return once a condition holds. Raise TimeoutError where it never does."""
+    """Return once a condition holds. Raise TimeoutError if it never does."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:
@@ -26,7 +26,7 @@ def wait_until(condition: Callable[[], object]) -> None:
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Let the loop run until a condition holds. Raise TimeoutError where it never does."""
+    """Let the loop run until a condition holds. Raise TimeoutError if it never does."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:

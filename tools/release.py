@@ -130,7 +130,7 @@ def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
 
 
 def _given_urls() -> dict[str, str]:
-    """Return the addresses that the metadata should have. Raise ReleaseError where the variable has no address."""
+    """Return the addresses that the metadata should have. Raise ReleaseError if the variable has no address."""
     address = os.environ.get(ADDRESS_VARIABLE, "").strip()
     try:
         return project_urls(address) if address else {}

@@ -256,7 +256,7 @@ class Player:
         self._terminals: dict[int, Terminal] = {}
 
     def play(self, page: Path) -> None:
-        """Do what the page says. Raise CourseError where the answer is another one."""
+        """Do what the page says. Raise CourseError if the answer is another one."""
         self.record.append(f"\n===== {page.name} =====\n")
         try:
             for step in steps(page):

@@ -142,7 +142,7 @@ class Node:
     async def start(self) -> None:
         """Open the node's servers and wait for a master; what ``async with`` does first.
 
-        Raise ROSInitException where the node cannot listen, or has been started before.
+        Raise ROSInitException if the node cannot listen, or has been started before.
         """
         if self._runtime or self._is_closed:
             raise ROSInitException(f"node [{self.name}] has been started before: make another one")
@@ -305,7 +305,7 @@ class Node:
         ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
         number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets the
         last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
-        has connected or disconnected. Raise ValueError where this node publishes the topic with another type.
+        has connected or disconnected. Raise ValueError if this node publishes the topic with another type.
         """
         resolved = self.resolve(topic)
         state = self._published.get(resolved)
@@ -349,7 +349,7 @@ class Node:
     ) -> _Response:
         """Call a service, with a request or its fields, and return its response.
 
-        Raise ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        Raise ServiceException if the call fails, TypeError or AttributeError where the arguments do not
         fit the request, SerializationError where a value does not. Cancelling it hangs up.
         """
         return await self.service_proxy(service, service_class)(*args, **kwds)
@@ -376,7 +376,7 @@ class Node:
         ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
         their values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
         other in a worker thread. What it raises goes to the client as the call's error.
-        Raise ServiceException where this node offers the service already.
+        Raise ServiceException if this node offers the service already.
         """
         resolved = self.resolve(service)
         if resolved in self._served:
@@ -399,7 +399,7 @@ class Node:
     async def get_param(self, name: str, default: object = _UNSPECIFIED) -> Any:
         """Return a parameter's value, or ``default``.
 
-        Raise KeyError where it is neither set nor has a default, MasterUnreachableError.
+        Raise KeyError if it is neither set nor has a default, MasterUnreachableError.
         """
         try:
             return await self._node.master("getParam", self.resolve(name))
@@ -417,14 +417,14 @@ class Node:
         return bool(await self._node.master("hasParam", self.resolve(name)))
 
     async def delete_param(self, name: str) -> None:
-        """Delete a parameter, or a whole namespace. Raise KeyError where it is not set."""
+        """Delete a parameter, or a whole namespace. Raise KeyError if it is not set."""
         try:
             await self._node.master("deleteParam", self.resolve(name))
         except RpcRefused as error:
             raise KeyError(name) from error
 
     async def search_param(self, name: str) -> str | None:
-        """Return the full name of the parameter nearest to this node's namespace; None where there is none."""
+        """Return the full name of the parameter nearest to this node's namespace; None if there is none."""
         try:
             return str(await self._node.master("searchParam", name))
         except RpcRefused:
@@ -444,7 +444,7 @@ class Node:
     async def sleep(self, duration: float | Duration) -> None:
         """Sleep for ``duration`` seconds of the node's time.
 
-        Raise ROSInterruptException where the node ends meanwhile, ROSTimeMovedBackwardsException where
+        Raise ROSInterruptException if the node ends meanwhile, ROSTimeMovedBackwardsException where
         simulated time jumps back.
         """
         seconds = duration.to_sec() if isinstance(duration, Duration) else duration

@@ -22,7 +22,7 @@ class Rate:
     """Keeps a loop at ``hz`` turns a second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
 
     def __init__(self, node: Node, hz: float) -> None:
-        """Start the first period. Raise ValueError where ``hz`` is not above 0."""
+        """Start the first period. Raise ValueError if ``hz`` is not above 0."""
         if hz <= 0:
             raise ValueError(f"a rate of {hz} Hz: it has to be above 0")
         self._node = node
@@ -68,7 +68,7 @@ class SimulatedTime:
     async def sleep(self, nanoseconds: int) -> None:
         """Wait until the time has moved on so far, or the node ends.
 
-        Raise ROSTimeMovedBackwardsException where it is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException if it is set to before the sleep's start.
         """
         while self.now == 0 and not self._stopping.is_set():
             await self._next_tick()

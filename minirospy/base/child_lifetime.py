@@ -24,7 +24,7 @@ _CREATE_BREAKAWAY_FROM_JOB = 0x01000000
 
 
 class JobSystem(Protocol):
-    """The calls of the system. Each raises OSError where it fails."""
+    """The calls of the system. Each raises OSError if it fails."""
 
     def create(self) -> int:
         """Create a job; return its handle."""
@@ -108,7 +108,7 @@ def start_outside_of_job(
     creationflags: int = 0,
     **options: Any,
 ) -> subprocess.Popen[bytes]:
-    """Start a process that may outlive this one, also where the children of this one are guarded.
+    """Start a process that may outlive this one, also if the children of this one are guarded.
 
     ``options`` as in subprocess.Popen. Raise OSError.
     """

@@ -92,7 +92,7 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
-    """Return the nanoseconds in a message of /clock, as it came; None where it is of another type than rosgraph_msgs/Clock."""
+    """Return the nanoseconds in a message of /clock, as it came; None if it is of another type than rosgraph_msgs/Clock."""
     # One time: seconds and nanoseconds. A node may publish something else.
     if len(body) != _CLOCK.size:
         return None
@@ -147,7 +147,7 @@ class SimulatedClock:
         """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
 
         While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
-        Raise ROSTimeMovedBackwardsException where the clock is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException if the clock is set to before the sleep's start.
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)

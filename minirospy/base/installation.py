@@ -26,7 +26,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
     It can be typed in sh, cmd.exe and PowerShell. ``upgrade``: a version that is too old is replaced.
     """
-    # Only where an error is described: commands that find all their libraries do not wait for these modules.
+    # Only if an error is described: commands that find all their libraries do not wait for these modules.
     import importlib.util
     import sysconfig
 

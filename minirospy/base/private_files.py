@@ -33,7 +33,7 @@ _FLAGS = (
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
 
-    Raise OSError, also where the name is that of a link, or of anything but a device or a regular file with one
+    Raise OSError, also if the name is that of a link, or of anything but a device or a regular file with one
     name. With O_TRUNC the file is emptied after these checks.
     """
     if os.path.islink(path):

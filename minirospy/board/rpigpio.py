@@ -213,7 +213,7 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Also where nothing was left: RPi.GPIO only checks whether it has touched a pin yet.
+                # Also if nothing was left: RPi.GPIO only checks whether it has touched a pin yet.
                 self._mode = None
 
         if not mine:

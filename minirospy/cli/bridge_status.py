@@ -30,7 +30,7 @@ class _NoBridgeError(BridgeError):
 def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
     """Print the status of the bridges at these ports of this machine; return the exit status.
 
-    Raise BridgeError where none answers, or one refuses.
+    Raise BridgeError if none answers, or one refuses.
     """
     found: dict[str, _Json] = {}
     faults: list[BridgeError] = []

@@ -40,7 +40,7 @@ _WAY = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 where the LED followed the button each time, else 1."""
+    """Run the command; return 0 if the LED followed the button each time, else 1."""
     return COMMAND.main(argv)
 
 
@@ -165,7 +165,7 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release; return the seconds until the LED has followed, None where it did not."""
+    """Press or release; return the seconds until the LED has followed, None if it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start

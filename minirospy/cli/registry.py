@@ -47,7 +47,7 @@ class Entry(NamedTuple):
         return main
 
     def load_grammar(self) -> Command | Family | None:
-        """Import the module; return the Command or Family that it defines, None where it has only a function."""
+        """Import the module; return the Command or Family that it defines, None if it has only a function."""
         grammar: Command | Family | None = (
             getattr(self._load_module(), self.grammar) if self.grammar else None
         )

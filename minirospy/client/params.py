@@ -53,7 +53,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return a parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
-    Raise KeyError where it is neither set nor has a default, ROSException where the master fails.
+    Raise KeyError if it is neither set nor has a default, ROSException where the master fails.
     """
     value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
@@ -114,7 +114,7 @@ def has_param(param_name: str) -> bool:
 
 
 def delete_param(param_name: str) -> None:
-    """Delete a parameter. Raise KeyError where it is not set, ROSException where the master fails."""
+    """Delete a parameter. Raise KeyError if it is not set, ROSException where the master fails."""
     if not _may_be_name(param_name):
         raise KeyError(param_name)
     name = current_session().resolve(param_name)
@@ -128,9 +128,9 @@ def delete_param(param_name: str) -> None:
 
 
 def search_param(param_name: str) -> str | None:
-    """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none.
+    """Return the nearest parameter of this name, upwards from this node's namespace; None if there is none.
 
-    Raise ROSException where the master fails, or the name is a private one.
+    Raise ROSException if the master fails, or the name is a private one.
     """
     name = current_session().identity.arguments.remappings.get(param_name, param_name)
     check_sendable(name)

@@ -123,7 +123,7 @@ class Publisher(Topic[_M_co]):
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
 
     def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> bool:
-        """Wait until so many subscribers are connected; False where ``timeout`` seconds were not enough.
+        """Wait until so many subscribers are connected; False if ``timeout`` seconds were not enough.
 
         What is published before a subscriber is connected does not reach it, unless the topic is latched.
         Raise ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
@@ -212,7 +212,7 @@ class PublishedTopic(SharedTopic):
 
     @property
     def queue_size(self) -> int | None:
-        """Return the last queue_size that a Publisher was given; None where publish() waits for the sockets."""
+        """Return the last queue_size that a Publisher was given; None if publish() waits for the sockets."""
         return self.publication.queue_size
 
     @property
@@ -309,7 +309,7 @@ class PublishedTopic(SharedTopic):
         return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
-        """Log that the first message had no subscriber: a warning only where the master knows one that is connecting.
+        """Log that the first message had no subscriber: a warning only if the master knows one that is connecting.
 
         Most topics have no subscriber at first, or ever.
         """

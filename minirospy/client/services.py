@@ -211,7 +211,7 @@ class ServiceProxy(Generic[_S_co]):
     def __call__(self, *args: object, **kwds: object) -> Any:
         """Call the service and return its response.
 
-        Raise ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        Raise ServiceException if the call fails, TypeError or AttributeError where the arguments do not
         fit the request, SerializationError where a value does not.
         """
         return self.call(*args, **kwds)
@@ -392,7 +392,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 
 def _probe(name: str, timeout: float) -> str | None:
-    """Return why the service cannot be called yet; None where it can."""
+    """Return why the service cannot be called yet; None if it can."""
     from minirospy.runtime.node.service_client import ServiceClient
 
     session = current_session()

@@ -117,7 +117,7 @@ class SignalWatchdog:
         self._deferral.pending = True
         self._handled += 1
         if self._sending is not None:
-            # Wakes the watchdog also where an event loop has taken the file descriptor. No signal has the number 0.
+            # Wakes the watchdog also if an event loop has taken the file descriptor. No signal has the number 0.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 

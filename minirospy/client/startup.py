@@ -83,7 +83,7 @@ def init_node(
 
 
 def start_clock() -> None:
-    """Follow /clock where the master's /use_sim_time is set. Raise ROSInitException where the master fails."""
+    """Follow /clock where the master's /use_sim_time is set. Raise ROSInitException if the master fails."""
     session = current_session()
     try:
         is_simulated = session.master.has_param("/use_sim_time") and session.master.get_param("/use_sim_time")
@@ -102,7 +102,7 @@ def _check_name(name: str) -> None:
 
 
 def _is_repeated(session: Session, arguments: tuple[object, ...]) -> bool:
-    """Return whether init_node was called before with the same arguments. Raise ROSException where with others."""
+    """Return whether init_node was called before with the same arguments. Raise ROSException if with others."""
     if session.init_arguments is None:
         return False
     if session.init_arguments != arguments:

@@ -94,7 +94,7 @@ def sleep(duration: float | times.Duration) -> None:
     """Sleep for ``duration`` seconds; not at all where that is negative.
 
     Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that polls
-    is_shutdown(), by returning. Raise ROSTimeMovedBackwardsException where
+    is_shutdown(), by returning. Raise ROSTimeMovedBackwardsException if
     simulated time jumps back to before the sleep's start.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)

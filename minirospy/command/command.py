@@ -163,7 +163,7 @@ def run(
 
 
 def _offer_overlay() -> None:
-    """Let this process and those that it starts import rospy also where no `.pth` file is read: `pip install --target`.
+    """Let this process and those that it starts import rospy also if no `.pth` file is read: `pip install --target`.
 
     At the end of the path, where the `.pth` file adds it, too.
     """
@@ -189,7 +189,7 @@ def _heed_break() -> None:
 
 
 def _heed_interrupts() -> None:
-    """End at SIGINT also where a script has started the command with `&`: the shell has it ignored there.
+    """End at SIGINT also if a script has started the command with `&`: the shell has it ignored there.
 
     As in ROS, whose commands are nodes and install their own handlers. A build keeps what its shell says.
     """

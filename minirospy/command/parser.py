@@ -290,7 +290,7 @@ def attach_completer(action: argparse.Action, completer: str) -> None:
 
 
 def completer_of(action: argparse.Action) -> str:
-    """Return the name of the function that completes an argument; empty where nothing is attached."""
+    """Return the name of the function that completes an argument; empty if nothing is attached."""
     return str(getattr(action, _COMPLETER, ""))
 
 

@@ -28,7 +28,7 @@ _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
 def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full text. Raise DefinitionError where it is not that of the md5sum, or not one at all."""
+    """Return the specs in a full text. Raise DefinitionError if it is not that of the md5sum, or not one at all."""
     specs, found = checked_text(name, text)
     if found != md5sum:
         raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
@@ -93,7 +93,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return what rewrites the frame ids of a type; None where it has none, or its text is not known."""
+        """Return what rewrites the frame ids of a type; None if it has none, or its text is not known."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)

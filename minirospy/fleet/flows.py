@@ -52,7 +52,7 @@ class FlowQueue(Generic[_T]):
         return dropped
 
     def pop(self) -> tuple[Flow[_T], _T] | None:
-        """Return the next message, of the flow whose turn it is; None where none waits."""
+        """Return the next message, of the flow whose turn it is; None if none waits."""
         while self._ready:
             flow, _ = self._ready.popitem(last=False)
             if not flow.waiting:

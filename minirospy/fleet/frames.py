@@ -55,7 +55,7 @@ class FrameRewriter:
         return bool(self._steps)
 
     def rewritten(self, data: bytes | memoryview, change: Callable[[bytes], bytes]) -> bytes:
-        """Return a message with ``change`` of each frame id. Raise DeserializationError where it ends too early."""
+        """Return a message with ``change`` of each frame id. Raise DeserializationError if it ends too early."""
         data = bytes(data)
         if not self._steps:
             return data

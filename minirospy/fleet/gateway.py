@@ -86,7 +86,7 @@ class Gateway:
     async def start(self) -> None:
         """Connect to the fleet unless :meth:`connect` has, and pass on until :meth:`close`.
 
-        Raise BridgeError, MasterUnreachableError, RpcError, ROSInterruptException where the node is shut down before.
+        Raise BridgeError, MasterUnreachableError, RpcError, ROSInterruptException if the node is shut down before.
         """
         options = self.options
         # A thousand robots have thousands of topics: a master that does not register them is one line.

@@ -123,7 +123,7 @@ class ImportedTopic:
         self._shared.spawn(self._open())
 
     def update(self, token: TopicToken) -> bool:
-        """Take over a token that has changed; False where the topic has to be made again."""
+        """Take over a token that has changed; False if the topic has to be made again."""
         before, self.token = self.token, token
         if token == before:
             return True

@@ -455,7 +455,7 @@ class Importer:
                 topic.look(snapshot)
 
     async def _answering(self) -> list[str] | None:
-        """Query all gateways of the fleet; return those that answer, None where they cannot be queried."""
+        """Query all gateways of the fleet; return those that answer, None if they cannot be queried."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)

@@ -23,7 +23,7 @@ _AT_ONCE = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Open a session, and return the answer. Raise BridgeError where nothing of the fleet is reached."""
+    """Open a session, and return the answer. Raise BridgeError if nothing of the fleet is reached."""
 
     async def asking() -> _T:
         network = await FleetNetwork.open(options, waits=False)

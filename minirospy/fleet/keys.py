@@ -167,7 +167,7 @@ def mangled(name: str) -> str:
 
 
 def unmangled(chunk: str) -> str | None:
-    """Return the global graph resource name of a chunk; None where it is not a legal one."""
+    """Return the global graph resource name of a chunk; None if it is not a legal one."""
     name = chunk.replace("%", "/")
     return name if is_global_name(name) else None
 
@@ -359,7 +359,7 @@ def serialize_stamp(stamp: Stamp) -> bytes:
 
 
 def parse_stamp(data: bytes) -> Stamp | None:
-    """Return what came with a message; None where it is not of ours."""
+    """Return what came with a message; None if it is not of ours."""
     return Stamp._make(_STAMP.unpack(data)) if len(data) == _STAMP.size else None
 
 

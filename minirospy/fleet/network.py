@@ -109,7 +109,7 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; ``waits``: until the other end is there. Raise BridgeError where the configuration is not right."""
+        """Open a session; ``waits``: until the other end is there. Raise BridgeError if the configuration is not right."""
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")

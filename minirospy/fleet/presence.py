@@ -28,7 +28,7 @@ class Presence:
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query`` all; it returns those that answered in time, None where none could be queried.
+        """``query`` all; it returns those that answered in time, None if none could be queried.
 
         ``gateways``: those that have tokens.
         ``changed`` is called when one is lost, or there again.

@@ -101,7 +101,7 @@ def shared_topics(
 
 
 def parse_namespace(text: str) -> str:
-    """Return a namespace of keys. Raise BridgeError where it is not one chunk of a key."""
+    """Return a namespace of keys. Raise BridgeError if it is not one chunk of a key."""
     if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
         raise BridgeError(
             f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
@@ -126,7 +126,7 @@ def beacon_pattern(namespace: str) -> str:
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return the resource of a beacon; None where it has no type, as a subscriber of any. Raise BridgeError with the reason."""
+    """Return the resource of a beacon; None if it has no type, as a subscriber of any. Raise BridgeError with the reason."""
     if len(key) > _MAX_KEY:
         raise BridgeError(f"its key has {len(key)} characters")
     chunks = key.split("/", 6)
@@ -212,7 +212,7 @@ class Sightings:
         return iter(self._seen)
 
     def received(self, resource: Resource, now: float) -> bool:
-        """Record a beacon; return whether the resource is new. Raise BridgeError where there are too many."""
+        """Record a beacon; return whether the resource is new. Raise BridgeError if there are too many."""
         is_new = resource not in self._seen
         if is_new and len(self._seen) >= MAX_RESOURCES:
             raise BridgeError(f"there are more than {MAX_RESOURCES} topics and services")

@@ -78,7 +78,7 @@ class GatewayRules:
     """A stream of velocities that comes here and ends is followed by a zero after this; 0: it is not."""
 
     def rate(self, topic: str) -> float:
-        """Return the most messages a second of a topic; 0 where it is not limited."""
+        """Return the most messages a second of a topic; 0 if it is not limited."""
         return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
 
     def priority(self, topic: str, type_: str) -> Priority:

@@ -183,7 +183,7 @@ class Flows:
         self._flows: dict[object, Flow[_Arrival]] = {}
 
     def of(self, key: object) -> Flow[_Arrival] | None:
-        """Return a key's flow; None where there are too many, and messages wait in each."""
+        """Return a key's flow; None if there are too many, and messages wait in each."""
         with self._lock:
             flow = self._flows.pop(key, None)
             if flow is None:

@@ -62,7 +62,7 @@ def open_reader(path: str) -> Iterator[BagReader]:
 
 
 def version_of(path: str) -> int:
-    """Return a bag's version, 200 for 2.0, also where it has no index. Raise BagFormatError, OSError."""
+    """Return a bag's version, 200 for 2.0, also if it has no index. Raise BagFormatError, OSError."""
     with open(path, "rb") as stream:
         return read_version(stream)
 
@@ -264,7 +264,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError where the name of a bag that is to be written is that of an MCAP file."""
+    """Raise UsageError if the name of a bag that is to be written is that of an MCAP file."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -275,7 +275,7 @@ def check_bag_name(path: str) -> None:
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
     """Yield the writer of a new file; chunks are compressed in parallel. Errors and Ctrl-C leave a bag of what was written.
 
-    Raise UsageError where the name is that of an MCAP file, before anything is written.
+    Raise UsageError if the name is that of an MCAP file, before anything is written.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:

@@ -11,7 +11,7 @@ __all__ = ["configuration_documents", "parameter_values"]
 def configuration_documents(text: str) -> list[object]:
     """Return the documents of a file; what ROS's dynparam has dumped, an object of Python, as a dict.
 
-    Raise MinirospyError where it is not YAML, or unfolds to too much.
+    Raise MinirospyError if it is not YAML, or unfolds to too much.
     """
     import yaml
 

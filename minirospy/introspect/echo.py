@@ -26,7 +26,7 @@ class Filter:
     """A Python expression over a message ``m`` and the name of its ``topic``, as the user typed it."""
 
     def __init__(self, expression: str) -> None:
-        """Raise UsageError where it is not an expression."""
+        """Raise UsageError if it is not an expression."""
         self._expression = expression
         try:
             self._code = compile(expression, "--filter", "eval")
@@ -34,7 +34,7 @@ class Filter:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
     def __call__(self, message: Message, topic: str) -> bool:
-        """Return whether the expression is true. Raise UsageError where it cannot be evaluated."""
+        """Return whether the expression is true. Raise UsageError if it cannot be evaluated."""
         try:
             # The user's own code on the user's own machine, as in ROS: no input of others gets here.
             return bool(eval(self._code, {"m": message, "topic": topic}))
@@ -81,7 +81,7 @@ class Echo:
         self._header_written = False
 
     def message(self, received: Received) -> Message:
-        """Return the message in what was received. Raise NotFoundError where it has no such field."""
+        """Return the message in what was received. Raise NotFoundError if it has no such field."""
         from minirospy.core.idl.load import get_message_class
 
         message = self._classes.read(received)
@@ -92,7 +92,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return what is printed of a message. Raise IndexError where the field's array is too short."""
+        """Return what is printed of a message. Raise IndexError if the field's array is too short."""
         value = field_value(message, self._steps)
         return self._row(value, received) if self._plot else self._block(value)
 
@@ -131,7 +131,7 @@ class Echo:
 def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
     """Return a message of YAML values; ``now`` is the time, ``auto`` a stamped header (``nanoseconds``: what time it is).
 
-    Raise MessageException where they do not fit, with the names of the fields that there are.
+    Raise MessageException if they do not fit, with the names of the fields that there are.
     """
     message = fill(cls(), values, words_of(time.time_ns() if nanoseconds is None else nanoseconds))
     serialize(message)

@@ -41,7 +41,7 @@ def parse_path(path: str) -> tuple[Step, ...]:
 def field_value(message: object, steps: tuple[Step, ...]) -> object:
     """Return the value at a path; a slice of messages followed by a field gives a list of that field's values.
 
-    Raise NotFoundError where a field is not there, IndexError where an array is too short.
+    Raise NotFoundError if a field is not there, IndexError where an array is too short.
     """
     value: object = message
 
@@ -68,7 +68,7 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
 def field_type(message_class: type[Message], path: str) -> str:
     """Return the ROS type of the field at a path of a message class.
 
-    Raise NotFoundError where the field does not exist or the class of an inner message is not installed.
+    Raise NotFoundError if the field does not exist or the class of an inner message is not installed.
     """
     from minirospy.core.idl.load import message_class as load_class
 

@@ -32,7 +32,7 @@ _LONGEST_NAME = 4096
 
 
 class NodeAddress(NamedTuple):
-    """A node's name and the URI of its Slave API; None where the master does not know it."""
+    """A node's name and the URI of its Slave API; None if the master does not know it."""
 
     name: str
     uri: str | None
@@ -41,7 +41,7 @@ class NodeAddress(NamedTuple):
 class Graph:
     """A master, called in the name of ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
 
-    Every call raises MasterUnreachableError where no master answers.
+    Every call raises MasterUnreachableError if no master answers.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Graph:
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API (one call a node); None where the master does not know it."""
+        """Return the URI of a node's Slave API (one call a node); None if the master does not know it."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):

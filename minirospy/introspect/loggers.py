@@ -24,7 +24,7 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
     """Logger -> level (in small letters) of a node (global name).
 
-    Raise NotFoundError, NodeUnreachableError, and MinirospyError where it has no service of its loggers.
+    Raise NotFoundError, NodeUnreachableError, and MinirospyError if it has no service of its loggers.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
     return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}

@@ -39,7 +39,7 @@ class MessageClasses:
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
         """Return the class for a publisher's connection header: the installed one where the md5sums agree.
 
-        Raise NotFoundError where it is not installed and the publisher sent no definition, DefinitionError
+        Raise NotFoundError if it is not installed and the publisher sent no definition, DefinitionError
         where the definition does not parse.
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
@@ -102,7 +102,7 @@ def check(message: Message) -> None:
 
 
 def serialize(message: Message) -> bytes:
-    """Return the bytes of a message. Raise MessageException where a value does not fit its field."""
+    """Return the bytes of a message. Raise MessageException if a value does not fit its field."""
     buffer = BytesIO()
     try:
         message.serialize(buffer)

@@ -87,7 +87,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
     """Return the documents of a parameter file named ``where``, to be set below ``namespace`` (global).
 
-    Raise ValueTextError where it is not YAML, or there are values at the root without a name.
+    Raise ValueTextError if it is not YAML, or there are values at the root without a name.
     """
     files = []
     for document in parse_documents(text, where):

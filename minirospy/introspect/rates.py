@@ -74,7 +74,7 @@ class RateWindow:
         self._last = time
 
     def report(self) -> Spread | None:
-        """Return the statistics; None where nothing has come since the last report, or too little yet."""
+        """Return the statistics; None if nothing has come since the last report, or too little yet."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -116,7 +116,7 @@ class DelayWindow:
         self._delays.append(time - stamp)
 
     def report(self) -> Spread | None:
-        """Return the statistics; None where nothing has come since the last report."""
+        """Return the statistics; None if nothing has come since the last report."""
         if self._arrived == self._reported:
             return None
         self._reported = self._arrived

@@ -95,7 +95,7 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 
 def service_arguments(type_: str) -> list[str]:
-    """Return the names of the fields of a service type's request. Raise NotFoundError where it is not installed."""
+    """Return the names of the fields of a service type's request. Raise NotFoundError if it is not installed."""
     from minirospy.core.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
@@ -119,7 +119,7 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
     ``now`` represents the time, ``auto`` a stamped header, whose ``seq`` is 1, as of the first call of a proxy.
-    Raise NotFoundError where the type is not installed, MessageException where the values do not fit.
+    Raise NotFoundError if the type is not installed, MessageException where the values do not fit.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.core.idl.message import number_header
@@ -160,7 +160,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """Return a service's type; None where it is not there or does not answer."""
+    """Return a service's type; None if it is not there or does not answer."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):

@@ -61,7 +61,7 @@ class ToolNode:
     """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it has to stop.
 
     ``clock`` gives the time of messages: the machine's time; with ``ros_time`` that of /clock where the parameter
-    /use_sim_time requests it, which ``simulated`` says then. Raise MasterUnreachableError where no master answers.
+    /use_sim_time requests it, which ``simulated`` says then. Raise MasterUnreachableError if no master answers.
     """
 
     def __init__(
@@ -284,7 +284,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message; its header is numbered. Raise MessageException where a value does not fit."""
+        """Send a message; its header is numbered. Raise MessageException if a value does not fit."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence

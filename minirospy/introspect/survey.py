@@ -144,7 +144,7 @@ def _topics(
 
 
 def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return what a node counted for each connection by which it sends; nothing where its rows are not as documented."""
+    """Return what a node counted for each connection by which it sends; nothing if its rows are not as documented."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }

@@ -148,7 +148,7 @@ def find_topics_of_type(graph: Graph, type_: str) -> list[str]:
 def topic_field_type(field: TopicField) -> str:
     """Return the type of a field of a topic's messages.
 
-    Raise NotFoundError where the message has no such field, or its type is not installed here.
+    Raise NotFoundError if the message has no such field, or its type is not installed here.
     """
     from minirospy.core.idl.load import message_class
     from minirospy.introspect.fields import field_type
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Like :func:`find_topic`. Raise NotFoundError where there is none or its type is not known."""
+    """Like :func:`find_topic`. Raise NotFoundError if there is none or its type is not known."""
     field = find_topic(graph, name)
     if field:
         return field

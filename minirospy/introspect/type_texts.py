@@ -26,7 +26,7 @@ _AT_ONCE = 32
 
 
 def installed_type(name: str) -> InterfaceType | None:
-    """Return a message type of the installed packages; None where there is none, or it cannot be read."""
+    """Return a message type of the installed packages; None if there is none, or it cannot be read."""
     from minirospy.core.idl.load import get_message_class
 
     try:
@@ -37,7 +37,7 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type that a full text defines; None where it does not parse. No class is made: that takes a second."""
+    """Return the type that a full text defines; None if it does not parse. No class is made: that takes a second."""
     from minirospy.core.idl.load import checked_text
 
     try:
@@ -77,7 +77,7 @@ class TypeTexts:
         return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
-        """Return an installed type, None where there is none of the name."""
+        """Return an installed type, None if there is none of the name."""
         if name in self._installed:
             return self._installed[name]
 
@@ -133,7 +133,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the type that a service's connection header names. Raise NotFoundError where it is not installed here."""
+    """Return the type that a service's connection header names. Raise NotFoundError if it is not installed here."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

@@ -120,7 +120,7 @@ def format_pretty(value: object) -> str:
 
 
 def check_parameter(value: object, name: str) -> None:
-    """Raise ValueTextError where a value, or one inside it, is nothing that a parameter can hold."""
+    """Raise ValueTextError if a value, or one inside it, is nothing that a parameter can hold."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if not isinstance(key, str):

@@ -38,7 +38,7 @@ class GoalId(NamedTuple):
 
     @property
     def nanoseconds(self) -> int:
-        """The stamp as one number, 0 where there is none."""
+        """The stamp as one number, 0 if there is none."""
         return self.secs * 1_000_000_000 + self.nsecs
 
 

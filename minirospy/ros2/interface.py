@@ -73,7 +73,7 @@ class Ros2ActionClient(Reachable, Protocol):
     """A client of an action; its methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future accepted goal, None where it is refused. It fails with BridgeError."""
+        """Send a goal; return the future accepted goal, None if it is refused. It fails with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -84,7 +84,7 @@ class Ros2Parameters(Protocol):
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; of type 0 where it is not set."""
+        """Return a parameter; of type 0 if it is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 

@@ -31,7 +31,7 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link, and why it is not open: nothing where it is."""
+    """A link, and why it is not open: nothing if it is."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""

@@ -20,7 +20,7 @@ BRIDGE_PREFIX = "minirospy_ros2_bridge"
 
 
 def parse_domain(text: str) -> str:
-    """Return the domain of ROS 2 that ``ROS_DOMAIN_ID`` names: 0 where it is empty. Raise BridgeError."""
+    """Return the domain of ROS 2 that ``ROS_DOMAIN_ID`` names: 0 if it is empty. Raise BridgeError."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))

@@ -108,7 +108,7 @@ def ros2_value(value: object) -> Value:
 
 
 def ros1_value(value: Value) -> object:
-    """Return a value of ROS 2 for ROS 1. Raise BridgeError where ROS 1 has none like it."""
+    """Return a value of ROS 2 for ROS 1. Raise BridgeError if ROS 1 has none like it."""
     if value.type == _BYTES and isinstance(value.value, Collection):
         return Binary(b"".join(each if isinstance(each, bytes) else bytes((each,)) for each in value.value))
     if 0 < value.type <= _ARRAY_OF_SINGLE:

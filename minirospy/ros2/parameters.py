@@ -39,7 +39,7 @@ class Ros1Parameters:
         return [ros2_name(name) for name in leaves(await self._node.get_param("/", {}))]
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; of type 0 where none is set, or the name is that of a namespace."""
+        """Return the values; of type 0 if none is set, or the name is that of a namespace."""
         found = []
         for name in names:
             value = await self._node.get_param(ros1_name(name), None)
@@ -169,7 +169,7 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return the texts of a request that has two. Raise ValueError where it has fewer."""
+    """Return the texts of a request that has two. Raise ValueError if it has fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts

@@ -194,7 +194,7 @@ class ActionClient:
         return reached
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, None where it is refused. From any thread."""
+        """Send a goal; return the accepted goal, None if it is refused. From any thread."""
         accepted: Future[Ros2Goal | None] = Future()
         self._calls.executor.create_task(self._send, goal, feedback, accepted)
         return accepted
@@ -319,7 +319,7 @@ class Feedback:
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
-"""A goal and where its feedback goes -> the accepted goal, None where it is refused."""
+"""A goal and where its feedback goes -> the accepted goal, None if it is refused."""
 
 
 class ActionServer:

@@ -192,13 +192,13 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the ids of a service's servers; None where no response can be lost. From any thread."""
+        """Return the ids of a service's servers; None if no response can be lost. From any thread."""
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return what reaches the nodes that serve; None where one has no parameters, or is not known yet. From any thread."""
+        """Return what reaches the nodes that serve; None if one has no parameters, or is not known yet. From any thread."""
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
@@ -261,7 +261,7 @@ class Client:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """The ids of the servers; None where no response can be lost. From any thread."""
+        """The ids of the servers; None if no response can be lost. From any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:

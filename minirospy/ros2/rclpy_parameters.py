@@ -29,7 +29,7 @@ class ParameterStore(Protocol):
     async def names(self) -> list[str]: ...
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; of type 0 where none is set."""
+        """Return the values; of type 0 if none is set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
         """Set or delete parameters; return for each why not, "" where it is done."""
@@ -134,7 +134,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; of type 0 where it is not set."""
+        """Return a parameter; of type 0 if it is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)

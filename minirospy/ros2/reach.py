@@ -37,10 +37,10 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """The ids of the servers that are there; None where no response can be lost."""
+        """The ids of the servers that are there; None if no response can be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return what sends requests without effect to the servers; None where they have nothing for it."""
+        """Return what sends requests without effect to the servers; None if they have nothing for it."""
 
 
 class Reach:
@@ -95,7 +95,7 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until servers are reached, as far as they can be; return False where one has left before."""
+        """Wait until servers are reached, as far as they can be; return False if one has left before."""
         self._wanted = servers
         probe = await self._probe()
         if probe is None:

@@ -164,7 +164,7 @@ class ZenohActionClient:
         """Return None: nothing has to be reached."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, None where it is refused. It fails with BridgeError."""
+        """Send a goal; return the accepted goal, None if it is refused. It fails with BridgeError."""
         id = uuid.uuid4().bytes
         self._callbacks[id] = feedback
         accepted: Future[Ros2Goal | None] = Future()

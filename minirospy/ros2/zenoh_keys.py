@@ -116,7 +116,7 @@ def format_token(entity: Entity) -> str:
 
 
 def parse_token(key: str) -> Entity | None:
-    """Return what a token declares, None where it is not one that the bridge understands."""
+    """Return what a token declares, None if it is not one that the bridge understands."""
     parts = key.split("/")
     if len(key) > _LONGEST or len(parts) < 9 or parts[0] != _SPACE:
         return None
@@ -170,7 +170,7 @@ def attachment(sequence: int, time: int, gid: bytes) -> bytes:
 
 
 def reply_attachment(data: bytes, time: int) -> bytes:
-    """Return what goes with the response to a request, with this attachment. Raise ValueError where it is not one."""
+    """Return what goes with the response to a request, with this attachment. Raise ValueError if it is not one."""
     # The id without its length, as other versions of rmw_zenoh may have it, goes back likewise.
     if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
         raise ValueError("this is not an attachment of rmw_zenoh")

@@ -118,7 +118,7 @@ class ZenohNodeParameters:
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; of type 0 where it is not set."""
+        """Return a parameter; of type 0 if it is not set."""
         found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)

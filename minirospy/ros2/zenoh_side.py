@@ -68,7 +68,7 @@ class ZenohSide:
         return [(each.node, each.namespace) for each in self._graph.nodes() if not is_bridge(each.node)]
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer, also where the other side's is another one."""
+        """Return the fields of a message type. Raise TypesDiffer, also if the other side's is another one."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC)
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 

@@ -128,7 +128,7 @@ class Access:
         return Grant.READ if self.default_is_read else Grant.WRITE
 
     def check_host(self, host: str) -> Refusal | None:
-        """Return why a request that names this host is refused, None where it is not."""
+        """Return why a request that names this host is refused, None if it is not."""
         if self._knows_host(host):
             return None
         return Refusal(

@@ -149,7 +149,7 @@ class Bridge:
         tls: ssl.SSLContext | None,
         public: Mapping[str, HttpHandler],
     ) -> Listener:
-        """Return a listener of a protocol. Raise BridgeError where the port is in use, unless it is to be tried again."""
+        """Return a listener of a protocol. Raise BridgeError if the port is in use, unless it is to be tried again."""
         listener = Listener(
             endpoints,
             self.options.access,

@@ -307,7 +307,7 @@ class SharedGraph:
                 await asyncio.wait_for(self._look_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
-        """Return a service's type; None where it is not known, or not installed here."""
+        """Return a service's type; None if it is not known, or not installed here."""
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
@@ -345,7 +345,7 @@ class SharedGraph:
             del self.topics[shared.topic]
 
     def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
-        """Publish a topic. Raise BridgeError where it may not be, or is published with another type."""
+        """Publish a topic. Raise BridgeError if it may not be, or is published with another type."""
         if not self.filters.publishable(topic):
             raise BridgeError(f"topic [{topic}] may not be published by clients")
         shared = self._publishers.get(topic)

@@ -73,7 +73,7 @@ def is_quick_text(text: str) -> bool:
 def load_json(
     text: str | bytes, *, max_values: int = _MAX_VALUES, max_collections: int = _MAX_COLLECTIONS
 ) -> object:
-    """Return the value of a text. Raise ValueError, also where it has too many values, and RecursionError."""
+    """Return the value of a text. Raise ValueError, also if it has too many values, and RecursionError."""
     if isinstance(text, str):
         _check_counts(text, max_values, max_collections)
     found: object = json.loads(text)
@@ -143,7 +143,7 @@ def _skip_space(text: str, at: int) -> int:
 
 
 def _numbers(text: str, start: int, end: int) -> list[object]:
-    """Return the values of a part of an array. Raise JSONDecodeError, also where there are none."""
+    """Return the values of a part of an array. Raise JSONDecodeError, also if there are none."""
     found: list[object] = json.loads(f"[{text[start:end]}]")
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)

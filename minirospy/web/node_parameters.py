@@ -34,7 +34,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter. Raise BridgeError where it is of another type."""
+    """Return a parameter. Raise BridgeError if it is of another type."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")

@@ -27,7 +27,7 @@ class Tokens(NamedTuple):
 
 
 def read_tokens(home: Path) -> Tokens | None:
-    """Return the tokens in ROS_HOME; None where there are none."""
+    """Return the tokens in ROS_HOME; None if there are none."""
     try:
         with os.fdopen(open_file(home / _NAME, os.O_RDONLY), encoding="utf-8") as file:
             if sys.platform != "win32" and not _is_own(os.fstat(file.fileno())):

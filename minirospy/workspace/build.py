@@ -149,7 +149,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package. ``made``: the generated parts, as text; empty where nothing had changed."""
+    """The result of building a package. ``made``: the generated parts, as text; empty if nothing had changed."""
 
     plan: Plan
     made: str

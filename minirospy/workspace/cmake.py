@@ -52,7 +52,7 @@ class Statement(NamedTuple):
 def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
     """Return the commands of a CMakeLists.txt; ``where`` names the file in errors.
 
-    Raise BuildError where a quote, a bracket, an ``if`` or a loop does not close.
+    Raise BuildError if a quote, a bracket, an ``if`` or a loop does not close.
     """
     return _nested(_commands(text.removeprefix("\ufeff"), where), where, None)
 

@@ -23,7 +23,7 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
     """Run the .cfg files of a package; return what they have written into devel, and warnings.
 
-    Raise BuildError where one fails.
+    Raise BuildError if one fails.
     """
     made: list[Path] = []
     warnings: list[str] = []

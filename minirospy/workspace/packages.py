@@ -230,7 +230,7 @@ def _leads_back(entry: os.DirEntry[str]) -> bool:
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in the package.xml of a folder (the folder's where it says none); None where no such file is."""
+    """Return the name in the package.xml of a folder (the folder's where it says none); None if no such file is."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
@@ -290,7 +290,7 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return why ROS 1 would not run a Python program that minirospy runs, and what to do; None where it would.
+    """Return why ROS 1 would not run a Python program that minirospy runs, and what to do; None if it would.
 
     ROS 1 leaves the choice of the interpreter to the system, which needs the permission and a first line.
     """

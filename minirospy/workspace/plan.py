@@ -88,7 +88,7 @@ class Install(NamedTuple):
     rename: str = ""
 
     def check(self, folder: Path) -> None:
-        """Raise BuildError where a source, below a folder, is not there."""
+        """Raise BuildError if a source, below a folder, is not there."""
         for name in self.sources:
             source = folder / name
             if not source.exists() and not self.optional:

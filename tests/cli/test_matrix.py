@@ -40,7 +40,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, signals and d
 class Row(NamedTuple):
     """What is typed behind a verb.
 
-    ``good``: something that works on the graph of the fixture ``graph``; None where that starts a program or a
+    ``good``: something that works on the graph of the fixture ``graph``; None if that starts a program or a
     master. ``unknown``: with a name that nobody has; "" where the verb takes no name. ``dead``: about the node that
     does not answer. ``uses_master``: whether it needs a master. ``streams``: only Ctrl-C ends it. ``quiet``: an unknown name
     is an empty answer, as of a search. ``waits``: it is waited for, with a warning.

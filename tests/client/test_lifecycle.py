@@ -975,7 +975,7 @@ class Interrupted(logging.Handler):
             os.kill(os.getpid(), signal.SIGINT)
         depth -= 1
 
-# Also where the program has had its time before it comes behind the line: there it is interrupted.
+# Also if the program has had its time before it comes behind the line: there it is interrupted.
 atexit.register(lambda: print(rospy.is_shutdown(), most, lines))
 rospy.init_node("writes", argv=[], disable_rosout=True)
 logging.getLogger("rosout").addHandler(Interrupted())

@@ -30,7 +30,7 @@ EMPTY = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lose nothing, where the machine stands still, and repeat no line of the log."""
+    """Lose nothing, if the machine stands still, and repeat no line of the log."""
     monkeypatch.setattr(ros1_keys, "LOST_SECONDS", SECONDS)
     monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1000.0)
 

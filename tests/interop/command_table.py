@@ -590,7 +590,7 @@ _CHANGING = [
     (re.compile(r"(?<=package \[std_msgs\] in )\S*/"), "SHARE/"),
     (re.compile(r"(?<=on search path \[)\{.*?\}(?=\]$)", re.MULTILINE), "SHARE"),
     (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
-    # roslaunch colours its errors also where they go to a file, and writes tracebacks that ours has none of.
+    # roslaunch colours its errors also if they go to a file, and writes tracebacks that ours has none of.
     (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),
     (re.compile(r"^The traceback for the exception was written to the log file\n", re.MULTILINE), ""),
 ]

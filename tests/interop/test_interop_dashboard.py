@@ -370,7 +370,7 @@ def test_console_keeps_long_texts_in_their_rows(
     widths = "['.bar select', '.bar'].map(find => document.querySelector(find).getBoundingClientRect().width)"
     select, bar = page.evaluate(widths)
     assert select < bar / 2
-    # The newest line is followed also where the list becomes lower before the event of its own scrolling comes.
+    # The newest line is followed also if the list becomes lower before the event of its own scrolling comes.
     for number in range(60):
         served.run(log.publish(Log(level=2, name="/n", msg=f"line {number}")))
     page.wait_text(".line .text", "line 59")

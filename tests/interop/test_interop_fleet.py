@@ -87,7 +87,7 @@ class Link:
         self.running = ExitStack()
 
     def build(self) -> None:
-        """Make them. Raise OSError, CalledProcessError where this is not permitted."""
+        """Make them. Raise OSError, CalledProcessError if this is not permitted."""
         for name in self.names:
             self.sh(f"ip netns add {name}")
         self.sh(f"ip link add veth0 netns {self.names[0]} type veth peer name veth0 netns {self.names[1]}")

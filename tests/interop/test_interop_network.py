@@ -52,7 +52,7 @@ class Network:
         sh(f"ip -n {self.names[machine]} {command}")
 
     def build(self) -> None:
-        """Make the machines. Raise CalledProcessError where this is not permitted."""
+        """Make the machines. Raise CalledProcessError if this is not permitted."""
         for name in self.names.values():
             sh(f"ip netns add {name}")
 

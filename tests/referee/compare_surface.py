@@ -384,7 +384,7 @@ def describe_value(value: Any) -> dict[str, Any] | None:
 
 
 def parameters(value: Any) -> list[list[str]] | None:
-    """[name, default, kind] of each parameter; None where it cannot be determined."""
+    """[name, default, kind] of each parameter; None if it cannot be determined."""
     try:
         signature = inspect.signature(value)
     except (TypeError, ValueError):

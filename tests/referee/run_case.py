@@ -40,7 +40,7 @@ def run_case(name: str, python: str, uri: str, home: Path) -> str:
 
 
 def differences(said: str, expected: str) -> str:
-    """Return the lines in which two outputs differ, for any Python version; nothing where they are the same."""
+    """Return the lines in which two outputs differ, for any Python version; nothing if they are the same."""
     lines, others = (_as_every_python(text).splitlines() for text in (said, expected))
     return "\n".join(difflib.unified_diff(others, lines, "expected", "said", lineterm="", n=1))
 

@@ -67,7 +67,7 @@ class Run:
         return self.said
 
     def reaches(self, words: str) -> bool:
-        """Read until the words were printed; return False where it ends before."""
+        """Read until the words were printed; return False if it ends before."""
         while words not in self.said:
             line = self._lines.get(timeout=SECONDS)
             if not line:

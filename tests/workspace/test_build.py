@@ -564,7 +564,7 @@ def test_warnings(scene: Scene) -> None:
 
 
 def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
-    """By its own package and by others, also where it uses another one; as in ROS, which makes no class of it."""
+    """By its own package and by others, also if it uses another one; as in ROS, which makes no class of it."""
     first = (
         "find_package(catkin REQUIRED COMPONENTS rospy message_generation)\nadd_message_files(FILES A.msg)\n"
     )

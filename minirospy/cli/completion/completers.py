@@ -279,7 +279,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return what the master, and the nodes, answer; nothing where that takes longer than a TAB may."""
+    """Return what the master, and the nodes, answer; nothing if that takes longer than a TAB may."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -298,7 +298,7 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Return global names, with their first slash only where they are typed so."""
+    """Return global names, with their first slash only if they are typed so."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 

@@ -70,7 +70,7 @@ class BagReader(ABC):
     ) -> Iterator[StoredMessage]:
         """Yield the messages of these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
 
-        They come in the order of time; those of one time in the order of the connections. Raise BagFormatError where
+        They come in the order of time; those of one time in the order of the connections. Raise BagFormatError if
         the bag is damaged, when the messages before the damage have been yielded.
         """
         self.prepare()

@@ -192,7 +192,7 @@ class ChunkStream:
     ) -> None:
         """Compare the record of each connection, which is in front of its first message, with that of the index.
 
-        Once for each connection. Raise BagFormatError where they differ, or where the index of the chunk is wrong.
+        Once for each connection. Raise BagFormatError if they differ, or where the index of the chunk is wrong.
         """
         limit = size_of(self.stream)
         for first, _, _, number in entries:
@@ -215,7 +215,7 @@ class ChunkStream:
     def _picked(
         self, start: int, size: int, entries: list[tuple[int, int, int, int]]
     ) -> tuple[bytes, list[Found]]:
-        """Return the bodies of messages one behind the other. Raise BagFormatError where the index is wrong."""
+        """Return the bodies of messages one behind the other. Raise BagFormatError if the index is wrong."""
         prefixes = {number: encoding.message_prefixes(number) for *_, number in entries}
         bodies: list[bytes] = []
         found: list[Found] = []
@@ -348,7 +348,7 @@ _COMPARED = ("type", "md5sum", "message_definition")
 
 
 def _check_connection(stored: Connection, known: Mapping[int, Connection]) -> None:
-    """Raise BagFormatError where the index has another topic or type for a connection that was found in a chunk."""
+    """Raise BagFormatError if the index has another topic or type for a connection that was found in a chunk."""
     indexed = known.get(stored.id, stored)
     if indexed.topic == stored.topic and all(
         indexed.header.get(name) == stored.header.get(name) for name in _COMPARED

@@ -57,7 +57,7 @@ class Stored(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """The contents of a bag. ``start`` and ``end`` in seconds are None where it has no messages."""
+    """The contents of a bag. ``start`` and ``end`` in seconds are None if it has no messages."""
 
     path: str | None
     version: str

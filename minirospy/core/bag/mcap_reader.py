@@ -52,7 +52,7 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 class McapReader(BagReader):
     """An MCAP file of profile ``ros1``; its channels are the connections.
 
-    Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError where the file is damaged,
+    Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError if the file is damaged,
     McapUnindexedError where its summary is missing or damaged, BagError if the extra is missing.
     """
 

@@ -303,7 +303,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError where messages would be missing without a word: the index has more, or other, than its header."""
+    """Raise BagFormatError if messages would be missing without a word: the index has more, or other, than its header."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

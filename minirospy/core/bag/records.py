@@ -329,7 +329,7 @@ def parse_bag_header(record: Record) -> BagHeader:
 
 
 def parse_connection(record: Record, data: bytes) -> Connection:
-    """Return the connection of a record. Raise BagFormatError, also where the type is missing."""
+    """Return the connection of a record. Raise BagFormatError, also if the type is missing."""
     record.expect(OP_CONNECTION)
     header = parse_fields(data, record.position)
     for name in ("type", "md5sum", "message_definition"):

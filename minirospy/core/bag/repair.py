@@ -222,7 +222,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError where a connection is another one than in the chunks before: not what it was written for."""
+        """Raise BagFormatError if a connection is another one than in the chunks before: not what it was written for."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (

@@ -92,7 +92,7 @@ class Timeline:
         )
 
     def time_after(self, time: int) -> int | None:
-        """Return the time of the first message after ``time``; None where that is the last."""
+        """Return the time of the first message after ``time``; None if that is the last."""
         found = [
             times[at]
             for topic in self.topics.values()
@@ -102,7 +102,7 @@ class Timeline:
         return min(found, default=None)
 
     def time_before(self, time: int) -> int | None:
-        """Return the time of the last message before ``time``; None where that is the first."""
+        """Return the time of the last message before ``time``; None if that is the first."""
         found = [
             times[at - 1]
             for topic in self.topics.values()

@@ -1,6 +1,6 @@
 """The life of an action's goal, as tables: the transitions of the server, and those of a client by the statuses that it receives.
 
-In: a state and an event. Out: the next state, or the states to pass through, or None where that cannot be.
+In: a state and an event. Out: the next state, or the states to pass through, or None if that cannot be.
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself where that page leaves things open.
 """
 
@@ -213,7 +213,7 @@ _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.
 
 
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
-    """Return what a client in ``state`` passes through when it receives ``status``; None where that cannot follow.
+    """Return what a client in ``state`` passes through when it receives ``status``; None if that cannot follow.
 
     Raise KeyError on a status that servers do not publish.
     """

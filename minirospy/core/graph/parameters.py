@@ -135,7 +135,7 @@ class ParameterTree:
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
         """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
 
-        A value in the way of a namespace is replaced by it. Raise ValueError where the root would become
+        A value in the way of a namespace is replaced by it. Raise ValueError if the root would become
         something else than a dictionary.
         """
         path = _split(key)
@@ -161,7 +161,7 @@ class ParameterTree:
         """Return the name of the nearest parameter ``key``, upwards from ``namespace``.
 
         Only the first part of ``key`` has to exist, as the API demands: a node may look for a namespace
-        whose parameters come later. None where there is none.
+        whose parameters come later. None if there is none.
         """
         if key.startswith("/"):
             return key if self.has(key) else None

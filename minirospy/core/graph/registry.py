@@ -122,7 +122,7 @@ class Registry:
         return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
     def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
-        """``node`` publishes ``topic`` no more; None where that was not registered from ``uri``."""
+        """``node`` publishes ``topic`` no more; None if that was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, PUBLISHES)

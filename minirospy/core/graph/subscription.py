@@ -79,7 +79,7 @@ class SubscriptionPlan:
             self._refusals.add(uri)
 
     def lost(self, uri: str) -> Connect | None:
-        """Return the next attempt at ``uri``, whose link failed or closed; None where its publisher has left."""
+        """Return the next attempt at ``uri``, whose link failed or closed; None if its publisher has left."""
         if uri not in self._failures:
             return None
         failures = self._failures[uri]

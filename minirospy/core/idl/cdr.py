@@ -64,7 +64,7 @@ class Text(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """Elements, each of which is laid out as ``items``; ``length`` is None where it varies."""
+    """Elements, each of which is laid out as ``items``; ``length`` is None if it varies."""
 
     items: tuple[Item, ...]
     length: int | None = None
@@ -88,7 +88,7 @@ class Transcoder(NamedTuple):
 def make_transcoder(name: str, layout: Layout) -> Transcoder:
     """Return the functions that convert a message of this layout; ``name`` is shown in tracebacks.
 
-    Raise DefinitionError where Python cannot make functions of it.
+    Raise DefinitionError if Python cannot make functions of it.
     """
     to_cdr = _compiled(f"{name} to CDR", _Generator(is_cdr_source=False, swaps=False).function(layout))
     little = _compiled(f"{name} from CDR", _Generator(is_cdr_source=True, swaps=False).function(layout))
@@ -132,7 +132,7 @@ class _Position(NamedTuple):
         return self.after(-self.remainder % width) if width <= self.modulus else _Position(width, 0)
 
     def padding(self, width: int) -> int | None:
-        """Return the bytes up to the next multiple of ``width``, None where that depends on the message."""
+        """Return the bytes up to the next multiple of ``width``, None if that depends on the message."""
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:

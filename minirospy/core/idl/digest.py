@@ -36,13 +36,13 @@ _SEPARATOR = "=" * 80
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
     """Return what the md5sum counts: constants, then fields, nested types replaced by their md5sums.
 
-    Raise DefinitionError where a message contains itself.
+    Raise DefinitionError if a message contains itself.
     """
     return _md5_text(spec, lookup, ())
 
 
 def message_md5(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return a message's md5sum. Raise DefinitionError where it contains itself."""
+    """Return a message's md5sum. Raise DefinitionError if it contains itself."""
     return _md5(md5_text(spec, lookup))
 
 

@@ -97,7 +97,7 @@ _HELPERS = {
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return the module of a message. Raise DefinitionError where a name cannot be one in Python."""
+    """Return the module of a message. Raise DefinitionError if a name cannot be one in Python."""
     check_types(spec, lookup)
     return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
 
@@ -105,7 +105,7 @@ def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
     """Return the source of a message's class, which finds the classes of its fields among its globals.
 
-    Raise DefinitionError where a name cannot be one in Python.
+    Raise DefinitionError if a name cannot be one in Python.
     """
     check_types(spec, lookup)
     module = _Module(_checked(lookup), imports=False)
@@ -116,7 +116,7 @@ def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
 def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
     """Return the module of a service: request, response, and the class that joins them.
 
-    Raise DefinitionError where a name cannot be one in Python.
+    Raise DefinitionError if a name cannot be one in Python.
     """
     check_type_name(spec.full_name)
     for message in (spec.request, spec.response):

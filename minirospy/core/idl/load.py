@@ -101,7 +101,7 @@ class Catalogue:
         return [self.service(f"{package}/{name}") for name in self.files(package, "srv")]
 
     def service(self, full_name: str) -> ServiceSpec:
-        """Return the spec of the service ``pkg/Name``. Raise KeyError where no file defines it, DefinitionError."""
+        """Return the spec of the service ``pkg/Name``. Raise KeyError if no file defines it, DefinitionError."""
         from minirospy.core.idl.parse import parse_service
 
         package, _, name = full_name.partition("/")
@@ -113,7 +113,7 @@ class Catalogue:
         return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
 
     def action(self, full_name: str) -> ActionSpec:
-        """Return the spec of the action ``pkg/Name``. Raise KeyError where no file defines it, DefinitionError."""
+        """Return the spec of the action ``pkg/Name``. Raise KeyError if no file defines it, DefinitionError."""
         from minirospy.core.idl.parse import parse_action
 
         package, _, name = full_name.partition("/")
@@ -160,7 +160,7 @@ _OF_OTHER_LANGUAGES = {
 
 
 def read_definition(path: Path) -> str:
-    """Return the text of a definition's file. Raise DefinitionError where it cannot be read."""
+    """Return the text of a definition's file. Raise DefinitionError if it cannot be read."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -261,13 +261,13 @@ def write_if_changed(path: Path, text: str) -> bool:
 
 
 def get_message_class(name: str) -> type[Message] | None:
-    """Return the class of ``pkg/Name``, or None where no module defines it."""
+    """Return the class of ``pkg/Name``, or None if no module defines it."""
     found: type[Message] | None = _imported(name, "msg")
     return found
 
 
 def get_service_class(name: str) -> ServiceClass | None:
-    """Return the class of the service ``pkg/Name``, or None where no module defines it."""
+    """Return the class of the service ``pkg/Name``, or None if no module defines it."""
     found: ServiceClass | None = _imported(name, "srv")
     return found
 

@@ -176,7 +176,7 @@ def check_type(field_name: str, field_type: str, field_val: object) -> None:
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
     """Return the message that publish() or a service call was given: itself, or made from field values.
 
-    Raise TypeError or AttributeError where they do not fit.
+    Raise TypeError or AttributeError if they do not fit.
     """
     if args and kwds:
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
@@ -201,7 +201,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
     """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
 
-    ``keys`` are words that represent values ("now", "auto"). Raise MessageException where a name or a number
+    ``keys`` are words that represent values ("now", "auto"). Raise MessageException if a name or a number
     of values does not fit, ValueError on values that cannot be fields.
     """
     if not is_message(msg) or isinstance(msg, type):

@@ -28,7 +28,7 @@ PRIMITIVES = {
 
 
 class FieldType(NamedTuple):
-    """A field's type: a primitive or ``pkg/Name``; ``length`` of an array is None where it varies."""
+    """A field's type: a primitive or ``pkg/Name``; ``length`` of an array is None if it varies."""
 
     base: str
     is_array: bool = False

@@ -78,7 +78,7 @@ def check_spec(spec: MessageSpec) -> None:
 def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list[str]:
     """Return the names of a message and of all types that it needs, each after those that it needs itself.
 
-    Raise DefinitionError where a name is not legal, where a message contains itself, and where it is too large or too
+    Raise DefinitionError if a name is not legal, where a message contains itself, and where it is too large or too
     deeply nested to make a class of; as well what ``lookup`` raises.
     """
     specs = {spec.full_name: spec}

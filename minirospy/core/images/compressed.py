@@ -42,7 +42,7 @@ class Options(NamedTuple):
 
 
 def opencv() -> Any:
-    """Return the module cv2; None where it is not installed."""
+    """Return the module cv2; None if it is not installed."""
     try:
         import cv2  # type: ignore[import-not-found]
     except ImportError:

@@ -37,7 +37,7 @@ _GRAY = (9798, 19235, 3735)
 
 
 def type_of_encoding(encoding: str) -> int:
-    """Return the number of an encoding's type. Raise ValueError where it is unknown."""
+    """Return the number of an encoding's type. Raise ValueError if it is unknown."""
     if encoding == _YUV:
         return _type("8U", 2)
     if match := _COLOR.match(encoding):

@@ -76,7 +76,7 @@ class TransformBuffer(FrameTree):
         return StampedTransform(second.stamp, *compose(second[1:], first[1:]))
 
     def why_not(self, target: str, source: str, time: int) -> str | None:
-        """Return None where :meth:`lookup` would succeed, else the text of tf2's can_transform.
+        """Return None if :meth:`lookup` would succeed, else the text of tf2's can_transform.
 
         Raise InvalidArgumentException on a name that no frame can have.
         """
@@ -92,7 +92,7 @@ class TransformBuffer(FrameTree):
     def why_not_full(
         self, target: str, target_time: int, source: str, source_time: int, fixed: str
     ) -> str | None:
-        """Return None where :meth:`lookup_full` would succeed, else the text of tf2's can_transform.
+        """Return None if :meth:`lookup_full` would succeed, else the text of tf2's can_transform.
 
         Raise InvalidArgumentException on a name that no frame can have.
         """
@@ -111,7 +111,7 @@ class TransformBuffer(FrameTree):
         return self._why_no_walk(fixed_frame, source_frame, source_time) if why is None else why
 
     def latest_common_time(self, target: str, source: str) -> int:
-        """Return the newest time at which :meth:`lookup` succeeds; 0 where only static transforms are between them.
+        """Return the newest time at which :meth:`lookup` succeeds; 0 if only static transforms are between them.
 
         Raise LookupException, InvalidArgumentException; a plain TransformException where they are not connected.
         """

@@ -91,7 +91,7 @@ class TimeCache:
         return None
 
     def at(self, time: int) -> Sample | None:
-        """Return the sample at ``time``, interpolated between its neighbours; None where there is none.
+        """Return the sample at ``time``, interpolated between its neighbours; None if there is none.
 
         Between samples of different parents the older one counts.
         """

@@ -153,7 +153,7 @@ class Layouts:
                 yield layout
 
     def find(self, data: bytes) -> Layout | None:
-        """Return the layout of a message; None where it is a new one, or no message."""
+        """Return the layout of a message; None if it is a new one, or no message."""
         if data[:4] == b"\1\0\0\0":
             return self._single.get(data[16:-56])
         candidates = self._several.get(len(data))
@@ -166,7 +166,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Make the layout of a message; None where it has no frame, one twice, or there are too many layouts."""
+        """Make the layout of a message; None if it has no frame, one twice, or there are too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

@@ -103,7 +103,7 @@ def _link_of(element: Element, tag: str) -> str:
 
 
 def _part(element: Element, tag: str, read: Callable[[Element], _T], context: str) -> _T | None:
-    """Return what ``read`` makes of the first child of this tag; None where there is none. Raise ElementError."""
+    """Return what ``read`` makes of the first child of this tag; None if there is none. Raise ElementError."""
     part = element.first(tag)
     if part is None:
         return None

@@ -143,7 +143,7 @@ def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -
 
 
 def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, Joint]) -> str:
-    """Return the link without a parent. Raise UrdfError where there is not one."""
+    """Return the link without a parent. Raise UrdfError if there is not one."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in sorted(links) if name not in children]
     if not roots:

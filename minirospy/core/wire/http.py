@@ -80,7 +80,7 @@ class HttpMessage(NamedTuple):
 
     @property
     def status(self) -> int:
-        """An answer's status code; 0 where there is none."""
+        """An answer's status code; 0 if there is none."""
         parts = self.head.start.split(" ", 2)
         return int(parts[1]) if len(parts) > 1 and re.fullmatch(r"[0-9]{3}", parts[1]) else 0
 
@@ -148,7 +148,7 @@ class HttpReader:
     def feed_one(self, data: bytes) -> HttpMessage | None:
         """Return the first message that is complete with ``data``, and leave the others to :meth:`next_message`.
 
-        None where the first one is not complete. Raise RpcProtocolError.
+        None if the first one is not complete. Raise RpcProtocolError.
         """
         head = self._head
         if head is not None:
@@ -200,7 +200,7 @@ class HttpReader:
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None where it has to be filled; ``head`` has been removed already."""
+        """Yield the messages in the buffer, and None if it has to be filled; ``head`` has been removed already."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))

@@ -49,7 +49,7 @@ def serialize_failure(error: Exception) -> bytes:
 
 
 def parse_request_head(head: bytes) -> int:
-    """Return the length of the body behind these :data:`REQUEST_HEAD` bytes. Raise WireError where it is over the limit."""
+    """Return the length of the body behind these :data:`REQUEST_HEAD` bytes. Raise WireError if it is over the limit."""
     length: int = _LENGTH.unpack(head)[0]
     if length > MAX_FRAME:
         raise _too_long(length)
@@ -57,7 +57,7 @@ def parse_request_head(head: bytes) -> int:
 
 
 def parse_response_head(head: bytes) -> tuple[bool, int]:
-    """Return whether the call succeeded, and the length of what follows. Raise WireError where it is over the limit."""
+    """Return whether the call succeeded, and the length of what follows. Raise WireError if it is over the limit."""
     ok, length = _OK_LENGTH.unpack(head)
     if length > MAX_FRAME:
         raise _too_long(length)

@@ -96,7 +96,7 @@ def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> S
 
 
 def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
-    """Return a successful answer as pieces of XML. Raise RpcProtocolError where it has more than ``most`` bytes."""
+    """Return a successful answer as pieces of XML. Raise RpcProtocolError if it has more than ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]
     yield from write_in_steps(value, out, 0)

@@ -31,7 +31,7 @@ class _Patterns(NamedTuple):
 
 
 def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
-    """Return the method of the call in ``body`` (None: an answer), and the parameters; None where it is not plain."""
+    """Return the method of the call in ``body`` (None: an answer), and the parameters; None if it is not plain."""
     try:
         text = body.decode("ascii")
         if text.count("<") > _MAX_TAGS:
@@ -49,7 +49,7 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
 
 
 def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
-    """Return the values that the tokens make up; None where they do not fit each other. Raise ValueError."""
+    """Return the values that the tokens make up; None if they do not fit each other. Raise ValueError."""
     if tokens and tokens[-1][4] not in {"", "</param>"}:
         # The token of what was not expected is always the last one.
         return None

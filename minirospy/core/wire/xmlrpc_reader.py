@@ -240,7 +240,7 @@ class Reader:
             most = _MAX_WIDE // _MIB
             raise RpcProtocolError(f"a text of wide characters of more than {most} MiB in memory", status=413)
 
-        # Python copies nothing where a local variable is the only one that refers to a text.
+        # Python copies nothing if a local variable is the only one that refers to a text.
         joined += more
         self._joined = joined
 

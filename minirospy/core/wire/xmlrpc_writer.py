@@ -120,7 +120,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Put away what was written; return what to yield. Raise RpcProtocolError where it is too much."""
+        """Put away what was written; return what to yield. Raise RpcProtocolError if it is too much."""
         piece = "".join(self.parts).encode()
         self.parts.clear()
         self._pieces.append(piece)

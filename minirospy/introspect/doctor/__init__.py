@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Answer the doctors of other machines until the context ends; False where no master was found."""
+        """Answer the doctors of other machines until the context ends; False if no master was found."""
         if self._listen is None:
             return False
         self._listen(report)

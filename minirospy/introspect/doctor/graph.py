@@ -52,7 +52,7 @@ _SHOWN = 5
 class NodeAnswer:
     """The answers of a node to queries; ``trouble`` if it did not answer.
 
-    ``seconds`` is how long the first call took; ``stats`` (getBusStats) only where the caller wants them.
+    ``seconds`` is how long the first call took; ``stats`` (getBusStats) only if the caller wants them.
     """
 
     node: NodeAddress

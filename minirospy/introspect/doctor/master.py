@@ -48,7 +48,7 @@ def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
 
 
 def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
-    """Yield how far the master's clock is from ours; nothing where both are this machine's."""
+    """Yield how far the master's clock is from ours; nothing if both are this machine's."""
     if place.is_local:
         return
     before = time.time()

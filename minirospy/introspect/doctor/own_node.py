@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 class DoctorNode:
     """A node with a latched message for any peer, registered while the context lasts.
 
-    Entering raises OSError where no server can be opened at this machine's address.
+    Entering raises OSError if no server can be opened at this machine's address.
     """
 
     def __init__(self, environment: Environment) -> None:

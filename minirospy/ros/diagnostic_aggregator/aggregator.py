@@ -51,7 +51,7 @@ def main() -> int:
 
 
 def analyzer_loader() -> int:
-    """Return 0 where all analyzers of the private parameters can be made, and 1 where they cannot.
+    """Return 0 if all analyzers of the private parameters can be made, and 1 where they cannot.
 
     A test program: `<test pkg="diagnostic_aggregator" type="analyzer_loader">` in a launch file with the parameters.
     """
@@ -81,7 +81,7 @@ def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
 
 
 def toplevel_level(levels: Iterable[int]) -> int:
-    """Return the level of the whole tree: stale only where all of it is; -1 of nothing."""
+    """Return the level of the whole tree: stale only if all of it is; -1 of nothing."""
     found = list(levels)
     highest = max(found, default=-1)
     return 2 if highest > 2 and min(found) <= 2 else highest

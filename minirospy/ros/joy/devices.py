@@ -50,7 +50,7 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
+        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
         """Run the motors at shares of their full power for a second. Raise RumbleError."""
@@ -86,7 +86,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
+        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -179,7 +179,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raise DeviceError where it is disconnected."""
+        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()

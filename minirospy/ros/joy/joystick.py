@@ -126,7 +126,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # What a trigger reports before it was touched is wrong: 0, where it rests at 1.
+        # What a trigger reports before it was touched is wrong: 0, if it rests at 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = LARGEST * self._options.deadzone

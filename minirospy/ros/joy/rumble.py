@@ -36,7 +36,7 @@ class RumbleError(MinirospyError):
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:
-    """Return the event device of the joystick at a path (`/dev/input/js0`); empty where it has none."""
+    """Return the event device of the joystick at a path (`/dev/input/js0`); empty if it has none."""
     found = sorted((folder / Path(joystick).name / "device").glob("event*"))
     return f"/dev/input/{found[0].name}" if found else ""
 

@@ -115,7 +115,7 @@ class KeyTeleop:
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Do what a key means ("": none was pressed in time); return the lines to show, None where nothing is to be published."""
+        """Do what a key means ("": none was pressed in time); return the lines to show, None if nothing is to be published."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []

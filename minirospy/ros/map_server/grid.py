@@ -158,7 +158,7 @@ def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians; 0 where the pitch is a right angle, as tf2's getEulerYPR.
+    """Return the rotation about z in radians; 0 if the pitch is a right angle, as tf2's getEulerYPR.
 
     0 also of the quaternion 0, 0, 0, 0, which a publisher never set: the real program writes `-nan`, which no map_server reads.
     """

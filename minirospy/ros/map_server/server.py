@@ -124,7 +124,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
 
 
 class MapServer:
-    """The map as a node: two latched topics and two services. Raise MapError where there is no map."""
+    """The map as a node: two latched topics and two services. Raise MapError if there is no map."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))

@@ -77,7 +77,7 @@ class JointPublisher:
                 pass
 
     def publish(self) -> None:
-        """Publish the state of all joints; nothing where there are none."""
+        """Publish the state of all joints; nothing if there are none."""
         with self.lock:
             if self._delta > 0:
                 self.joints.advance(self._delta)

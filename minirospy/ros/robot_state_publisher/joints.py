@@ -227,7 +227,7 @@ def _free_joint(name: str, lower: float, upper: float, kind: str, options: Joint
 
 
 def _limits(element: Element, kind: str) -> tuple[float, float] | None:
-    """Return the limits of a joint; None where they are missing or are not numbers."""
+    """Return the limits of a joint; None if they are missing or are not numbers."""
     if kind == "continuous":
         return -math.pi, math.pi
     for limit in _below(element):

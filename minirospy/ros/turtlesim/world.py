@@ -143,7 +143,7 @@ class World:
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:
-        """Return where a turtle is. Raise WorldError where there is none."""
+        """Return where a turtle is. Raise WorldError if there is none."""
         return self._turtle(name).pose
 
     def clear(self, background: Color) -> None:
@@ -173,7 +173,7 @@ class World:
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:
-        """Remove a turtle. Raise WorldError where there is none."""
+        """Remove a turtle. Raise WorldError if there is none."""
         if name not in self._turtles:
             raise WorldError(f"Tried to kill turtle [{name}], which does not exist")
         del self._turtles[name]

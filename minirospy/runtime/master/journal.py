@@ -39,7 +39,7 @@ _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 
 
 class JournalBusyError(Exception):
-    """Another master holds the journal; ``pid`` is its process, 0 where that is not known."""
+    """Another master holds the journal; ``pid`` is its process, 0 if that is not known."""
 
     def __init__(self, path: Path, pid: int) -> None:
         super().__init__(path, pid)
@@ -53,7 +53,7 @@ class JournalBusyError(Exception):
 class Left(NamedTuple):
     """The journal that a killed master left; ``age``: seconds since it last wrote.
 
-    ``copy`` is the file to which a damaged journal was copied, None where that was not possible.
+    ``copy`` is the file to which a damaged journal was copied, None if that was not possible.
     """
 
     recovered: Recovered
@@ -111,7 +111,7 @@ class Journal:
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
 
     def read(self) -> Left | None:
-        """Return what another master has left, None where that is nothing."""
+        """Return what another master has left, None if that is nothing."""
         try:
             data, written = private_files.read_file(self.path)
         except (FileNotFoundError, NotADirectoryError):

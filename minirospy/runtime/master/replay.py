@@ -30,7 +30,7 @@ class Replay:
     def apply(self, what: str, *args: Any) -> None:
         """Make one change again; the nodes that it notified then are not notified again.
 
-        Raise TypeError, ValueError, KeyError or MinirospyError where the record makes no sense.
+        Raise TypeError, ValueError, KeyError or MinirospyError if the record makes no sense.
         """
         registry, parameters = self._registry, self._parameters
         actions: Iterable[Notice] = ()

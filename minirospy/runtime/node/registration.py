@@ -92,7 +92,7 @@ class Registrations:
         self._watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """What is registered with the master; None where a call failed, or has no answer yet."""
+        """What is registered with the master; None if a call failed, or has no answer yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self._watching: asyncio.Task[None] | None = None
@@ -163,7 +163,7 @@ class Registrations:
             self._start_registering(key)
 
     async def update(self, key: _Key, *, again: bool = False) -> None:
-        """Register what this node has of one name, a part or nothing, where the master does not know it.
+        """Register what this node has of one name, a part or nothing, if the master does not know it.
 
         One call after the other for each name, and none is cancelled half way: a registration could overtake the
         unregistration before it, which would undo it, or the shutdown of the node could overtake a registration.

@@ -338,7 +338,7 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Return exactly ``count`` bytes, on the loop. Raise WireError where the peer ends before."""
+    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer ends before."""
     loop = asyncio.get_running_loop()
     try:
         buffer = bytearray(count)

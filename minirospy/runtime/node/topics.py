@@ -225,7 +225,7 @@ class InLink:
 
     @property
     def local_port(self) -> int:
-        """The port at this end; 0 where it has none, or is closed."""
+        """The port at this end; 0 if it has none, or is closed."""
         try:
             return int(self.sock.getsockname()[1]) if self.transport == "TCPROS" else 0
         except OSError:

@@ -190,7 +190,7 @@ class Connection:
         return True
 
     def _receive(self, most: int = _RECEIVE) -> bytes | None:
-        """Return the bytes that have arrived; b"" at the end, None where there are none."""
+        """Return the bytes that have arrived; b"" at the end, None if there are none."""
         try:
             return self._sock.recv(most)
         except (BlockingIOError, InterruptedError):

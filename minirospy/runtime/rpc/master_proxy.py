@@ -63,7 +63,7 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 class MasterProxy:
     """The master at ``uri``, called as the node ``caller_id``.
 
-    Each method raises MasterUnreachableError where it does not answer, RpcRefused where it refuses.
+    Each method raises MasterUnreachableError if it does not answer, RpcRefused where it refuses.
     """
 
     def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
@@ -162,7 +162,7 @@ class MasterProxy:
         self.call("deleteParam", key)
 
     def search_param(self, key: str) -> str | None:
-        """Return the closest parameter of this name, upwards from the caller's namespace; None where there is none."""
+        """Return the closest parameter of this name, upwards from the caller's namespace; None if there is none."""
         try:
             return str(self.call("searchParam", key))
         except RpcRefused:

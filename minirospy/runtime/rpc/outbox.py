@@ -13,7 +13,7 @@ MAX_UNREAD = 256 * 1024
 
 
 class Outbox:
-    """A queue of bytes in front of a socket that does not block. True where something waits in it."""
+    """A queue of bytes in front of a socket that does not block. True if something waits in it."""
 
     __slots__ = ("_pieces", "_sock", "size")
 

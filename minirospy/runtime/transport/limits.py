@@ -18,7 +18,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 @contextlib.contextmanager
 def naming_thread_limit() -> Iterator[None]:
-    """Start threads in the block. Raise ThreadLimitError where the system allows no more, instead of RuntimeError."""
+    """Start threads in the block. Raise ThreadLimitError if the system allows no more, instead of RuntimeError."""
     try:
         yield
     except RuntimeError as error:

@@ -163,7 +163,7 @@ class OutLink:
         self._on_closed(self)
 
     def _has_to_wait(self, frame: _Waiting) -> bool:
-        """Put ``frame`` behind those that wait; False where meanwhile they have all gone."""
+        """Put ``frame`` behind those that wait; False if meanwhile they have all gone."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
             # A thread that publishes without a pause would not let the loop's come to it.

@@ -51,7 +51,7 @@ def name_of(host: str, port: int) -> str:
 
 
 def bind(host: str, port: int) -> socket.socket | None:
-    """Return the socket beside ``port`` of a server that is known as ``host``; None where there can be none."""
+    """Return the socket beside ``port`` of a server that is known as ``host``; None if there can be none."""
     if sys.platform != "linux":
         return None
     try:
@@ -66,7 +66,7 @@ def connect(name: str) -> socket.socket:
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Return a connected, non-blocking socket to the server of ``host`` at ``port``; None where only TCP reaches it.
+    """Return a connected, non-blocking socket to the server of ``host`` at ``port``; None if only TCP reaches it.
 
     Other users of this machine could take a name before its server does: so the server is this user's or root's.
     """
@@ -84,7 +84,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Return the address out of a publisher's answer to requestTopic; None where it is of another protocol."""
+    """Return the address out of a publisher's answer to requestTopic; None if it is of another protocol."""
     match answer:
         # A peer must not choose any other socket of this machine, such as a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):

@@ -205,7 +205,7 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # Also where the bytes were there, but the GIL was not: other threads of this process need it.
+        # Also if the bytes were there, but the GIL was not: other threads of this process need it.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count

@@ -81,7 +81,7 @@ def enlarge_send_buffer(sock: socket.socket) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """Return a host's name as a resolver takes it. Raise OSError where it is not a host name.
+    """Return a host's name as a resolver takes it. Raise OSError if it is not a host name.
 
     A str would have the resolver import the IDNA codec, which takes a command a tenth of its time.
     """
@@ -136,7 +136,7 @@ def may_busy_poll(sock: socket.socket) -> bool:
 def busy_receive(sock: socket.socket, space: memoryview) -> int:
     """Receive what another process sends within a fifth of a millisecond, by busy-polling.
 
-    For a socket of which ``may_busy_poll`` is true. Raise BlockingIOError where nothing comes, OSError.
+    For a socket of which ``may_busy_poll`` is true. Raise BlockingIOError if nothing comes, OSError.
     """
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:

@@ -60,7 +60,7 @@ def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
 
 
 async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECONDS) -> socket.socket:
-    """Return a connected, non-blocking socket. Raise OSError, also where the time is up."""
+    """Return a connected, non-blocking socket. Raise OSError, also if the time is up."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
 
@@ -94,7 +94,7 @@ class HeaderMemory:
         self._most = most
 
     def reserve(self, count: int) -> None:
-        """Reserve memory, to be returned by :meth:`free`. Raise WireError where it is too much."""
+        """Reserve memory, to be returned by :meth:`free`. Raise WireError if it is too much."""
         if self.held + count > self._most:
             raise WireError("too many long connection headers are being received at the same time")
         self.held += count

@@ -90,7 +90,7 @@ class BagFolder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Return the file for a recording. Raise UsageError where the name is none, or is in use."""
+        """Return the file for a recording. Raise UsageError if the name is none, or is in use."""
         stem = name.removesuffix(suffix)
         if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
             raise UsageError(

@@ -105,7 +105,7 @@ class BoardSession(JsonSession):
 
     async def _press(self, fields: Fields) -> None:
         pin = _pin(fields["press"])
-        # Released in any case, also where the client leaves before the answer.
+        # Released in any case, also if the client leaves before the answer.
         self._pressed.add(pin)
         await self.in_thread(partial(self._opened().press, pin))
 

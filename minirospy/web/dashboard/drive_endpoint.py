@@ -239,7 +239,7 @@ class _Driven:
         held: Velocity | Joystick,
         stopped: Callable[[str], None],
     ) -> None:
-        """Raise BridgeError where the topic may not be published, or has another type."""
+        """Raise BridgeError if the topic may not be published, or has another type."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard
@@ -254,7 +254,7 @@ class _Driven:
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Velocity | Joystick) -> None:
-        """Publish what is held; it is zero where no more comes in time. Raise BridgeError where nothing could stop it."""
+        """Publish what is held; it is zero where no more comes in time. Raise BridgeError if nothing could stop it."""
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:
             self._guard.disarm(self._silent)

@@ -99,7 +99,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     def publish(self, *, is_on: bool) -> None:
-        """Publish from now on, or no more. Raise UsageError where clients may not publish the topic."""
+        """Publish from now on, or no more. Raise UsageError if clients may not publish the topic."""
         topic = self.node.resolve(_TOPIC)
         if is_on and not self._graph().filters.publishable(topic):
             raise UsageError(f"topic [{topic}] may not be published by clients")

@@ -85,7 +85,7 @@ class JsonSession:
     # --- for subclasses
 
     def refusal(self) -> str:
-        """Return why this client may carry out no operation, empty where it may."""
+        """Return why this client may carry out no operation, empty if it may."""
         if self.owners_only and not self.client.is_owner:
             return self.client.why_not_owner(self.owners_only)
         return ""

@@ -162,7 +162,7 @@ class LaunchRun:
         return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
 
     def log_file(self, node: str) -> Path | None:
-        """Return the file with what a node prints; None where there is none yet."""
+        """Return the file with what a node prints; None if there is none yet."""
         process = self._known.get(node)
         return process.stdout_file if process else None
 
@@ -181,7 +181,7 @@ class LaunchRun:
         self._thread.join()
 
     def end_node(self, name: str, *, restarts: bool) -> None:
-        """End one node, and start it again if wanted. Raise UsageError where it does not run."""
+        """End one node, and start it again if wanted. Raise UsageError if it does not run."""
         launcher, process = self._launcher, self._known.get(name)
         if not launcher or not process or not process.is_running or self._state != "running":
             raise UsageError(f"node [{name[:200]}] does not run")

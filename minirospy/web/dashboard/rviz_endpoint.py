@@ -34,7 +34,7 @@ _T = TypeVar("_T")
 
 
 def read_file(path: Path) -> dict[str, object] | None:
-    """Return the contents of a .rviz file, None where there is none. Raise RvizFileError."""
+    """Return the contents of a .rviz file, None if there is none. Raise RvizFileError."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             text = file.read(MAX_CHARACTERS + 1)

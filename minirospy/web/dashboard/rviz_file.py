@@ -112,7 +112,7 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 def format_rviz(config: Mapping[str, object]) -> str:
     """Return the text of a .rviz file: sorted names, lists one step to the right of their name, as RViz writes them.
 
-    Raise RvizFileError where it is nested more deeply than what :func:`parse_rviz` reads.
+    Raise RvizFileError if it is nested more deeply than what :func:`parse_rviz` reads.
     """
     return "".join(f"{line}\n" for line in _lines(config, 1)) or "{}\n"
 

@@ -251,7 +251,7 @@ class ToolsSession(JsonSession):
     async def _type(self, fields: Fields) -> Fields:
         """Return the full definition of the message type ``name``, of the packages that are installed here.
 
-        With ``topic`` instead, of the type that the master knows of it, also where it is only subscribed.
+        With ``topic`` instead, of the type that the master knows of it, also if it is only subscribed.
         """
         if "topic" in fields:
             topic = text_of(fields, "topic")

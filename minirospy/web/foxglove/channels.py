@@ -75,7 +75,7 @@ class Channels:
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
         """Return the channel that replaces one whose publisher sends messages of another definition.
 
-        None where the channel has been removed, or the definition was replaced before: publishers that contradict each other.
+        None if the channel has been removed, or the definition was replaced before: publishers that contradict each other.
         """
         md5sum = header.get("md5sum", ANY)
         if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:

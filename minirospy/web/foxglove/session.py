@@ -169,7 +169,7 @@ class FoxgloveSession:
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
-        """Raise BridgeError where the client may not do this."""
+        """Raise BridgeError if the client may not do this."""
         if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"

@@ -173,7 +173,7 @@ class Rosapi:
     # --- services
 
     async def _type_of(self, service: str) -> str:
-        """Return a service's type; nothing where it does not answer."""
+        """Return a service's type; nothing if it does not answer."""
         if not self._filters.services(service):
             return ""
         async with self._probing:
@@ -299,7 +299,7 @@ def _known(type_: str | None) -> str:
 
 
 def _text_of(type_: str) -> str:
-    """Return the full text of a type; nothing where it is not installed."""
+    """Return the full text of a type; nothing if it is not installed."""
     try:
         text: str = message_class(type_)._full_text
     except BridgeError:

@@ -25,7 +25,7 @@ _NOT_AN_ARRAY = -1
 
 @dataclass
 class TypeDefinition:
-    """A type's fields and constants; ``lengths``: -1 where a field is not an array, 0 where its length varies."""
+    """A type's fields and constants; ``lengths``: -1 where a field is not an array, 0 if its length varies."""
 
     type: str
     names: list[str] = field(default_factory=list)

@@ -18,7 +18,7 @@ SERVICE = "authenticate"
 
 
 async def authenticate(node: Node, event: Auth) -> bool:
-    """Return whether rosauth's node accepts a client. Raise ServiceException where it cannot be called."""
+    """Return whether rosauth's node accepts a client. Raise ServiceException if it cannot be called."""
     class_: Any = service_class("rosauth/Authentication")
     response = await node.call(
         SERVICE,

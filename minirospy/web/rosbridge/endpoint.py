@@ -129,11 +129,11 @@ class RosbridgeEndpoint:
         self._encoded.pop(topic, None)
 
     def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class of a message that came, None where nobody knows it."""
+        """Return the class of a message that came, None if nobody knows it."""
         return self._types.of(arrival.header)
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients get it, encoded once for all of them. Raise BridgeError where it cannot be."""
+        """Return a message as clients get it, encoded once for all of them. Raise BridgeError if it cannot be."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}

@@ -65,7 +65,7 @@ class ClientService:
     """A service that a client offers: calls of the graph go to it, and its answers back."""
 
     def __init__(self, session: RosbridgeSession, graph: SharedGraph, name: str, type_: str) -> None:
-        """Raise BridgeError where the type is unknown, ServiceException where this node offers the service itself."""
+        """Raise BridgeError if the type is unknown, ServiceException where this node offers the service itself."""
         self.session = session
         self.name = name
         self._graph = graph

@@ -466,7 +466,7 @@ class RosbridgeSession:
         self.status(StatusLevel.INFO, f"Unsubscribed from {event.topic}", event.id)
 
     async def _type_of(self, topic: str) -> str:
-        """Return the type that a topic has in the graph. Raise BridgeError where it has none."""
+        """Return the type that a topic has in the graph. Raise BridgeError if it has none."""
         resolved = self._graph.node.resolve(topic)
         if self._graph.snapshot.types.get(resolved, ANY) == ANY:
             await self._graph.look()

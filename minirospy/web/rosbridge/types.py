@@ -75,7 +75,7 @@ class ArrivingTypes:
         self._classes: dict[tuple[str, str], type[Message] | None] = {}
 
     def of(self, header: Header) -> type[Message] | None:
-        """Return the class of a publisher's messages, None where nobody knows it."""
+        """Return the class of a publisher's messages, None if nobody knows it."""
         key = header.get("type", ""), header.get("md5sum", "")
         if key not in self._classes:
             if len(self._classes) > 1000:

@@ -641,7 +641,7 @@ class Connection:
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
-    """Return the site of the page that sends a request; None where it is not one.
+    """Return the site of the page that sends a request; None if it is not one.
 
     A browser names it in Origin, but not for an image or a frame: there it says that the page is of another site, and
     may name that in Referer. Source: https://www.w3.org/TR/fetch-metadata/.

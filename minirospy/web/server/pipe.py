@@ -178,7 +178,7 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # The peer gets what was sent, also where it has sent more than was read.
+            # The peer gets what was sent, also if it has sent more than was read.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()

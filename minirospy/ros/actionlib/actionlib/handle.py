@@ -168,7 +168,7 @@ class ServerGoalHandle:
             self.action_server.publish_feedback(self.status_tracker.status, feedback)
 
     def get_goal(self) -> Any:
-        """Return the goal; None where the handle holds none."""
+        """Return the goal; None if the handle holds none."""
         return self.goal.goal if self.goal else None
 
     def get_goal_id(self) -> GoalID:

@@ -76,7 +76,7 @@ class SimpleActionServer:
         self.action_server.start()
 
     def accept_new_goal(self) -> Any:
-        """Begin with the goal that waits, and return it; the one that runs is preempted. None where none waits."""
+        """Begin with the goal that waits, and return it; the one that runs is preempted. None if none waits."""
         with self.lock:
             if not self.new_goal or not self.next_goal.get_goal():
                 rospy.logerr("Attempting to accept the next goal when a new goal is not available")

@@ -54,7 +54,7 @@ class StatusList(GoalStatusArray):
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:
-        """Return the status of a goal; None where the list does not have it."""
+        """Return the status of a goal; None if the list does not have it."""
         name = id.encode()
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
@@ -117,7 +117,7 @@ class StatusList(GoalStatusArray):
 
 
 def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
-    """Return the status of a goal in a GoalStatusArray; None where it does not have it."""
+    """Return the status of a goal in a GoalStatusArray; None if it does not have it."""
     if isinstance(statuses, StatusList):
         return statuses.find(id)
     for status in statuses.status_list:

@@ -27,7 +27,7 @@ _SLICE_SECONDS = 0.25
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 where the goal succeeded."""
+    """Run the command; return 0 if the goal succeeded."""
     return COMMAND.main(argv)
 
 

@@ -64,7 +64,7 @@ def _axserver(action: str, type: str) -> None:
 
 
 def _answer(server: SimpleActionServer) -> bool:
-    """Prompt for actions until the goal has ended; return False where the input ends: then it is aborted."""
+    """Prompt for actions until the goal has ended; return False if the input ends: then it is aborted."""
     types = server.action_server
     endings: dict[str, Callable[..., None]] = {
         "s": server.set_succeeded,

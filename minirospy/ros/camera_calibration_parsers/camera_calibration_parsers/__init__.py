@@ -27,7 +27,7 @@ _WRITERS = {".yaml": yaml_of, ".yml": yaml_of, ".ini": ini_of}
 def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
     """Return the camera's name and its parameters from a .yaml, .yml or .ini file.
 
-    None where there is none, or it is not a calibration; the reason is logged.
+    None if there is none, or it is not a calibration; the reason is logged.
     """
     parse = _PARSERS.get(Path(file_name).suffix)
     if parse is None:
@@ -47,7 +47,7 @@ def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
 def writeCalibration(file_name: str, camera_name: str, cinfo: CameraInfo) -> bool:
     """Write a calibration as .yaml, .yml or .ini, folders included, with ROS's text; ROS has this in C++ alone.
 
-    Returns False where it cannot be written, or is of another kind; the reason is logged.
+    Returns False if it cannot be written, or is of another kind; the reason is logged.
     """
     write = _WRITERS.get(Path(file_name).suffix)
     if write is None:

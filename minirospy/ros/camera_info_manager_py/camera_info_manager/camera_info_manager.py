@@ -104,7 +104,7 @@ class CameraInfoManager:
         return SetCameraInfoResponse(success=False, status_message="Error storing camera calibration.")
 
     def setCameraName(self, cname: str) -> bool:
-        """Set the camera's name, of letters, digits and ``_``; return False where it is not one.
+        """Set the camera's name, of letters, digits and ``_``; return False if it is not one.
 
         The calibration has to be loaded again, since its file may be another one.
         """
@@ -115,7 +115,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the URL of the calibration, which has to be loaded again; return False where it is not one."""
+        """Set the URL of the calibration, which has to be loaded again; return False if it is not one."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:

@@ -46,7 +46,7 @@ class ZoomCameraInfoManager(CameraInfoManager):
         self._zoom = min_zoom
 
     def set_zoom(self, zoom: float) -> None:
-        """Compute the calibration of a zoom level. Raise CameraInfoError where it is outside of the limits."""
+        """Compute the calibration of a zoom level. Raise CameraInfoError if it is outside of the limits."""
         if not self._min_zoom <= zoom <= self._max_zoom:
             raise CameraInfoError("Zoom got outside the allowed range")
         self._zoom = zoom
@@ -142,7 +142,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
     def loadCameraInfo(self) -> None:
         """Load all calibrations.
 
-        Raise CameraInfoMissingError where their package is missing, CameraInfoError where they are fewer than two.
+        Raise CameraInfoMissingError if their package is missing, CameraInfoError where they are fewer than two.
         """
         super().loadCameraInfo()
         self._camera_infos = {level: self._load(level) for level in self._zoom_levels}

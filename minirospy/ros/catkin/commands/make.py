@@ -167,7 +167,7 @@ def _catkin_make(
 
 
 def _check_folders(command: str, workspace: Workspace) -> None:
-    """Raise BuildError where the folder is not a workspace's."""
+    """Raise BuildError if the folder is not a workspace's."""
     if not workspace.source.is_dir():
         raise BuildError(
             str(workspace.source),

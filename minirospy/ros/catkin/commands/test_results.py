@@ -44,7 +44,7 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 where all passed, 1 after errors or failures, or if the folder does not exist."""
+    """Run the command; return 0 if all passed, 1 after errors or failures, or if the folder does not exist."""
     return COMMAND.main(argv)
 
 

@@ -9,7 +9,7 @@ __all__ = ["CvBridge", "CvBridgeError", "getCvType"]
 
 
 def getCvType(encoding: str) -> int:
-    """Return OpenCV's number of an encoding's type, as CV_8UC3 = 16. Raise RuntimeError where it is unknown."""
+    """Return OpenCV's number of an encoding's type, as CV_8UC3 = 16. Raise RuntimeError if it is unknown."""
     try:
         return type_of_encoding(encoding)
     except ValueError as error:

@@ -41,7 +41,7 @@ class CvBridge:
         }
 
     def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[numpy.generic], n_channels: int) -> str:
-        """Return the name of an array's type, such as 8UC3. Raise CvBridgeError where OpenCV has none."""
+        """Return the name of an array's type, such as 8UC3. Raise CvBridgeError if OpenCV has none."""
         if dtype.name not in self.numpy_type_to_cvtype:
             raise CvBridgeError(
                 f"images of {dtype.name} have no encoding: there is {', '.join(DEPTHS.values())}"
@@ -83,7 +83,7 @@ class CvBridge:
     ) -> Image:
         """Return the message of an image.
 
-        Raise CvBridgeError where its type is not that of the encoding, TypeError where it is not an array.
+        Raise CvBridgeError if its type is not that of the encoding, TypeError where it is not an array.
         """
         _check_array(cvim)
         message = Image()
@@ -117,7 +117,7 @@ class CvBridge:
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
         """Return the compressed message of an image: jpg, png, bmp, tiff, webp, ...
 
-        Raise CvBridgeError where the format cannot hold it, TypeError where it is not an array.
+        Raise CvBridgeError if the format cannot hold it, TypeError where it is not an array.
         """
         _check_array(cvim)
         try:

@@ -193,7 +193,7 @@ def _plain(value: object) -> object:
 
 
 def _connect() -> None:
-    """Become a node. Raise MasterUnreachableError, where ROS waits for a master without a word."""
+    """Become a node. Raise MasterUnreachableError, if ROS waits for a master without a word."""
     _check_master()
     rospy.init_node("dynparam", anonymous=True)
 
@@ -213,7 +213,7 @@ def _values_of(node: str, timeout: float | None) -> Config | None:
 
 
 def _change(node: str, values: Values, timeout: float | None) -> None:
-    """Change values at a node. Raise ROSException where it is not there in time, MinirospyError where it fails."""
+    """Change values at a node. Raise ROSException if it is not there in time, MinirospyError where it fails."""
     from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.client import Client
 
     client = Client(node, timeout=timeout)

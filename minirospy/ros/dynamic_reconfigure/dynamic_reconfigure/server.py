@@ -54,7 +54,7 @@ class Server:
     ) -> None:
         """``type``: the module package.cfg.NAMEConfig; ``namespace``: of its names, in the node's own one.
 
-        Raise DynamicReconfigureCallbackException where the callback returns None, and what it raises.
+        Raise DynamicReconfigureCallbackException if the callback returns None, and what it raises.
         """
         self.mutex = threading.Lock()
         if not namespace or namespace == "~":

@@ -11,12 +11,12 @@ __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 
 
 def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
-    """Return what the md5sum of a message counts. Raise KeyError where it needs what is not known."""
+    """Return what the md5sum of a message counts. Raise KeyError if it needs what is not known."""
     return digest.md5_text(parsed_message(spec), lookup_in(msg_context))
 
 
 def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the md5sum of a message or service. Raise KeyError where it needs what is not known."""
+    """Return the md5sum of a message or service. Raise KeyError if it needs what is not known."""
     if isinstance(spec, SrvSpec):
         return digest.service_md5(parsed_service(spec.text, spec.full_name), lookup_in(msg_context))
     return digest.message_md5(parsed_message(spec), lookup_in(msg_context))

@@ -100,7 +100,7 @@ class MsgContext:
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """Return the file of a definition; None where that is not known."""
+        """Return the file of a definition; None if that is not known."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:

@@ -61,7 +61,7 @@ class _Constant(NamedTuple):
 
 
 class Constant(_Constant):
-    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raise ValueError where one is None."""
+    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raise ValueError if one is None."""
 
     __slots__ = ()
 
@@ -208,7 +208,7 @@ def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
 
 
 def why_invalid(text: str) -> str | None:
-    """Return genmsg's words for the first fault of a definition; None where genmsg finds none."""
+    """Return genmsg's words for the first fault of a definition; None if genmsg finds none."""
     names: list[str] = []
     for line in text.splitlines():
         bare = line.split("#")[0].strip()

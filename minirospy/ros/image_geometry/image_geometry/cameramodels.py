@@ -32,7 +32,7 @@ __all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
 
 
 def mkmat(rows: int, cols: int, L: Sequence[float]) -> Matrix:
-    """Return a matrix of these values, row by row. Raise ValueError where they are not ``rows`` x ``cols``."""
+    """Return a matrix of these values, row by row. Raise ValueError if they are not ``rows`` x ``cols``."""
     import numpy as np
 
     return np.array(L, np.float64).reshape(rows, cols).view(np.matrix)
@@ -82,7 +82,7 @@ class PinholeCameraModel:
     def rectifyImage(self, raw: Array, rectified: Array) -> None:
         """Write the rectified image of a raw one into ``rectified``, an array of the same shape and type.
 
-        By OpenCV where it is installed, else by numpy with the same interpolation. Raise ValueError where the arrays do
+        By OpenCV where it is installed, else by numpy with the same interpolation. Raise ValueError if the arrays do
         not fit each other, or an uncalibrated camera has no size.
         """
         self._check()

@@ -33,7 +33,7 @@ _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return the rectified pixel of a raw one. Raise ValueError where D has another number of coefficients."""
+    """Return the rectified pixel of a raw one. Raise ValueError if D has another number of coefficients."""
     import numpy as np
 
     k = _coefficients(D)
@@ -63,7 +63,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels of rectified ones, all u and all v. Raise ValueError where D has another length."""
+    """Return the raw pixels of rectified ones, all u and all v. Raise ValueError if D has another length."""
     import numpy as np
 
     k = _coefficients(D)

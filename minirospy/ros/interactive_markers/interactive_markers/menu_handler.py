@@ -51,7 +51,7 @@ class MenuHandler:
         command: str = "",
         callback: Callback | None = None,
     ) -> int | None:
-        """Add an entry, below ``parent`` where that is given; return its handle, None where there is no such parent."""
+        """Add an entry, below ``parent`` where that is given; return its handle, None if there is no such parent."""
         handle = self.doInsert(title, command_type, command, callback)
         if parent is None:
             self.top_level_handles_.append(handle)

@@ -93,7 +93,7 @@ class Tree:
         self._segments: dict[str, Segment] = {}
 
     def addSegment(self, segment: Segment, hook_name: str) -> bool:
-        """Add a segment below a link; return False where that is not there, or the segment is there already."""
+        """Add a segment below a link; return False if that is not there, or the segment is there already."""
         name = segment.getName()
         is_known = hook_name == self._root or hook_name in self._segments
         if not is_known or name in self._segments or name == self._root:
@@ -110,7 +110,7 @@ class Tree:
         return sum(segment.is_moving for segment in self._segments.values())
 
     def getChain(self, chain_root: str, chain_tip: str) -> Chain:
-        """Return the segments from a link down to one below it. Raise ValueError where it is not below."""
+        """Return the segments from a link down to one below it. Raise ValueError if it is not below."""
         found: list[Segment] = []
         link = chain_tip
         while link != chain_root:

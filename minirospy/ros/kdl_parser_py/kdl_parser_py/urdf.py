@@ -23,7 +23,7 @@ def treeFromFile(filename: str) -> tuple[bool, Tree]:
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Return the tree of a parameter. Raise KeyError where it is not set, UrdfError."""
+    """Return the tree of a parameter. Raise KeyError if it is not set, UrdfError."""
     from minirospy import client as rospy
 
     return True, tree_of(parse_robot(rospy.get_param(param), param))

@@ -61,8 +61,8 @@ class LaserProjection:
         """Return the cloud of a scan, in the scan's frame; ranges outside of the scan's limits are left out.
 
         ``range_cutoff``: meters from which on points are left out, too; negative for the scan's own limit.
-        ``channel_options``: the fields, of ``ChannelOption``; ``INTENSITY`` only where the scan has any.
-        Raise IndexError where the scan has fewer intensities than ranges.
+        ``channel_options``: the fields, of ``ChannelOption``; ``INTENSITY`` only if the scan has any.
+        Raise IndexError if the scan has fewer intensities than ranges.
         """
         import numpy as np
 

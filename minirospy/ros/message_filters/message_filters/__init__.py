@@ -180,7 +180,7 @@ class TimeSynchronizer(SimpleFilter):
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
         """Store a message of an input; pass on each set that is complete.
 
-        Raise AttributeError where it has no header.
+        Raise AttributeError if it has no header.
         """
         stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         with self.lock:

@@ -73,7 +73,7 @@ class Vector:
         return self._component(2, value)
 
     def Norm(self, eps: float = EPSILON) -> float:
-        """Return the length; 0 where it is below ``eps``."""
+        """Return the length; 0 if it is below ``eps``."""
         length = math.hypot(*self._v)
         return 0.0 if length < eps else length
 

@@ -44,7 +44,7 @@ def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
 
 @converts_from_numpy(Vector3)
 def numpy_to_vector3(arr: Array) -> object:
-    """Return three values, or four of which the last is 0, as a vector. Raise AssertionError where it is not."""
+    """Return three values, or four of which the last is 0, as a vector. Raise AssertionError if it is not."""
     if arr.shape[-1] == 4:
         assert np.all(arr[..., -1] == 0)
         arr = arr[..., :-1]
@@ -73,7 +73,7 @@ def quat_to_numpy(msg: Quaternion) -> Floats:
 
 @converts_from_numpy(Quaternion)
 def numpy_to_quat(arr: Array) -> object:
-    """Return x, y, z, w as a quaternion. Raise AssertionError where there are not four."""
+    """Return x, y, z, w as a quaternion. Raise AssertionError if there are not four."""
     assert arr.shape[-1] == 4
     return _each(arr, 1, lambda row: Quaternion(*row.tolist()))
 
@@ -86,7 +86,7 @@ def transform_to_numpy(msg: Transform) -> Floats:
 
 @converts_from_numpy(Transform)
 def numpy_to_transform(arr: Array) -> object:
-    """Return a 4x4 matrix as a transform. Raise AssertionError where it is not one."""
+    """Return a 4x4 matrix as a transform. Raise AssertionError if it is not one."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Transform(*_parts(matrix, Vector3)))
 
@@ -99,7 +99,7 @@ def pose_to_numpy(msg: Pose) -> Floats:
 
 @converts_from_numpy(Pose)
 def numpy_to_pose(arr: Array) -> object:
-    """Return a 4x4 matrix as a pose. Raise AssertionError where it is not one."""
+    """Return a 4x4 matrix as a pose. Raise AssertionError if it is not one."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Pose(*_parts(matrix, Point)))
 

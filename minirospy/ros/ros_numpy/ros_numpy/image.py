@@ -24,7 +24,7 @@ def image_to_numpy(msg: Image) -> Array:
 
 @converts_from_numpy(Image)
 def numpy_to_image(arr: Array, encoding: str) -> Image:
-    """Return an array as an image of an encoding. Raise TypeError where the encoding has another type."""
+    """Return an array as an image of an encoding. Raise TypeError if the encoding has another type."""
     dtype, channels = CvBridge().encoding_to_dtype_with_channels(encoding)
     if arr.ndim not in (2, 3):
         raise TypeError("Array must be two or three dimensional")

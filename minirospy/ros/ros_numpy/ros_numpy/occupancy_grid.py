@@ -17,7 +17,7 @@ __all__ = ["numpy_to_occupancy_grid", "occupancygrid_to_numpy"]
 
 @converts_to_numpy(OccupancyGrid)
 def occupancygrid_to_numpy(msg: OccupancyGrid) -> np.ma.MaskedArray[tuple[int, int], np.dtype[np.int8]]:
-    """Return a map whose unknown cells, -1, are masked. Raise ValueError where it has less data than its size needs."""
+    """Return a map whose unknown cells, -1, are masked. Raise ValueError if it has less data than its size needs."""
     data = np.asarray(msg.data, dtype=np.int8).reshape(msg.info.height, msg.info.width)
     return np.ma.MaskedArray(data, mask=data == -1, fill_value=-1)
 

@@ -42,7 +42,7 @@ _DATATYPES = {np.dtype(dtype): datatype for datatype, dtype in _DTYPES.items()}
 def fields_to_dtype(
     fields: list[PointField], point_step: int, is_bigendian: bool = False
 ) -> np.dtype[np.void]:
-    """Return the type of a point. Raise ValueError where a field's type is unknown."""
+    """Return the type of a point. Raise ValueError if a field's type is unknown."""
     ordered = sorted(fields, key=lambda each: each.offset)
     for each in ordered:
         if each.datatype not in _DTYPES:
@@ -67,7 +67,7 @@ def fields_to_dtype(
 
 @converts_from_numpy(PointField, plural=True)
 def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
-    """Return the fields of a structured type. Raise KeyError where a point cannot have a type."""
+    """Return the fields of a structured type. Raise KeyError if a point cannot have a type."""
     fields = []
     for name in dtype.names or ():
         item, offset = dtype.fields[name][:2]  # type: ignore[index]
@@ -80,7 +80,7 @@ def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
 def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
     """Return the points as a read-only view of the message: (height, width), or (width,) of one row with ``squeeze``.
 
-    Raise ValueError where the message has less data than its size needs.
+    Raise ValueError if the message has less data than its size needs.
     """
     dtype = fields_to_dtype(cloud_msg.fields, cloud_msg.point_step, bool(cloud_msg.is_bigendian))
     shape = cloud_msg.height, cloud_msg.width

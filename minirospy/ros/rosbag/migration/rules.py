@@ -409,7 +409,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Return the classes of a full text, and the first one; nothing where a rule is for half a migration."""
+    """Return the classes of a full text, and the first one; nothing if a rule is for half a migration."""
     from minirospy.core.idl.load import classes_from_text
 
     if not type_:

@@ -362,7 +362,7 @@ class Bag(OpenedBag):
     def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
         """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
 
-        Raise ROSBagException where the bag already has chunks, as the real module does.
+        Raise ROSBagException if the bag already has chunks, as the real module does.
         """
         if self._current().chunks:
             raise ROSBagException("Cannot set encryptor after chunks are written")
@@ -373,7 +373,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None where it does not exist."""
+        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None if it does not exist."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text

@@ -80,7 +80,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raise NotFoundError where neither is known."""
+    """Return a hint for a missing program or package. Raise NotFoundError if neither is known."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:

@@ -129,7 +129,7 @@ def _missing(
 
 
 def _module(key: str) -> tuple[str, str] | None:
-    """Return the module and the name on PyPI that a key represents; None where it is not a key of Python."""
+    """Return the module and the name on PyPI that a key represents; None if it is not a key of Python."""
     match = _PYTHON_KEY.match(key)
     if match is None:
         return None

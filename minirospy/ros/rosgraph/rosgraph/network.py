@@ -43,7 +43,7 @@ class ROSHandshakeException(Exception):
 
 
 def get_address_override() -> str | None:
-    """Return ROS_HOSTNAME, or else ROS_IP; None where neither is set. With MINIROSPY_LOCAL=1 it is localhost."""
+    """Return ROS_HOSTNAME, or else ROS_IP; None if neither is set. With MINIROSPY_LOCAL=1 it is localhost."""
     if is_local(os.environ):
         return "localhost"
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
@@ -147,7 +147,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
     """Return the connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
 
-    Raise ROSHandshakeException where the peer ends before.
+    Raise ROSHandshakeException if the peer ends before.
     """
     data = b.getvalue()
     while len(data) < LENGTH_BYTES or len(data) < LENGTH_BYTES + parse_length(data):

@@ -70,7 +70,7 @@ class LaunchOptions(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command, 1 also where a required node died of a fault."""
+    """Run the command; return the exit status as in minirospy.command.command, 1 also if a required node died of a fault."""
     return COMMAND.main(argv)
 
 

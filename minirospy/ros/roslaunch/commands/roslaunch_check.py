@@ -23,7 +23,7 @@ _CLASS = "roslaunch.RoslaunchCheck"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 where all files are right, 1 where one is not."""
+    """Run the command; return 0 if all files are right, 1 where one is not."""
     return COMMAND.main(argv)
 
 

@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def get_run_id() -> str | None:
-    """Return the id of the current run; None where no master answers, or it has none."""
+    """Return the id of the current run; None if no master answers, or it has none."""
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
     try:
         return str(master.get_param("/run_id"))

@@ -30,7 +30,7 @@ def run_child(
 ) -> int:
     """Be the child ``name`` of the roslaunch at the URI ``parent``, until it or a signal ends it; return the exit status.
 
-    Raise MinirospyError where the parent does not answer.
+    Raise MinirospyError if the parent does not answer.
     """
 
     def listener(level: int, text: str) -> None:

@@ -92,7 +92,7 @@ class Tag:
             raise self.error(str(error)) from error
 
     def optional(self, key: str) -> str | None:
-        """Return an attribute, substitutions made; None where it is not there. Raise LaunchError."""
+        """Return an attribute, substitutions made; None if it is not there. Raise LaunchError."""
         text = self.element.attributes.get(key)
         return None if text is None else self.resolve(text)
 

@@ -28,7 +28,7 @@ _START_SECONDS = 60.0
 class LaunchMaster:
     """The master that the nodes of a launch use.
 
-    ``pause(seconds)`` waits, and raises KeyboardInterrupt where the run has been stopped meanwhile.
+    ``pause(seconds)`` waits, and raises KeyboardInterrupt if the run has been stopped meanwhile.
     """
 
     def __init__(self, environment: Environment, output: Output, pause: Callable[[float], None]) -> None:
@@ -62,7 +62,7 @@ class LaunchMaster:
         self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
-        """Start a master on this machine. Raise MasterUnreachableError where it belongs on another, MinirospyError."""
+        """Start a master on this machine. Raise MasterUnreachableError if it belongs on another, MinirospyError."""
         if not self._environment.master_is_local:
             # Its error names what is wrong: a name without an address, a master that is suspended.
             self._proxy.get_pid()

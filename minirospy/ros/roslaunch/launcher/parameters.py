@@ -175,7 +175,7 @@ def _pass_on(reading: int, end: bytearray) -> None:
 def _command_words(words: list[str]) -> list[str]:
     """Return the words that run a command: a package's Python program by this interpreter, as its nodes are; xacro as ours.
 
-    So a launch file finds xacro also where no virtual environment is active, and never that of ROS 2.
+    So a launch file finds xacro also if no virtual environment is active, and never that of ROS 2.
     """
     if not words:
         return words

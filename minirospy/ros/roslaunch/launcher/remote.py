@@ -126,7 +126,7 @@ class RemoteMachines:
         return any(child.running and child.ssh.is_running for child in self._children.values())
 
     def start(self, nodes: Sequence[tuple[NodeSpec, MachineSpec]]) -> None:
-        """Start nodes on their machines. Raise LaunchError where a machine cannot be reached."""
+        """Start nodes on their machines. Raise LaunchError if a machine cannot be reached."""
         if self._environment.master_address[0] in ("localhost", "127.0.0.1", "::1"):
             self._output.warn(
                 f"WARNING: ROS_MASTER_URI [{self._environment.master_uri}] means another master on another machine: "

@@ -177,7 +177,7 @@ class Launcher:
         return here, elsewhere
 
     def _check(self, here: list[NodeSpec], elsewhere: list[NodeSpec]) -> None:
-        """Raise LaunchError where a node cannot be run."""
+        """Raise LaunchError if a node cannot be run."""
         if elsewhere and self._environment.local:
             node = elsewhere[0]
             why = f"node [{node.name}] is for machine [{node.machine}]"
@@ -251,13 +251,13 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """The signal, or who called stop(), that ended the run; empty where the nodes ended it."""
+        """The signal, or who called stop(), that ended the run; empty if the nodes ended it."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
         """Watch the nodes until they, or a required one, have exited, or stop() was called; return the exit status.
 
-        ``forever``: also where no node is left.
+        ``forever``: also if no node is left.
         """
         if not forever and not self.supervisor.is_anything_left:
             self._output.print("No processes to monitor", bold=True)

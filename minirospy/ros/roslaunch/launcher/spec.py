@@ -16,7 +16,7 @@ class NodeSpec:
     """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` hold those of the groups around it too.
 
     ``name`` ends in a slash where a ``<test>`` has none: its parameters are in the namespace, and it is ``named()`` when it runs.
-    ``output`` and ``cwd`` are empty where the file does not set them, which means ``log`` and ``ROS_HOME``.
+    ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and ``ROS_HOME``.
     """
 
     name: str
@@ -112,7 +112,7 @@ class ParameterCommand:
 
 @dataclass(frozen=True)
 class ArgDoc:
-    """An ``<arg>`` of the first file: its default (None where it is required), and its doc."""
+    """An ``<arg>`` of the first file: its default (None if it is required), and its doc."""
 
     name: str
     default: str | None

@@ -95,7 +95,7 @@ class Supervisor:
         self.master: Process | None = None
         """The master, where this launch has started one."""
         self.stopped_by = ""
-        """The signal, or who called stop(), that ended the run; empty where the nodes ended it."""
+        """The signal, or who called stop(), that ended the run; empty if the nodes ended it."""
 
     @property
     def is_anything_left(self) -> bool:
@@ -138,7 +138,7 @@ class Supervisor:
     def watch(self, *, forever: bool = False) -> int | None:
         """Watch until all processes, or a required one, have exited, or stop() was called.
 
-        Return the exit status; None where no process is left. ``forever``: go on where no process is left.
+        Return the exit status; None if no process is left. ``forever``: go on where no process is left.
         """
         while forever or self.is_anything_left:
             event = self._next_event()
@@ -162,7 +162,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Wait. Raise KeyboardInterrupt where stop() is called meanwhile."""
+        """Wait. Raise KeyboardInterrupt if stop() is called meanwhile."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:

@@ -57,7 +57,7 @@ class ROSLaunchConfig:
         return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
-        """Add a node. Raise RLException where there is one of its name."""
+        """Add a node. Raise RLException if there is one of its name."""
         if node.name and node.spec.name in self.resolved_node_names:
             raise RLException(
                 f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
@@ -112,7 +112,7 @@ class ROSLaunchConfig:
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> bool:
-        """Add a machine; False where the same is there already. Raise RLException where another of its name is."""
+        """Add a machine; False if the same is there already. Raise RLException if another of its name is."""
         if m.name not in self.machines:
             self.machines[m.name] = m
             return True

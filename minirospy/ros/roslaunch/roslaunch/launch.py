@@ -116,7 +116,7 @@ class ROSLaunchRunner:
     def run_test(self, test: Test) -> bool:
         """Start a test and wait until it exits; return whether its status is 0.
 
-        Raise RLTestTimeoutException where it takes longer than its time limit, after which it is ended; RLException where
+        Raise RLTestTimeoutException if it takes longer than its time limit, after which it is ended; RLException where
         it cannot be started.
         """
         process, has_started = self.launch_node(test)

@@ -347,7 +347,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """Return a process for a node, to be started with its start(). Raise NodeParamsException where it has no program."""
+    """Return a process for a node, to be started with its start(). Raise NodeParamsException if it has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""

@@ -51,7 +51,7 @@ def resolve_args(
 ) -> str:
     """Return a text with its substitution arguments resolved; ``context`` may hold the args as ``{"arg": {name: value}}``.
 
-    Raise SubstitutionException, ArgException where an arg is not set, rospkg.ResourceNotFound where a package is not found,
+    Raise SubstitutionException, ArgException if an arg is not set, rospkg.ResourceNotFound where a package is not found,
     and what the expression of an ``$(eval ...)`` raises.
     """
     context = {} if context is None else context

@@ -35,7 +35,7 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     for folder in folders:
         source = str(folder / "src")
         modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
-        # Last, and only where a module is missing: a devel folder that is sourced also has the package's messages.
+        # Last, and only if a module is missing: a devel folder that is sourced also has the package's messages.
         if source not in sys.path and not all(map(_is_importable, modules)):
             sys.path.append(source)
 

@@ -86,7 +86,7 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 
 
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
-    """Return the path of a package's manifest.xml, not ``required`` also where it has none.
+    """Return the path of a package's manifest.xml, not ``required`` also if it has none.
 
     Raise InvalidROSPkgException.
     """
@@ -107,7 +107,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError where there is none, ManifestException."""
+    """Return the manifest in a file. Raise ValueError if there is none, ManifestException."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):

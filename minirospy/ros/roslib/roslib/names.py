@@ -32,7 +32,7 @@ def resource_name_package(name: str) -> str | None:
 
 
 def package_resource_name(name: str) -> tuple[str, str]:
-    """Return (package, name); the package is empty where the name has none. Raise ValueError on two slashes."""
+    """Return (package, name); the package is empty if the name has none. Raise ValueError on two slashes."""
     if PRN_SEPARATOR not in name:
         return "", name
     if name.count(PRN_SEPARATOR) > 1:

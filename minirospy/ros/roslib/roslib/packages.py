@@ -49,7 +49,7 @@ class MultipleNodesException(ROSPkgException):
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """Return the folder of a package. Raise InvalidROSPkgException where there is none and ``required``; else None."""
+    """Return the folder of a package. Raise InvalidROSPkgException if there is none and ``required``; else None."""
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:

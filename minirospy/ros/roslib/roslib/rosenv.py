@@ -35,12 +35,12 @@ class ROSEnvException(ROSLibException):
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT. Raise ROSEnvException where it is not set, if ``required``."""
+    """Return ROS_ROOT. Raise ROSEnvException if it is not set, if ``required``."""
     return _variable(ROS_ROOT, required, env)
 
 
 def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_PACKAGE_PATH. Raise ROSEnvException where it is not set, if ``required``."""
+    """Return ROS_PACKAGE_PATH. Raise ROSEnvException if it is not set, if ``required``."""
     return _variable(ROS_PACKAGE_PATH, required, env)
 
 

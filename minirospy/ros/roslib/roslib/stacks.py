@@ -71,7 +71,7 @@ def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str |
 
 
 def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the stack that contains a package; None where none does. Raise InvalidROSPkgException."""
+    """Return the stack that contains a package; None if none does. Raise InvalidROSPkgException."""
     folder = _packages(env).get(pkg) or str(get_pkg_dir(pkg))
     while os.path.dirname(folder) != folder:
         if os.path.exists(os.path.join(folder, STACK_FILE)):

@@ -451,7 +451,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
 
 
 def _holder(path: Path) -> int | None:
-    """Return the pid of the master that holds a journal, 0 where it is not known, None where no master does."""
+    """Return the pid of the master that holds a journal, 0 if it is not known, None if no master does."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():

@@ -16,7 +16,7 @@ class Master:
         self.uri: str | None = None
 
     def start(self) -> None:
-        """Serve from a thread. Raise OSError where the port is taken."""
+        """Serve from a thread. Raise OSError if the port is taken."""
         from minirospy.runtime.master.master import Master as Serving
         from minirospy.runtime.transport.access import Access
         from minirospy.runtime.transport.loop import LoopThread

@@ -28,7 +28,7 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Return the nearest parameter upwards from a namespace. Raise ValueError where that is not global."""
+        """Return the nearest parameter upwards from a namespace. Raise ValueError if that is not global."""
         if not ns or ns[0] != "/":
             raise ValueError("namespace must be global")
         return self._tree.search(ns, key)

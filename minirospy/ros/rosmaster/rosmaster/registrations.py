@@ -60,7 +60,7 @@ class Registrations:
         return [api for _, api in self[key]]
 
     def get_service_api(self, service: str) -> str | None:
-        """Return the address of a service, None where it is not there."""
+        """Return the address of a service, None if it is not there."""
         return (self.service_api_map or {}).get(service, ("", None))[1]
 
     def get_state(self) -> list[list[object]]:
@@ -175,11 +175,11 @@ class RegistrationManager:
         self.param_subscribers = Registrations(Registrations.PARAM_SUBSCRIPTIONS)
 
     def get_node(self, caller_id: str) -> NodeRef | None:
-        """Return a node, None where it has registered nothing."""
+        """Return a node, None if it has registered nothing."""
         return self.nodes.get(caller_id)
 
     def reverse_lookup(self, caller_api: str) -> list[NodeRef] | None:
-        """Return the nodes of an API, None where there are none."""
+        """Return the nodes of an API, None if there are none."""
         return [node for node in self.nodes.values() if node.api == caller_api] or None
 
     def register_service(self, service: str, caller_id: str, caller_api: str, service_api: str) -> None:

@@ -92,7 +92,7 @@ class MarkedThreadPool:
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not at work; None where this thread is to end."""
+        """Return the first task whose marker is not at work; None if this thread is to end."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

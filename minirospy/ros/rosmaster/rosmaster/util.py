@@ -18,7 +18,7 @@ _PROXIES = _Proxies()
 
 
 def xmlrpcapi(uri: str | None) -> ServerProxy | None:
-    """Return the proxy of an address; None where it names no host. Raise OSError where it is no http address."""
+    """Return the proxy of an address; None if it names no host. Raise OSError if it is no http address."""
     if uri is None or not urlparse(uri).netloc:
         return None
     if uri not in _PROXIES.by_uri:

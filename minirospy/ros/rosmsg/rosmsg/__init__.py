@@ -102,7 +102,7 @@ def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
     """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
 
-    Raise KeyError where it needs a message that is not in the context.
+    Raise KeyError if it needs a message that is not in the context.
     """
     from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
 

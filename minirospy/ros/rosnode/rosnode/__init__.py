@@ -59,7 +59,7 @@ def get_node_names(namespace: str | None = None) -> list[str]:
 
 
 def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = False) -> str | None:
-    """Return the URI of a node; None where the master does not know it. The master is always queried."""
+    """Return the URI of a node; None if the master does not know it. The master is always queried."""
     with _graph(master) as graph:
         return graph.node_uri(caller_id)
 
@@ -77,7 +77,7 @@ def get_node_info_description(node_name: str) -> str:
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
     """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
 
-    Raise ROSNodeIOException where the node does not answer.
+    Raise ROSNodeIOException if the node does not answer.
     """
     with _graph(master) as graph:
         try:
@@ -153,10 +153,10 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Take what the nodes in ``blacklist`` registered out of the master, and print their names.
 
-    Raise ConnectionRefusedError where no master answers, as ROS's does.
+    Raise ConnectionRefusedError if no master answers, as ROS's does.
     """
     with _graph(master, ConnectionRefusedError) as graph:
-        # Also where nothing is on the list: a master that does not answer is an error.
+        # Also if nothing is on the list: a master that does not answer is an error.
         graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
@@ -166,7 +166,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Take what all nodes but those in ``whitelist`` registered out of the master.
 
-    Raise ConnectionRefusedError where no master answers, as ROS's does.
+    Raise ConnectionRefusedError if no master answers, as ROS's does.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -181,7 +181,7 @@ def get_machines_by_nodes() -> list[str]:
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """Return the nodes on a machine. Raise ROSNodeException where its name does not resolve."""
+    """Return the nodes on a machine. Raise ROSNodeException if its name does not resolve."""
     try:
         wanted = socket.gethostbyname(machine)
     except OSError as error:
@@ -264,7 +264,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value of an answer (code, text, value). Raise ROSNodeException where it is an error."""
+    """Return the value of an answer (code, text, value). Raise ROSNodeException if it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -276,7 +276,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Return the seconds that a ping takes; None where the node does not answer, which is printed."""
+    """Return the seconds that a ping takes; None if the node does not answer, which is printed."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:

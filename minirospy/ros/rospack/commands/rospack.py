@@ -145,7 +145,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return the verb of a line. Raise _RospackError where it does not exist or does not take the line's options."""
+    """Return the verb of a line. Raise _RospackError if it does not exist or does not take the line's options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")

@@ -61,7 +61,7 @@ class _YamlError(RosParamException, yaml.YAMLError):
 def get_param(param: str) -> Any:
     """Return a parameter's value; bytes and dates in xmlrpc.client's wrappers, as programs know them from ROS.
 
-    Raise rosgraph.MasterError where it is not set, or the name is empty.
+    Raise rosgraph.MasterError if it is not set, or the name is empty.
     """
     with _graph() as graph:
         name = _resolve(graph, param)
@@ -72,7 +72,7 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter from YAML text. Raise RosParamException, also where it is none."""
+    """Set a parameter from YAML text. Raise RosParamException, also if it is none."""
     try:
         parsed = parse_value(value)
     except ValueTextError as error:
@@ -99,7 +99,7 @@ def _with_bytes(value: object) -> object:
 
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
-    """Set all values below a namespace. Raise RosParamException where they have no names at the root."""
+    """Set all values below a namespace. Raise RosParamException if they have no names at the root."""
     check_sendable(ns)
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -109,7 +109,7 @@ def upload_params(ns: str, values: object, verbose: bool = False) -> None:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raise rosgraph.MasterError where it is not set, or the name is empty."""
+    """Delete a parameter. Raise rosgraph.MasterError if it is not set, or the name is empty."""
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
@@ -147,7 +147,7 @@ def load_file(
     """Return [(values, namespace)] of each document of a YAML file, which may contain more than a parameter can.
 
     ``-``, or nothing, is the standard input.
-    Raise RosParamException where it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
+    Raise RosParamException if it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
     """
     if not filename or filename == "-":
         if verbose:
@@ -186,7 +186,7 @@ def load_str(
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters below a name to a file. Raise OSError, rosgraph.MasterError where there are none."""
+    """Write the parameters below a name to a file. Raise OSError, rosgraph.MasterError if there are none."""
     values = get_param(param)
     if verbose:
         print_params(values, param)

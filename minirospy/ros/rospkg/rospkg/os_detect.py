@@ -58,7 +58,7 @@ class OsNotDetected(Exception):
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
-    """Return the values of an os-release file; None where there is none."""
+    """Return the values of an os-release file; None if there is none."""
     for path in (filename,) if filename else ("/etc/os-release", "/usr/lib/os-release"):
         try:
             with open(path, encoding="utf-8", errors="replace") as file:
@@ -70,7 +70,7 @@ def read_os_release(filename: str | None = None) -> dict[str, str] | None:
 
 
 def read_issue(filename: str = "/etc/issue") -> list[str] | None:
-    """Return the words of /etc/issue; None where there is none."""
+    """Return the words of /etc/issue; None if there is none."""
     try:
         with open(filename, encoding="utf-8", errors="replace") as file:
             return file.read().split()

@@ -190,7 +190,7 @@ def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[s
 
 
 def get_package_name(path: str) -> str | None:
-    """Return the package that contains a path; None where none does."""
+    """Return the package that contains a path; None if none does."""
     place = Path(path).absolute()
     return next(filter(None, map(package_name, (place, *place.parents))), None)
 

@@ -123,7 +123,7 @@ def register_signals() -> None:
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT of the environment. Raise ROSException where it is ``required`` and not set."""
+    """Return ROS_ROOT of the environment. Raise ROSException if it is ``required`` and not set."""
     root = (os.environ if env is None else env).get("ROS_ROOT")
     if required and not root:
         raise ROSException("ROS_ROOT is not set")

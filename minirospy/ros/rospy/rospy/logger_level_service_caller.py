@@ -47,7 +47,7 @@ class LoggerLevelServiceCaller:
         return self._current_loggers
 
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
-        """Set a level; return False where get_loggers() found it set already.
+        """Set a level; return False if get_loggers() found it set already.
 
         Raise rosservice.ROSServiceException.
         """

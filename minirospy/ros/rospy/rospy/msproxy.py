@@ -117,7 +117,7 @@ class MasterProxy:
         return iter(value if code == 1 else [])
 
     def search_param(self, key: str) -> str | None:
-        """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none."""
+        """Return the nearest parameter of this name, upwards from this node's namespace; None if there is none."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
@@ -134,7 +134,7 @@ def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return the XML-RPC server at ``uri``, one object for each; None where that is not a URI."""
+    """Return the XML-RPC server at ``uri``, one object for each; None if that is not a URI."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)

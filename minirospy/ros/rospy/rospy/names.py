@@ -84,7 +84,7 @@ def resolve_name_without_node_name(name: str) -> str:
 
 
 def scoped_name(caller_id: str, name: str) -> str:
-    """Return ``name`` without the namespace of ``caller_id``. Raise ROSException where that is not global."""
+    """Return ``name`` without the namespace of ``caller_id``. Raise ROSException if that is not global."""
     if not is_global(caller_id):
         raise ROSException("caller_id must be global")
     return names.canonicalize(name)[len(names.namespace_of(caller_id)) :]

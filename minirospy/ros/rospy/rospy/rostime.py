@@ -22,7 +22,7 @@ __all__ = [
 
 
 def wallsleep(duration: float) -> None:
-    """Sleep so many seconds of the wall clock, whatever the node's time is. Raise ValueError where negative."""
+    """Sleep so many seconds of the wall clock, whatever the node's time is. Raise ValueError if negative."""
     time.sleep(duration)
 
 
@@ -42,7 +42,7 @@ def set_rostime_initialized(val: bool) -> None:
 
 
 def set_rostime(t: object) -> None:
-    """Set the node's time, which is simulated from now on. Raise ValueError where ``t`` is not a Time."""
+    """Set the node's time, which is simulated from now on. Raise ValueError if ``t`` is not a Time."""
     if not isinstance(t, Time):
         raise ValueError(f"must be Time instance: {t.__class__}")
     session = current_session()

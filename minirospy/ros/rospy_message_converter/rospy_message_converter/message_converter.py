@@ -48,7 +48,7 @@ def convert_dictionary_to_ros_message(
 
     ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError, without ``strict_mode``
     they are logged. With ``check_missing_fields`` a field without a value raises ValueError, with ``check_types`` a value of
-    another type TypeError. Raise NotFoundError where the type is unknown.
+    another type TypeError. Raise NotFoundError if the type is unknown.
     """
     if kind == "message":
         message = message_class(message_type)()

@@ -135,7 +135,7 @@ class SerialClient:
     # --- the line
 
     def run(self) -> None:
-        """Pass messages on until the node is shut down. Raise PortError where the line breaks."""
+        """Pass messages on until the node is shut down. Raise PortError if the line breaks."""
         if self.port is None:
             return
         self._writer = threading.Thread(target=self._write_all, args=(self.port,), daemon=True)

@@ -105,11 +105,11 @@ class _Service:
         self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
-        """Raise EndpointError where the device's request is another."""
+        """Raise EndpointError if the device's request is another."""
         _compare(self.request._md5sum, info.md5sum)
 
     def check_response(self, info: TopicInfo) -> None:
-        """Raise EndpointError where the device's response is another."""
+        """Raise EndpointError if the device's response is another."""
         _compare(self.response._md5sum, info.md5sum)
 
 

@@ -25,7 +25,7 @@ class Port(Protocol):
     """A line to a device."""
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError where the line has broken."""
+        """Return what has come, nothing after a moment. Raise PortError if the line has broken."""
 
     def write(self, data: bytes) -> None:
         """Write all of it. Raise PortError."""
@@ -52,7 +52,7 @@ class File(Protocol):
 
 
 class SerialPort:
-    """A serial port. Raise PortError where it cannot be opened, ImportError without pyserial."""
+    """A serial port. Raise PortError if it cannot be opened, ImportError without pyserial."""
 
     def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
         try:
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError where the line has broken."""
+        """Return what has come, nothing after a moment. Raise PortError if the line has broken."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -111,7 +111,7 @@ class SocketPort:
         connection.settimeout(_WRITE_SECONDS)
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError where the connection is closed."""
+        """Return what has come, nothing after a moment. Raise PortError if the connection is closed."""
         try:
             ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
             if not ready:

@@ -63,7 +63,7 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return the type of a service; None where it does not exist. Raise ROSServiceIOException where it does not answer."""
+    """Return the type of a service; None if it does not exist. Raise ROSServiceIOException if it does not answer."""
     with _graph() as graph:
         try:
             return services.service_type(graph, _sent(graph, service_name))
@@ -72,7 +72,7 @@ def get_service_type(service_name: str) -> str | None:
 
 
 def get_service_uri(service_name: str) -> str | None:
-    """Return the URI of a service; None where it does not exist."""
+    """Return the URI of a service; None if it does not exist."""
     with _graph() as graph:
         try:
             return services.service_uri(graph, _sent(graph, service_name))
@@ -81,7 +81,7 @@ def get_service_uri(service_name: str) -> str | None:
 
 
 def get_service_node(service_name: str) -> str | None:
-    """Return the node that offers a service; None where it does not exist."""
+    """Return the node that offers a service; None if it does not exist."""
     with _graph() as graph:
         nodes = graph.state().services.get(_resolved(graph, service_name))
     return nodes[0] if nodes else None
@@ -94,7 +94,7 @@ def get_service_args(service_name: str) -> str:
 
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
-    """Return the class of a running service. Raise ROSServiceException where it does not exist or is not installed."""
+    """Return the class of a running service. Raise ROSServiceException if it does not exist or is not installed."""
     from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
@@ -123,7 +123,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header that a service answers with. Raise ROSServiceIOException where it does not."""
+    """Return the connection header that a service answers with. Raise ROSServiceIOException if it does not."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -162,7 +162,7 @@ def _resolved(graph: Graph, name: str) -> str:
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the same of a name that is sent to the master. Raise TypeError where XML-RPC has no type for it."""
+    """Return the same of a name that is sent to the master. Raise TypeError if XML-RPC has no type for it."""
     check_sendable(name)
     return _resolved(graph, name)
 

@@ -39,7 +39,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open = ExitStack()
 
     def setUp(self) -> None:
-        """Have the master ready. Raise RLException, MasterUnreachableError where one that is reused does not answer."""
+        """Have the master ready. Raise RLException, MasterUnreachableError if one that is reused does not answer."""
         environment = self._open.enter_context(
             master_of_tests(Environment.read(), self.run_id, reuse=self.reuse_master, clear=self.clear)
         )

@@ -180,7 +180,7 @@ def createUnitTest(
     clear: bool = False,
     results_base_dir: str | None = None,
 ) -> type[unittest.TestCase]:
-    """Return the class of a launch file's tests. Raise RLException where it cannot be read."""
+    """Return the class of a launch file's tests. Raise RLException if it cannot be read."""
     config = load_config_default([test_file], None)
     methods: dict[str, TestMethod] = {}
     for test in config.tests:

@@ -98,7 +98,7 @@ class RosTest:
                 return
 
     def _why_not(self, test: TestSpec) -> str:
-        """Why a test cannot be run; empty where it can."""
+        """Why a test cannot be run; empty if it can."""
         node = f"{test.node.package}/{test.node.type}"
         try:
             self.packages.find_executable(test.node.package, test.node.type)
@@ -210,7 +210,7 @@ def master_of_tests(
     """Provide the environment with a new master on a free port, whose run_id this is; it ends with the block.
 
     ``reuse``: with the master that the environment names; ``clear`` deletes its parameters first.
-    Raise MasterUnreachableError where that one does not answer.
+    Raise MasterUnreachableError if that one does not answer.
     """
     if reuse:
         with contextlib.closing(MasterProxy(environment.master_uri, "/rostest")) as master:

@@ -163,7 +163,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, also where a field of one is named; warn of one that nobody publishes yet."""
+    """Return the global names of topics, also if a field of one is named; warn of one that nobody publishes yet."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

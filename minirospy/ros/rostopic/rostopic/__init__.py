@@ -83,7 +83,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return the same as :func:`get_topic_type`, with the message's class. Raise ROSTopicException where it is not installed."""
+    """Return the same as :func:`get_topic_type`, with the message's class. Raise ROSTopicException if it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -137,7 +137,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return what is wrong with the brackets of a field, in ROS's words; empty where nothing is."""
+    """Return what is wrong with the brackets of a field, in ROS's words; empty if nothing is."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""
@@ -184,7 +184,7 @@ def create_publisher(
 ) -> tuple[Publisher[Message], type[Message]]:
     """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
 
-    Raise ROSTopicException where the type is not installed.
+    Raise ROSTopicException if the type is not installed.
     """
     import rospy
 
@@ -289,7 +289,7 @@ def _rostopic_list_group_by_host(
 
 
 def _check_master() -> None:
-    """Raise ROSTopicIOException where no master answers."""
+    """Raise ROSTopicIOException if no master answers."""
     with _graph() as graph:
         graph.master.get_pid()
 

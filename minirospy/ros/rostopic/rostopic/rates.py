@@ -52,7 +52,7 @@ class ROSTopicHz:
                 self._window(topic).add(now)
 
     def get_hz(self, topic: str | None = None) -> Statistics | None:
-        """Return (rate, least pause, longest pause, standard deviation, messages); None where no new message has arrived."""
+        """Return (rate, least pause, longest pause, standard deviation, messages); None if no new message has arrived."""
         report = self._report(topic)
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
@@ -119,7 +119,7 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """Return (mean, least, longest, standard deviation, messages); None where no new message has arrived."""
+        """Return (mean, least, longest, standard deviation, messages); None if no new message has arrived."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 

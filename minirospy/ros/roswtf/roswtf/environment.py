@@ -15,13 +15,13 @@ def paths(path: str | None) -> list[str]:
 
 
 def is_executable(path: str) -> int:
-    """Return the permission bits of a file that allow to execute it; 0 where none does. Raise OSError."""
+    """Return the permission bits of a file that allow to execute it; 0 if none does. Raise OSError."""
     mode = os.stat(path)[stat.ST_MODE]
     return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
 
 
 def invalid_url(url: str | None) -> str | None:
-    """Return what is wrong with the address of a master; None where nothing is."""
+    """Return what is wrong with the address of a master; None if nothing is."""
     if not url:
         return None
     scheme, _, rest = url.partition("://")

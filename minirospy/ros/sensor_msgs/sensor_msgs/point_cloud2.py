@@ -72,7 +72,7 @@ def read_points(
     """Yield a tuple of values for each point: those of ``field_names``, in the order of their offsets.
 
     ``skip_nans`` leaves out points with a NaN in one of them; ``uvs`` names the points to yield, as (column, row).
-    Raise AssertionError where it is not a PointCloud2, struct.error where the data ends before the last point.
+    Raise AssertionError if it is not a PointCloud2, struct.error where the data ends before the last point.
     """
     _check_type(cloud)
     columns = _columns(cloud.fields, field_names)
@@ -101,7 +101,7 @@ def read_points_list(
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Raise TypeError where a field has more than one value; all points have as many.
+    # Raise TypeError if a field has more than one value; all points have as many.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -117,7 +117,7 @@ def read_points_numpy(
 
     With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
     data where the values have one type and are evenly spaced, as x, y, z; else a copy, of the type that holds all of them.
-    Raise AssertionError where it is not a PointCloud2, ValueError where it lacks a field or data.
+    Raise AssertionError if it is not a PointCloud2, ValueError where it lacks a field or data.
     """
     _check_type(cloud)
     fields = {field.name: field for field in cloud.fields}
@@ -189,7 +189,7 @@ def _get_struct_fmt(
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return where the fields of these names are: as ROS reads them, one after the other, even where they overlap."""
+    """Return where the fields of these names are: as ROS reads them, one after the other, even if they overlap."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:
@@ -302,7 +302,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the data of points that are an array of floats for fields of floats; None where ``struct`` has to decide."""
+    """Return the data of points that are an array of floats for fields of floats; None if ``struct`` has to decide."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

@@ -93,7 +93,7 @@ class Concurrence(Container):
         return state
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError where the outcome map names a state or an outcome that is not there."""
+        """Raise InvalidTransitionError if the outcome map names a state or an outcome that is not there."""
         for outcomes in self._outcome_map.values():
             for label, outcome in outcomes.items():
                 if label not in self._states:
@@ -110,7 +110,7 @@ class Concurrence(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute all states; return the outcome. Raise InvalidStateError where one of them fails."""
+        """Execute all states; return the outcome. Raise InvalidStateError if one of them fails."""
         if not self._states:
             raise InvalidStateError("No states was added to concurrence")
         self._copy_input_keys(parent_ud, self.userdata)

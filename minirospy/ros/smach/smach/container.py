@@ -76,7 +76,7 @@ class Container(State):
         raise NotImplementedError
 
     def check_consistency(self) -> None:
-        """Raise InvalidStateError or InvalidTransitionError where the container cannot be executed."""
+        """Raise InvalidStateError or InvalidTransitionError if the container cannot be executed."""
         raise NotImplementedError
 
     # Userdata.
@@ -181,7 +181,7 @@ class Container(State):
         return bool(stack) and stack[-1] is self
 
     def assert_opened(self, msg: str = "") -> None:
-        """Raise InvalidConstructionError where the container is not open."""
+        """Raise InvalidConstructionError if the container is not open."""
         if not self.is_opened():
             raise InvalidConstructionError(msg)
 

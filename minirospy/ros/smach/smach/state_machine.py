@@ -70,7 +70,7 @@ class StateMachine(Container):
         """Add a state to the open machine, and return it.
 
         ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's;
-        ``constants``: values that are put into the userdata before the state executes. Raise InvalidStateError where
+        ``constants``: values that are put into the userdata before the state executes. Raise InvalidStateError if
         the label is taken, InvalidTransitionError for an outcome that the state does not have.
         """
         return StateMachine._currently_opened_container()._add(
@@ -142,7 +142,7 @@ class StateMachine(Container):
                 )
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError where there is no initial state, or a transition leads nowhere."""
+        """Raise InvalidTransitionError if there is no initial state, or a transition leads nowhere."""
         outcomes = self.get_registered_outcomes()
         available = [*self._states, *(each for each in outcomes if each not in self._states)]
         errors = []

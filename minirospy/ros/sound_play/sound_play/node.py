@@ -118,7 +118,7 @@ class SoundNode:
         self._server.start()
 
     def handle(self, request: SoundRequest) -> PlayingSound | None:
-        """Play or stop what a request says; return the sound that plays. Raise SoundError where it cannot."""
+        """Play or stop what a request says; return the sound that plays. Raise SoundError if it cannot."""
         with self._lock:
             key = (request.sound, request.arg, request.arg2)
             if request.command == SoundRequest.PLAY_STOP:

@@ -69,7 +69,7 @@ def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
 def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float], Floats, Floats]:
     """Return scale, shear (x-y, x-z, y-z), angles about the static axes, translation and perspective.
 
-    Raise ValueError where the matrix cannot be taken apart. Source: Thomas, "Decomposing a matrix into simple
+    Raise ValueError if the matrix cannot be taken apart. Source: Thomas, "Decomposing a matrix into simple
     transformations", Graphics Gems II (1991).
     """
     import numpy

@@ -259,7 +259,7 @@ def clip_matrix(
 def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike) -> Floats:
     """Return the matrix that shears by ``angle`` radians along a direction in a plane.
 
-    Raise ValueError where the direction is not in the plane.
+    Raise ValueError if the direction is not in the plane.
     """
     import numpy
 

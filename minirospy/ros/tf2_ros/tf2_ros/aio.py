@@ -116,7 +116,7 @@ class Buffer:
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
-        """Return None where :meth:`lookup` would succeed now, else why it would not."""
+        """Return None if :meth:`lookup` would succeed now, else why it would not."""
         try:
             return self._tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:

@@ -12,7 +12,7 @@ _SMALL = 4 * 2.0**-52
 
 
 def rpy_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw as tf_echo prints them; the yaw is 0 where pitch is a right angle."""
+    """Return roll, pitch and yaw as tf_echo prints them; the yaw is 0 if pitch is a right angle."""
     (xx, xy, xz), (yx, _, _), (zx, zy, zz) = _matrix(rotation)
     if zx <= -1:
         return math.atan2(xy, xz), math.pi / 2, 0.0

@@ -41,7 +41,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
 
     As with the real one the result has one row, little-endian numbers, nothing behind a point's last field, zeros between
     its fields, and is not marked as dense. The other fields, and the points without a place (NaN), are kept. x, y and z are
-    the fields of these names, where the real one takes the first three. Raise ValueError where the cloud has no x, y and z,
+    the fields of these names, where the real one takes the first three. Raise ValueError if the cloud has no x, y and z,
     or fewer bytes than it says.
     """
     import numpy

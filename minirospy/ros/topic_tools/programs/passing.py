@@ -127,7 +127,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, of which the node's name is made. Raise ValueError where it has none."""
+    """Return the last part of a topic's name, of which the node's name is made. Raise ValueError if it has none."""
     name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -135,7 +135,7 @@ def base_name(topic: str) -> str:
 
 
 def _checked(topic: str) -> str:
-    """Return a topic's name. Raise ValueError where it is not legal."""
+    """Return a topic's name. Raise ValueError if it is not legal."""
     if not is_legal_name(topic):
         raise ValueError(f"[{topic}] is not the name of a topic")
     return topic

@@ -42,7 +42,7 @@ class Pose(Object):
         self.rpy = rpy
 
     def check_valid(self) -> None:
-        """Raise AssertionError where the vectors have not three numbers."""
+        """Raise AssertionError if the vectors have not three numbers."""
         if any(vector is not None and len(vector) != 3 for vector in (self.xyz, self.rpy)):
             raise AssertionError
 
@@ -131,7 +131,7 @@ class GeometricType(Codec[Object]):
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the shape. Raise AssertionError where there is not one."""
+        """Return the shape. Raise AssertionError if there is not one."""
         if len(node) != 1:
             raise AssertionError("One element only for geometric")
         kind = self._KINDS.get(node[0].tag)

@@ -114,7 +114,7 @@ class Robot(Object):
 
     @classmethod
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
-        """Return the robot of a parameter. Raise KeyError where it is not set, and as from_xml_string."""
+        """Return the robot of a parameter. Raise KeyError if it is not set, and as from_xml_string."""
         from minirospy import client as rospy
 
         return cls.from_xml_string(rospy.get_param(key))
@@ -142,7 +142,7 @@ class Robot(Object):
     ) -> list[str]:
         """Return the names from the link ``root`` down to ``tip``, of joints (those that are ``fixed``, too) and links.
 
-        Raise KeyError where ``tip`` is not below ``root``.
+        Raise KeyError if ``tip`` is not below ``root``.
         """
         chain = [tip] if links else []
         link, seen = tip, {tip}
@@ -158,7 +158,7 @@ class Robot(Object):
         return chain[::-1]
 
     def get_root(self) -> str:
-        """Return the one link without a parent. Raise AssertionError where there is not one."""
+        """Return the one link without a parent. Raise AssertionError if there is not one."""
         roots = [name for name in self.link_map if name not in self.parent_map]
         if len(roots) > 1:
             raise AssertionError("Multiple roots detected, invalid URDF.")

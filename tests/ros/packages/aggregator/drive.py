@@ -110,7 +110,7 @@ class Tree:
             while not self.levels.empty():
                 self.levels.get()
             level = self.levels.get(timeout=SECONDS)
-            # The level is that of the same tree only where the tree is still the same after it.
+            # The level is that of the same tree only if the tree is still the same after it.
             while not self.arrays.empty():
                 self.arrays.get()
             if is_it(self.next_lines()):

@@ -24,7 +24,7 @@ def CV_MAT_DEPTHWrap(i: int) -> int:
 
 
 def cvtColor2(obj_in: Pixels, encoding_in: str, encoding_out: str) -> Pixels:
-    """Return an image in another encoding. Raise RuntimeError where there is no such conversion."""
+    """Return an image in another encoding. Raise RuntimeError if there is no such conversion."""
     try:
         return _converted(obj_in, encoding_in, encoding_out)
     except CvBridgeError as error:

@@ -89,7 +89,7 @@ class EdgeList:
         return edge in self._edges
 
     def add(self, edge: Edge) -> bool:
-        """Add an edge; False where it is there."""
+        """Add an edge; False if it is there."""
         if edge in self._edges:
             return False
         self._edges[edge] = None

@@ -67,7 +67,7 @@ class ServiceManager:
         return [(name, service.uri) for name, service in list(current_session().offered.items())]
 
     def get_service(self, resolved_service_name: str) -> Service[object] | None:
-        """Return the service of this name; None where this node does not offer it."""
+        """Return the service of this name; None if this node does not offer it."""
         return current_session().offered.get(resolved_service_name)
 
 

@@ -105,7 +105,7 @@ class VectorOf(Codec[Iterable[float]]):
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Return the numbers. Raise AssertionError where they are too few or too many, ValueError."""
+        """Return the numbers. Raise AssertionError if they are too few or too many, ValueError."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")

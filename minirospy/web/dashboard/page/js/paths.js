@@ -112,7 +112,7 @@ export function canLead(definition, steps) {
   return !at.isArray && at.message.fields.some(({ type, isArray }) => isNumeric(type) && !isArray);
 }
 
-/** Return the time in the header of a message; 0 where there is none. */
+/** Return the time in the header of a message; 0 if there is none. */
 export function stampOf({ header }) {
   return header?.stamp?.nsecs === undefined ? 0 : numberOf(header.stamp);
 }
