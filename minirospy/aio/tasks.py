@@ -13,13 +13,13 @@ from pathlib import Path
 
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
-__all__ = ["Faults", "keep_running"]
+__all__ = ["ErrorReporter", "keep_running"]
 
 PAUSE_SECONDS = 1.0
 _MAX_CHARACTERS = 500
 
 
-class Faults:
+class ErrorReporter:
     """Reports the unforeseen errors of a piece of work: one line every ten seconds, with a count of the others."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
@@ -43,14 +43,14 @@ class Faults:
 
 
 async def keep_running(
-    work: Callable[[], Awaitable[object]], faults: Faults, *, pause: float = PAUSE_SECONDS
+    work: Callable[[], Awaitable[object]], reporter: ErrorReporter, *, pause: float = PAUSE_SECONDS
 ) -> None:
     """Run ``work`` until it returns or is cancelled; where it raises, report that and start it again after ``pause`` seconds."""
     while True:
         try:
             await work()
         except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
-            faults.report(error)
+            reporter.report(error)
         else:
             return
         await asyncio.sleep(pause)

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable, Collection, Coroutine, Mapping
 from typing import TYPE_CHECKING
 
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.inbound import InboundTopic, call_service, run_on_loop
 from minirospy.fleet.keys import (
@@ -75,7 +75,7 @@ class Exporter:
         self._claims = {claim}
         self._rivals = RateLimitedLogger(_log)
         self._flows = Intake.flows(_MAX_IN_FLOWS)
-        self._faults = Faults(_log, "the watch of the robot's graph")
+        self._reporter = ErrorReporter(_log, "the watch of the robot's graph")
         self._watching: asyncio.Task[None] | None = None
         self._declared: list[Later] = []
 
@@ -93,7 +93,7 @@ class Exporter:
             network.declare_token(claim_key(self.claim)),
         ]
         self._watching = asyncio.ensure_future(
-            keep_running(lambda: self.graph.watch(self.look), self._faults)
+            keep_running(lambda: self.graph.watch(self.look), self._reporter)
         )
 
     async def close(self) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, MasterUnreachableError, ROSInterruptException, RpcError
 from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.exporter import Exporter
@@ -75,7 +75,7 @@ class Gateway:
         self._intake: Intake | None = None
         self._declared: list[Later] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self._faults = Faults(_log, "a task of the gateway")
+        self._reporter = ErrorReporter(_log, "a task of the gateway")
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
@@ -271,7 +271,7 @@ class Gateway:
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
                 self._failures.warning("%s", error)
             except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
-                self._faults.report(error)
+                self._reporter.report(error)
 
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)

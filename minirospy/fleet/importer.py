@@ -9,7 +9,7 @@ from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
@@ -116,7 +116,7 @@ class Importer:
         """The machine of each robot that was shown last."""
         self._challenging: set[str] = set()
         self._is_closed = False
-        self._faults = Faults(_log, "showing the fleet's robots")
+        self._reporter = ErrorReporter(_log, "showing the fleet's robots")
         self._presence = Presence(
             self._answering, lambda: self.contents.gateways, lambda: self._soon(_SETTLE_SECONDS)
         )
@@ -138,7 +138,7 @@ class Importer:
             for kind in ("robot", "topic", "service")
         ]
         self._watching = [
-            asyncio.ensure_future(keep_running(watch, self._faults))
+            asyncio.ensure_future(keep_running(watch, self._reporter))
             for watch in (self._watch, self._presence.watch)
         ]
 
@@ -236,7 +236,7 @@ class Importer:
                 *map(self._remove, gone[first : first + _AT_ONCE]), return_exceptions=True
             ):
                 if isinstance(error, Exception):
-                    self._faults.report(error)
+                    self._reporter.report(error)
         self._trim_soon(sum(len(robot.topics) + len(robot.services) for robot in gone))
         for name, robot in robots.items():
             if name not in self.robots:
@@ -254,7 +254,7 @@ class Importer:
             try:
                 await self._update(known)
             except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
-                self._faults.report(error)
+                self._reporter.report(error)
                 self._soon(_AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.base.escape import escaped
 from minirospy.fleet.rules import Priority
@@ -101,10 +101,10 @@ class FleetNetwork:
         self._calls = _Share(_QUERIES)
         self._control = _Share(_CONTROL_QUERIES)
         self._is_closed = False
-        self._faults = Faults(_log, "taking a message or query of the fleet")
-        faults = Faults(_log, "the search for links of Zenoh")
+        self._reporter = ErrorReporter(_log, "taking a message or query of the fleet")
+        reporter = ErrorReporter(_log, "the search for links of Zenoh")
         self._lingering = (
-            asyncio.ensure_future(keep_running(_remove_linger, faults)) if has_many_links else None
+            asyncio.ensure_future(keep_running(_remove_linger, reporter)) if has_many_links else None
         )
 
     @classmethod
@@ -213,7 +213,7 @@ class FleetNetwork:
                     attachment.to_bytes() if attachment else b"",
                 )
             except Exception as error:  # noqa: BLE001 - Zenoh would print it, or end its thread
-                self._faults.report(error)
+                self._reporter.report(error)
 
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
@@ -424,7 +424,7 @@ class FleetNetwork:
         except MinirospyError as error:
             reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
         except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here
-            self._faults.report(error)
+            self._reporter.report(error)
             reply = functools.partial(query.reply_err, f"the gateway failed: {type(error).__name__}".encode())
         finally:
             if reply is None:

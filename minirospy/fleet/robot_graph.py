@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import service_header
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import MasterUnreachableError, RpcError, WireError
 from minirospy.core.wire.header import Header
 from minirospy.fleet.definitions import Definitions
@@ -53,9 +53,9 @@ class RobotGraph:
         self._rules = rules
         self._hidden = hidden
         self._gateways = gateways
-        faults = Faults(_log, "a query for a type")
-        self._publishers = NodeQueries(self._publisher, faults)
-        self._services = NodeQueries(self._service, faults)
+        reporter = ErrorReporter(_log, "a query for a type")
+        self._publishers = NodeQueries(self._publisher, reporter)
+        self._services = NodeQueries(self._service, reporter)
 
     async def close(self) -> None:
         """End the queries. Idempotent."""

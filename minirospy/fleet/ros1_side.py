@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, RawSubscription
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import BridgeError, DeserializationError, MinirospyError, ServiceException
 from minirospy.base.name_filter import NameFilter
 from minirospy.core.wire.header import Header
@@ -105,7 +105,7 @@ class Ros1Side:
         self._adjusting = asyncio.Lock()
         self._left_out = RateLimitedLogger(_log)
         self._misfits = RateLimitedLogger(_log, 5)
-        self._faults = Faults(_log, "passing the keys of zenoh-bridge-ros1")
+        self._reporter = ErrorReporter(_log, "passing the keys of zenoh-bridge-ros1")
         self._marker: RawSubscription | None = None
         self._beacons_received: Later | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -124,8 +124,8 @@ class Ros1Side:
             beacon_pattern(self.namespace), self._beacon_arrived, from_others=True
         )
         self._tasks = [
-            asyncio.ensure_future(keep_running(lambda: self.graph.watch(self.look), self._faults)),
-            asyncio.ensure_future(keep_running(self._beat, self._faults)),
+            asyncio.ensure_future(keep_running(lambda: self.graph.watch(self.look), self._reporter)),
+            asyncio.ensure_future(keep_running(self._beat, self._reporter)),
         ]
 
     async def close(self) -> None:

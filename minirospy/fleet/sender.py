@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import TypeAlias
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.fleet.flows import Flow, FlowQueue
 from minirospy.fleet.keys import Stamp, serialize_stamp
 from minirospy.fleet.network import FleetNetwork, Outlet
@@ -205,7 +205,7 @@ class Intake(_Worker):
 
     def __init__(self) -> None:
         super().__init__("fleet-intake")
-        self._faults = Faults(_log, "publishing a message of the fleet")
+        self._reporter = ErrorReporter(_log, "publishing a message of the fleet")
         self._queue: FlowQueue[_Arrival] = FlowQueue()
 
     @staticmethod
@@ -244,4 +244,4 @@ class Intake(_Worker):
                 try:
                     deliver(message, attachment)
                 except Exception as error:  # noqa: BLE001 - of one message: the others go on
-                    self._faults.report(error)
+                    self._reporter.report(error)

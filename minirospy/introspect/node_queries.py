@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Collection
 from functools import partial
 from typing import Generic, TypeVar
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import MinirospyError, ServiceException
 
 __all__ = ["AT_ONCE", "NodeQueries"]
@@ -37,14 +37,14 @@ class NodeQueries(Generic[_Key, _Found]):
     def __init__(
         self,
         query: Callable[[_Key], Awaitable[_Found]],
-        faults: Faults,
+        reporter: ErrorReporter,
         *,
         arrived_late: Callable[[], object] = lambda: None,
     ) -> None:
         """``arrived_late`` is called when an answer has come that :meth:`look` did not wait for."""
         self.found: dict[_Key, _Found] = {}
         self._query = query
-        self._faults = faults
+        self._reporter = reporter
         self._arrived_late = arrived_late
         self._present: set[_Key] = set()
         self._tasks: dict[_Key, asyncio.Task[None]] = {}
@@ -99,7 +99,7 @@ class NodeQueries(Generic[_Key, _Found]):
             is_quick = asyncio.get_running_loop().time() - started < _REFUSED_SECONDS
             self._failed(key, is_quick=is_quick)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
-            self._faults.report(error)
+            self._reporter.report(error)
             self._failed(key)
         else:
             # What is absent by now is new when it is back.

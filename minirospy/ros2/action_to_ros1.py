@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from typing import TYPE_CHECKING
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, DeserializationError, ROSException
 from minirospy.core.graph.goals import TERMINAL, GoalState
 from minirospy.core.idl.cdr import CDR_HEADER
@@ -87,7 +87,7 @@ class GoalsToRos1:
         self._goals: dict[str, _Goal] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._number = 0
-        self._faults = Faults(node.log, f"action {link.action}")
+        self._reporter = ErrorReporter(node.log, f"action {link.action}")
         self._heard = asyncio.Event()
         self._server: Ros2Handle | None = None
         self._is_closed = False
@@ -157,7 +157,7 @@ class GoalsToRos1:
         except (DeserializationError, ROSException) as error:
             accepted.set_exception(BridgeError(str(error)))
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
-            self._faults.report(error)
+            self._reporter.report(error)
             accepted.set_exception(BridgeError(f"the bridge failed: {type(error).__name__}"))
 
     async def _sent(self, data: bytes, feedback: Callable[[bytes], None]) -> GoalOfRos1 | None:

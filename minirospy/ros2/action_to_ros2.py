@@ -7,7 +7,7 @@ import contextlib
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, TypeVar
 
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import BridgeError, DeserializationError, ROSException
 from minirospy.core.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent, GoalState, is_meant
 from minirospy.core.idl.cdr import CDR_HEADER
@@ -102,8 +102,8 @@ class GoalsToRos2:
             node.subscribe_raw(f"{link.action}/goal", self._take_goal),
             node.subscribe_raw(f"{link.action}/cancel", self._take_cancel),
         ]
-        self._faults = Faults(node.log, f"action {link.action}")
-        self._telling = asyncio.ensure_future(keep_running(self._publish_statuses, self._faults))
+        self._reporter = ErrorReporter(node.log, f"action {link.action}")
+        self._telling = asyncio.ensure_future(keep_running(self._publish_statuses, self._reporter))
         self._reach = Reach(self._client)
 
     async def open(self) -> None:
@@ -197,7 +197,7 @@ class GoalsToRos2:
         except (BridgeError, DeserializationError) as error:
             goal.fail(" ".join(str(error).split()))
         except Exception as error:  # noqa: BLE001 - the client waits for the goal's end, whatever happened here
-            self._faults.report(error)
+            self._reporter.report(error)
             goal.fail(f"the bridge failed: {type(error).__name__}")
 
         goal.ended_at = self._loop.time()

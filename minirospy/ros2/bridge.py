@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawSubscription, raw_class
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.aio.topics import Publisher
 from minirospy.base.errors import (
     DefinitionError,
@@ -142,8 +142,8 @@ class Ros2Bridge:
         self._parameters = ParameterBridge(node, side, catalogue)
         self._types = _Types(side, options.rules, catalogue)
         self._texts = TypeTexts(node)
-        faults = Faults(node.log, "the query of a publisher")
-        self._headers = NodeQueries(self._header, faults)
+        reporter = ErrorReporter(node.log, "the query of a publisher")
+        self._headers = NodeQueries(self._header, reporter)
         self._watching: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         self._is_closed = False
@@ -152,8 +152,8 @@ class Ros2Bridge:
         """Bridge until :meth:`close`. Raise MasterUnreachableError, RpcError."""
         await self._parameters.start()
         await self.look()
-        faults = Faults(self.node.log, "the watch of both graphs")
-        self._watching = asyncio.ensure_future(keep_running(self._watch, faults))
+        reporter = ErrorReporter(self.node.log, "the watch of both graphs")
+        self._watching = asyncio.ensure_future(keep_running(self._watch, reporter))
 
     async def close(self) -> None:
         """Close all links, and the side of ROS 2. Idempotent."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import MinirospyError, ROSException
 from minirospy.base.escape import escaped
 from minirospy.ros2.action_links import ActionLink
@@ -57,7 +57,7 @@ class LinkTable(Generic[_L, _O]):
         self.links: dict[_L, _O] = {}
         self.refused: dict[_L, str] = {}
         self._log = log
-        self._faults = Faults(log, "closing a link")
+        self._reporter = ErrorReporter(log, "closing a link")
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
@@ -108,5 +108,5 @@ class LinkTable(Generic[_L, _O]):
         try:
             await self.links.pop(link).close()
         except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are closed
-            self._faults.report(error)
+            self._reporter.report(error)
         self._log.info("no longer bridging %s (%s)", link.title, link.direction.value)

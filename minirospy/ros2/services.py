@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from minirospy.aio.raw import RawService, call_raw, service_header
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import (
     BridgeError,
     DefinitionError,
@@ -140,7 +140,7 @@ class ServiceBridge:
         self._services = services
         self._types = _Types(side, rules, catalogue)
         self._call_seconds = call_seconds
-        self._headers = NodeQueries(self._header, Faults(node.log, "the query for a service's type"))
+        self._headers = NodeQueries(self._header, ErrorReporter(node.log, "the query for a service's type"))
         self._table: LinkTable[ServiceLink, _InRos1 | _InRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:

@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minirospy.aio.node import Node
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.closing import close_all
 from minirospy.base.environment import DISTRO
 from minirospy.base.errors import BridgeError
@@ -257,8 +257,8 @@ class Bridge:
         from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)
-        faults = Faults(self.node.log, "publishing the state of the clients")
-        await keep_running(partial(self._publish_states, publisher), faults)
+        reporter = ErrorReporter(self.node.log, "publishing the state of the clients")
+        await keep_running(partial(self._publish_states, publisher), reporter)
 
     async def _publish_states(self, publisher: Publisher[DiagnosticArray]) -> None:
         from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.aio.topics import Publisher
 from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.base.name_filter import NameFilter
@@ -216,12 +216,14 @@ class SharedGraph:
         self._publishers: dict[str, _SharedPublisher] = {}
         self._look_soon = asyncio.Event()
         self._looking = asyncio.Lock()
-        self._faults = Faults(_log, "a task of the bridge")
+        self._reporter = ErrorReporter(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._has_new_types = False
         self._service_types = NodeQueries(
-            self._service_type, Faults(_log, "the query for a service's type"), arrived_late=self.look_soon
+            self._service_type,
+            ErrorReporter(_log, "the query for a service's type"),
+            arrived_late=self.look_soon,
         )
 
     def now(self) -> int:
@@ -249,7 +251,7 @@ class SharedGraph:
         if self._watching is None:
             self.snapshot = Snapshot()
             self._is_first_look = True
-            self._watching = asyncio.ensure_future(keep_running(self._watch, self._faults))
+            self._watching = asyncio.ensure_future(keep_running(self._watch, self._reporter))
         self._look_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
@@ -280,7 +282,7 @@ class SharedGraph:
                     try:
                         listener(changes)
                     except Exception as error:  # noqa: BLE001 - of one client: the others are notified
-                        self._faults.report(error)
+                        self._reporter.report(error)
 
     async def _watch(self) -> None:
         pause = FASTEST_LOOK
@@ -387,7 +389,7 @@ class SharedGraph:
             except (MasterUnreachableError, RpcError, ServiceException, BridgeError) as error:
                 _log.warning("%s", error)
             except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
-                self._faults.report(error)
+                self._reporter.report(error)
 
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)

@@ -7,7 +7,7 @@ from functools import partial
 from types import TracebackType
 
 from minirospy.aio.node import Node
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.ros.rosbag.recording.player import Player
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.web.addresses import links
@@ -97,8 +97,8 @@ class PlayerBridge:
             f"open in Foxglove:   {found.foxglove}",
             f"open in Lichtblick: {found.lichtblick}",
         ]
-        faults = Faults(self._node.log, "the timeline of the bag")
-        self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), faults))
+        reporter = ErrorReporter(self._node.log, "the timeline of the bag")
+        self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
         """Send the bag's time, and the player's state when that changes, whether by a client or by a key."""

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.introspect import node_queries
 from minirospy.introspect.node_queries import AT_ONCE, NodeQueries
@@ -49,8 +49,8 @@ def queried(scene: Callable[[Nodes, NodeQueries[str, str]], Awaitable[None]]) ->
 
     async def run() -> None:
         nodes = Nodes()
-        faults = Faults(logging.getLogger("test"), "the query")
-        queries = NodeQueries(nodes.answer, faults, arrived_late=nodes.came_late.set)
+        reporter = ErrorReporter(logging.getLogger("test"), "the query")
+        queries = NodeQueries(nodes.answer, reporter, arrived_late=nodes.came_late.set)
         try:
             await asyncio.wait_for(scene(nodes, queries), LIMIT)
         finally:
@@ -156,7 +156,7 @@ def test_a_node_that_refuses_is_queried_again_soon(monkeypatch: pytest.MonkeyPat
 
     async def scene(loop: ManualLoop) -> None:
         nodes = Nodes()
-        queries = NodeQueries(nodes.answer, Faults(logging.getLogger("test"), "the query"))
+        queries = NodeQueries(nodes.answer, ErrorReporter(logging.getLogger("test"), "the query"))
         nodes.dead.add("a")
         nodes.silent.add("b")
         await queries.look(["a"], 0.0)
@@ -218,7 +218,7 @@ def test_what_nobody_foresaw_of_one_node_is_reported(caplog: pytest.LogCaptureFi
                 raise KeyError("it")
             return name
 
-        queries = NodeQueries(answer, Faults(logging.getLogger("test"), "the query"))
+        queries = NodeQueries(answer, ErrorReporter(logging.getLogger("test"), "the query"))
         await queries.look(["odd", "even"], LIMIT)
         assert queries.found == {"even": "even"}
         await queries.close()
@@ -232,7 +232,7 @@ def test_a_service_that_cannot_be_reached_is_not_reported(caplog: pytest.LogCapt
         async def answer(name: str) -> str:
             raise ServiceException(f"service [{name}] cannot be reached")
 
-        queries = NodeQueries(answer, Faults(logging.getLogger("test"), "the query"))
+        queries = NodeQueries(answer, ErrorReporter(logging.getLogger("test"), "the query"))
         await queries.look(["/dead"], LIMIT)
         assert "/dead" in queries._not_before
         await queries.close()

@@ -11,7 +11,7 @@ import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 
 from minirospy import Node
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.core.graph.goals import GoalState
 from minirospy.fleet.contents import Robot
 from minirospy.fleet.exporter import Exporter
@@ -67,7 +67,7 @@ def reported(caplog: pytest.LogCaptureFixture) -> list[str]:
 def test_work_that_fails_is_started_again_and_reported_in_one_line(caplog: pytest.LogCaptureFixture) -> None:
     async def run() -> None:
         work = Failing({1, 2}, 3)
-        await keep_running(work, Faults(logging.getLogger("here"), "the work"), pause=0.0)
+        await keep_running(work, ErrorReporter(logging.getLogger("here"), "the work"), pause=0.0)
         assert work.done.is_set()
 
     asyncio.run(run())
@@ -84,7 +84,7 @@ def test_work_that_is_cancelled_ends() -> None:
             started.set()
             await asyncio.sleep(LIMIT)
 
-        task = asyncio.ensure_future(keep_running(work, Faults(logging.getLogger("here"), "the work")))
+        task = asyncio.ensure_future(keep_running(work, ErrorReporter(logging.getLogger("here"), "the work")))
         await started.wait()
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -94,7 +94,9 @@ def test_work_that_is_cancelled_ends() -> None:
 
 
 def test_text_of_an_error_is_one_line_without_control_characters(caplog: pytest.LogCaptureFixture) -> None:
-    Faults(logging.getLogger("here"), "the work").report(ValueError("two\nlines \x1b[31m" + "x" * 5000))
+    ErrorReporter(logging.getLogger("here"), "the work").report(
+        ValueError("two\nlines \x1b[31m" + "x" * 5000)
+    )
     (record,) = caplog.records
     assert record.getMessage().isprintable()
     assert len(record.getMessage()) < 600

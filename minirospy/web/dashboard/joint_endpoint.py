@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import MinirospyError, ROSException, UrdfError, UsageError
 from minirospy.core.urdf.elements import parse_xml
 from minirospy.introspect.graph import why_illegal
@@ -77,7 +77,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self._publisher: Publisher[JointState] | None = None
         self._working: asyncio.Task[None] | None = None
         self._work_changed = asyncio.Event()
-        self._faults = Faults(_log, "following and publishing joints")
+        self._reporter = ErrorReporter(_log, "following and publishing joints")
         self._sources: list[asyncio.Task[None]] = []
 
     # --- Endpoint
@@ -125,7 +125,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         """Follow the parameters, and publish where wanted, from now on, while there is somebody who wants that."""
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
-            self._working = asyncio.ensure_future(keep_running(self._work, self._faults))
+            self._working = asyncio.ensure_future(keep_running(self._work, self._reporter))
 
     async def _work(self) -> None:
         loop = asyncio.get_running_loop()
@@ -218,7 +218,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
                 await subscription.close()
 
         self._sources = [
-            asyncio.ensure_future(keep_running(partial(follow, topic), self._faults)) for topic in topics
+            asyncio.ensure_future(keep_running(partial(follow, topic), self._reporter)) for topic in topics
         ]
 
     async def _publish(self) -> None:

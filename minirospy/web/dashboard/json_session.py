@@ -19,7 +19,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
-from minirospy.aio.tasks import PAUSE_SECONDS, Faults
+from minirospy.aio.tasks import PAUSE_SECONDS, ErrorReporter
 from minirospy.base.errors import MinirospyError
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class JsonSession:
         self._next_look = -math.inf
         self._is_change_posted = False
         self._has_failed = False
-        self._faults = Faults(_log, f"serving {self.subject}")
+        self._reporter = ErrorReporter(_log, f"serving {self.subject}")
         self._task = asyncio.ensure_future(self._run())
 
     # --- for subclasses
@@ -200,13 +200,13 @@ class JsonSession:
                 if not self._operations:
                     await wait_until(self._wake, self._next_look)
         except Exception as error:  # noqa: BLE001 - the page connects again, and the fault is in the log
-            self._faults.report(error)
+            self._reporter.report(error)
             self.client.close(_INTERNAL_ERROR, "the dashboard failed: its terminal shows why")
         finally:
             try:
                 await self.left()
             except Exception as error:  # noqa: BLE001 - nobody is there to be notified
-                self._faults.report(error)
+                self._reporter.report(error)
             self._thread.shutdown(wait=False)
 
     async def _look(self) -> None:
@@ -220,7 +220,7 @@ class JsonSession:
                 pause = await self.follow()
                 self._has_failed = False
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
-                self._faults.report(error)
+                self._reporter.report(error)
                 if not self._has_failed:
                     # The text of other errors is for the terminal: it may name what is no client's business.
                     why = (
@@ -241,7 +241,7 @@ class JsonSession:
         except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
             self.send_error(f"not an operation on {self.subject}: {name}: {_line(error)}", fields)
         except Exception as error:  # noqa: BLE001 - the page waits for the answer, whatever happened here
-            self._faults.report(error)
+            self._reporter.report(error)
             self.send_error(f"the dashboard failed on this operation: {type(error).__name__}", fields)
         else:
             if answer is not None:

@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
-from minirospy.aio.tasks import Faults, keep_running
+from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.graph import Graph, why_illegal
@@ -86,8 +86,8 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         self._watching.add(session)
         if self._reporting is None or self._reporting.done():
             self._last = None
-            faults = Faults(_log, "the report of the nodes")
-            self._reporting = asyncio.ensure_future(keep_running(self._report, faults))
+            reporter = ErrorReporter(_log, "the report of the nodes")
+            self._reporting = asyncio.ensure_future(keep_running(self._report, reporter))
         elif self._last:
             session.report(_report_of(describe(self._last)))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.aio.handle import serialized
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import (
     BridgeError,
     MessageException,
@@ -106,7 +106,7 @@ class RosbridgeSession:
         self._subscribed: dict[str, ClientTopic] = {}
         self._published: dict[str, _Published] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._faults = Faults(_log, "a client's call of a service")
+        self._reporter = ErrorReporter(_log, "a client's call of a service")
         self._calls = 0
         self._calls_size = 0
         """Memory of the calls under way."""
@@ -510,7 +510,7 @@ class RosbridgeSession:
             )
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
             values, result = "the bridge failed on this call", False
-            self._faults.report(error)
+            self._reporter.report(error)
         fields = protocol.service_response(event.service, values, event.id, result=result)
         self.send(fields, event.compression, event.fragment_size)
 

@@ -17,7 +17,7 @@ from tf2_web_republisher.msg import (
 from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
 from minirospy.aio.node import Node
-from minirospy.aio.tasks import Faults
+from minirospy.aio.tasks import ErrorReporter
 from minirospy.aio.topics import Publisher
 from minirospy.base.errors import BridgeError, ServiceException, TransformException
 from minirospy.ros.actionlib.actionlib.aio import ActionServer, GoalError, ServerGoal
@@ -52,7 +52,7 @@ class Republisher:
         self._ids = itertools.count()
         self._closing: list[_Closing] = []
         self._requests: set[asyncio.Task[None]] = set()
-        self._faults = Faults(node.log, "republishing transforms")
+        self._reporter = ErrorReporter(node.log, "republishing transforms")
 
     async def start(self) -> None:
         """Listen to transforms, and serve."""
@@ -99,7 +99,7 @@ class Republisher:
         task = asyncio.ensure_future(self._serve(request, pairs, publisher))
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
-        task.add_done_callback(self._faults.of_task)
+        task.add_done_callback(self._reporter.of_task)
         # A client of rosbridge subscribes without a type: the master must know the topic by then.
         await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
