@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from minirospy.base.errors import BoardError
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.link import Edge, Link
 from minirospy.board.model import PINS, BoardModel, Force, Function, Pin, Position, Press, Release, Setup
-from minirospy.board.place import Place
 from minirospy.board.protocol import MovePerson
 
 __all__ = ["Board", "BoardState", "Edge"]
@@ -52,12 +52,12 @@ class Board:
     """
 
     def __init__(self, name: str | None = None) -> None:
-        place = Place.find(name)
+        directory = BoardDirectory.find(name)
         # Weak: a watch that nobody holds any more takes no more edges.
         self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
-        self.name = place.name
-        self._link = Link(place, self._spread)
+        self.name = directory.name
+        self._link = Link(directory, self._spread)
 
     def __enter__(self) -> Board:
         return self

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy.base import private_files
 from minirospy.base.child_lifetime import start_outside_of_job
 from minirospy.base.errors import BoardError
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.model import Function, Operation, Pin, Position, Setup, Write
-from minirospy.board.place import Place
 from minirospy.board.protocol import (
     VERSION,
     Changed,
@@ -81,8 +81,8 @@ class Link:
     Raise BoardError when no server can be started.
     """
 
-    def __init__(self, place: Place, on_edge: Callable[[Edge], None] | None = None) -> None:
-        self._place = place
+    def __init__(self, directory: BoardDirectory, on_edge: Callable[[Edge], None] | None = None) -> None:
+        self._directory = directory
         self._on_edge = on_edge
         # Re-entrant: a signal handler (a node's shutdown hook) may set pins while its thread is in here.
         self._news = threading.Condition(threading.RLock())
@@ -94,7 +94,7 @@ class Link:
         self._mine: set[int] = set()
         self._failure: BoardError | None = None
         self._closed = False
-        self._connection: _Connection | None = _reach(place, lambda: False)
+        self._connection: _Connection | None = _reach(directory, lambda: False)
         self.states: list[Pin] = list(self._connection.pins)
         self.levels: list[int] = [pin.level for pin in self.states]
         self.person = self._connection.person
@@ -116,7 +116,7 @@ class Link:
             if number in self._refused:
                 raise BoardError(self._refused.pop(number))
             if not answered:
-                raise BoardError(f"the virtual board [{self._place.name}] does not answer")
+                raise BoardError(f"the virtual board [{self._directory.name}] does not answer")
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
         """Set the latches of output pins, in order, without waiting; the mirror shows it immediately."""
@@ -144,7 +144,7 @@ class Link:
 
     def _send(self, operation: Operation | MovePerson | None) -> int:
         if self._closed:
-            raise BoardError(f"the connection to the virtual board [{self._place.name}] is closed")
+            raise BoardError(f"the connection to the virtual board [{self._directory.name}] is closed")
         if self._failure is not None:
             raise self._failure
         self._number += 1
@@ -172,7 +172,7 @@ class Link:
             return None
 
         try:
-            connection = _reach(self._place, lambda: self._closed)
+            connection = _reach(self._directory, lambda: self._closed)
         except BoardError as error:
             with self._news:
                 self._failure = error
@@ -265,37 +265,37 @@ class _Connection:
         self._socket.close()
 
 
-def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
+def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connection:
     """Connect to the board's server; start one when none answers."""
-    place.prepare()
+    directory.prepare()
     deadline = time.monotonic() + START_PATIENCE
     process: subprocess.Popen[bytes] | None = None
     pause = 0.004
     while True:
-        connection = _connect(place)
+        connection = _connect(directory)
         if connection is not None:
             return connection
         status = None if process is None else process.poll()
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
-            raise BoardError(f"the virtual board [{place.name}] does not start{_last_words(place)}")
+            raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
             # Status 0 without an answer: it met a server that was just ending. Below 0: a Ctrl-C that was meant
             # for us killed it before it had left our terminal.
-            process = _start_server(place)
+            process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
 
 
-def _connect(place: Place) -> _Connection | None:
+def _connect(directory: BoardDirectory) -> _Connection | None:
     """Return the connection, after Hello and Welcome, or None when nobody answers."""
     token = ""
 
     try:
-        if sys.platform != "win32" and place.uses_unix_socket:
+        if sys.platform != "win32" and directory.uses_unix_socket:
             link = socket.socket(socket.AF_UNIX)
-            target: str | tuple[str, int] = str(place.socket_path)
+            target: str | tuple[str, int] = str(directory.socket_path)
         else:
-            port, token = place.address_path.read_text().split()
+            port, token = directory.address_path.read_text().split()
             link = socket.socket(socket.AF_INET)
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             target = ("127.0.0.1", int(port))
@@ -321,12 +321,12 @@ def _connect(place: Place) -> _Connection | None:
     welcome, *more = messages
     if not isinstance(welcome, Welcome) or welcome.version != VERSION:
         link.close()
-        raise BoardError(f"the virtual board [{place.name}] is in use by another version of minirospy")
+        raise BoardError(f"the virtual board [{directory.name}] is in use by another version of minirospy")
 
     return _Connection(link, stream, welcome, more)
 
 
-def _start_server(place: Place) -> subprocess.Popen[bytes]:
+def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     """Return a server process in a new session, which outlives this one as long as the board has users."""
     import subprocess
 
@@ -339,14 +339,14 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
     # A temporary board is for what the guarded process has started, and need not outlive it.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
-    with open(os.devnull, "a") if windows else private_files.open_text(place.log_path, "a") as log:
+    with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(
-            [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
+            [sys.executable, "-c", _SERVE, root, str(directory.folder), directory.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             # On Windows the server writes its log itself: server.py says why.
             stderr=log,
-            cwd=place.folder,
+            cwd=directory.folder,
             start_new_session=True,
             creationflags=flags,
         )
@@ -355,9 +355,9 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
     return process
 
 
-def _last_words(place: Place) -> str:
+def _last_words(directory: BoardDirectory) -> str:
     try:
-        lines = place.log_path.read_text(errors="replace").strip().splitlines()
+        lines = directory.log_path.read_text(errors="replace").strip().splitlines()
     except OSError:
         return ""
-    return f": {lines[-1]} ({place.log_path})" if lines else ""
+    return f": {lines[-1]} ({directory.log_path})" if lines else ""

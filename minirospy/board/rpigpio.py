@@ -17,10 +17,10 @@ from collections.abc import Sequence
 
 from minirospy.base.signal_dispatch import is_dispatching_signal
 from minirospy.board.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.events import Callback, CallbackThread, Detector, Slope
 from minirospy.board.link import Edge, Link
 from minirospy.board.model import PINS, Function, Pull, Setup
-from minirospy.board.place import Place
 from minirospy.board.wave import Wave
 
 __all__ = [
@@ -333,7 +333,7 @@ class Gpio:
             return link
         with self._lock:
             if self._link is None:
-                self._link = Link(Place.find(self._board), self._on_edge)
+                self._link = Link(BoardDirectory.find(self._board), self._on_edge)
                 self._levels = self._link.levels
                 atexit.register(self.close)
             return self._link

@@ -17,8 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from minirospy.base import private_files
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.model import BoardModel, Operation, OperationError
-from minirospy.board.place import Place
 from minirospy.board.protocol import (
     VERSION,
     Changed,
@@ -54,17 +54,17 @@ LOCK_PATIENCE = 5.0
 
 def main(argv: list[str]) -> int:
     """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
-    place = Place(argv[1], Path(argv[0]))
+    directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
         # Not the open file that it is elsewhere: Windows could not remove that, nor its folder.
-        sys.stderr = _LogOnDemand(place.log_path)
+        sys.stderr = _LogOnDemand(directory.log_path)
     # A board that somebody kept stays, also when another process starts it again.
-    is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not place.state_path.exists()
-    with _locked(place) as owned:
+    is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
+    with _locked(directory) as owned:
         if owned:
-            asyncio.run(_Server(place).serve())
+            asyncio.run(_Server(directory).serve())
     if owned and is_temporary:
-        for path in (place.state_path, place.log_path, place.lock_path):
+        for path in (directory.state_path, directory.log_path, directory.lock_path):
             with contextlib.suppress(OSError):
                 private_files.remove_file(path)
     return 0
@@ -83,10 +83,10 @@ class _LogOnDemand(io.TextIOBase):
 
 
 class _Server:
-    def __init__(self, place: Place) -> None:
-        self._place = place
-        self._token = "" if place.uses_unix_socket else secrets.token_hex(16)
-        self._model = _saved(place)
+    def __init__(self, directory: BoardDirectory) -> None:
+        self._directory = directory
+        self._token = "" if directory.uses_unix_socket else secrets.token_hex(16)
+        self._model = _saved(directory)
         self._clients: set[_Client] = set()
         self._abandoned = asyncio.Event()
         self._saving: asyncio.TimerHandle | None = None
@@ -95,13 +95,13 @@ class _Server:
     async def serve(self) -> None:
         loop = asyncio.get_running_loop()
         self._wait_for_clients()
-        if sys.platform != "win32" and self._place.uses_unix_socket:
-            self._place.socket_path.unlink(missing_ok=True)
-            server = await loop.create_unix_server(lambda: _Client(self), self._place.socket_path)
-            address = self._place.socket_path
+        if sys.platform != "win32" and self._directory.uses_unix_socket:
+            self._directory.socket_path.unlink(missing_ok=True)
+            server = await loop.create_unix_server(lambda: _Client(self), self._directory.socket_path)
+            address = self._directory.socket_path
         else:
             server = await loop.create_server(lambda: _Client(self), "127.0.0.1", 0)
-            address = self._place.address_path
+            address = self._directory.address_path
             _write_private(address, f"{server.sockets[0].getsockname()[1]} {self._token}".encode())
         try:
             await self._abandoned.wait()
@@ -161,7 +161,7 @@ class _Server:
             self._saving = None
         # A removed folder (a test's, a cleaned /tmp) must not fail the clients.
         with contextlib.suppress(OSError):
-            _write_private(self._place.state_path, encode_board(self._model.pins, self._model.person))
+            _write_private(self._directory.state_path, encode_board(self._model.pins, self._model.person))
 
 
 class _Client(asyncio.Protocol):
@@ -215,9 +215,9 @@ class _Client(asyncio.Protocol):
             self._transport.abort()
 
 
-def _saved(place: Place) -> BoardModel:
+def _saved(directory: BoardDirectory) -> BoardModel:
     try:
-        return BoardModel(*decode_board(place.state_path.read_bytes()))
+        return BoardModel(*decode_board(directory.state_path.read_bytes()))
     except (OSError, ProtocolError):
         return BoardModel()
 
@@ -231,12 +231,14 @@ def _write_private(path: Path, data: bytes) -> None:
 
 
 @contextlib.contextmanager
-def _locked(place: Place) -> Iterator[bool]:
+def _locked(directory: BoardDirectory) -> Iterator[bool]:
     """Yield whether this process got the board's lock; waits a little for one that is about to end."""
     deadline = time.monotonic() + LOCK_PATIENCE
-    with os.fdopen(private_files.open_file(place.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:
+    with os.fdopen(
+        private_files.open_file(directory.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b"
+    ) as file:
         while not (owned := _try_lock(file.fileno())):
-            if time.monotonic() > deadline or _somebody_answers(place):
+            if time.monotonic() > deadline or _somebody_answers(directory):
                 break
             time.sleep(0.02)
         yield owned
@@ -257,8 +259,8 @@ def _try_lock(handle: int) -> bool:
     return True
 
 
-def _somebody_answers(place: Place) -> bool:
-    return (place.socket_path if place.uses_unix_socket else place.address_path).exists()
+def _somebody_answers(directory: BoardDirectory) -> bool:
+    return (directory.socket_path if directory.uses_unix_socket else directory.address_path).exists()
 
 
 if __name__ == "__main__":

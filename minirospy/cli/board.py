@@ -13,8 +13,8 @@ from minirospy.base.errors import UsageError
 from minirospy.base.escape import own_output
 from minirospy.base.keyboard import Keys
 from minirospy.board.board import Board, BoardState
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.model import BUTTONS, LEDS, Function, Pin, Position, Pull
-from minirospy.board.place import Place
 from minirospy.board.scanner import FIELDS, Circle
 from minirospy.command.command import run, warn
 from minirospy.command.parser import Misuse, Parser
@@ -279,7 +279,7 @@ def _boards_parser() -> Parser:
 
 
 def _boards() -> None:
-    for name in Place.find().names():
+    for name in BoardDirectory.find().names():
         print(name)
 
 

@@ -134,7 +134,7 @@ def _log_function(level: int, name: str) -> LogFunction:
     return _named(log, name, f"Log ``msg % args`` at level {SEVERITIES[level]}.")
 
 
-class _Places:
+class _CallSites:
     """Which places in the code have logged: when, and what. A place is one call, whatever function it calls."""
 
     def __init__(self) -> None:
@@ -170,7 +170,7 @@ class _Places:
         return True
 
 
-places = _Places()
+places = _CallSites()
 """Which places of the program have logged."""
 
 

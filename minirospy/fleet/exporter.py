@@ -24,11 +24,11 @@ from minirospy.fleet.keys import (
     service_key,
     topic_key,
 )
-from minirospy.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.fleet.network import Deferred, FleetNetwork, QueryFailed
 from minirospy.fleet.outbound import OutboundTopic
 from minirospy.fleet.robot_graph import RobotGraph
 from minirospy.fleet.rules import GatewayRules
-from minirospy.fleet.sender import Intake, Sender
+from minirospy.fleet.sender import Receiver, Sender
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Exporter:
         network: FleetNetwork,
         definitions: Definitions,
         sender: Sender,
-        intake: Intake,
+        receiver: Receiver,
         claim: Claim,
         rules: GatewayRules,
         hidden: Callable[[], Collection[str]],
@@ -67,17 +67,17 @@ class Exporter:
         self._network = network
         self._definitions = definitions
         self._sender = sender
-        self._intake = intake
+        self._receiver = receiver
         self._rules = rules
         self._spawn = spawn
-        self._tokens: dict[str, Later] = {}
+        self._tokens: dict[str, Deferred] = {}
         self._readers: dict[str, set[str]] = {}
         self._claims = {claim}
         self._rivals = RateLimitedLogger(_log)
-        self._flows = Intake.flows(_MAX_IN_FLOWS)
+        self._flows = Receiver.flows(_MAX_IN_FLOWS)
         self._reporter = ErrorReporter(_log, "the watch of the robot's graph")
         self._watching: asyncio.Task[None] | None = None
-        self._declared: list[Later] = []
+        self._declared: list[Deferred] = []
 
     async def start(self) -> None:
         """Announce the robot until :meth:`close`. Raise MasterUnreachableError, RpcError."""
@@ -238,12 +238,12 @@ class Exporter:
         topic, md5sum, writer = parsed
         flow = self._flows.of((topic, writer))
         if flow is not None:
-            self._intake.add(
+            self._receiver.add(
                 flow, lambda body, _: self._deliver(topic, md5sum, writer, body), message, attachment
             )
 
     def _deliver(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
-        """Publish a message. In the intake's thread."""
+        """Publish a message. In the receiver's thread."""
         inbound = self.inbound.get(topic)
         if inbound is None or not inbound.publish(md5sum, body):
             run_on_loop(self._node, self._hold(topic, md5sum, writer, body))

@@ -20,10 +20,10 @@ from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.exporter import Exporter
 from minirospy.fleet.importer import Importer
 from minirospy.fleet.keys import ROOT, Claim, claim_key, is_robot_name, parse_definition
-from minirospy.fleet.network import FleetNetwork, Later, NetworkOptions, QueryFailed
+from minirospy.fleet.network import Deferred, FleetNetwork, NetworkOptions, QueryFailed
 from minirospy.fleet.ros1_side import Ros1Side
 from minirospy.fleet.rules import GatewayRules
-from minirospy.fleet.sender import Intake, Outflow, Sender
+from minirospy.fleet.sender import Outflow, Receiver, Sender
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
@@ -72,8 +72,8 @@ class Gateway:
         self._since = time.monotonic()
         self._definitions: Definitions | None = None
         self._sender: Sender | None = None
-        self._intake: Intake | None = None
-        self._declared: list[Later] = []
+        self._receiver: Receiver | None = None
+        self._declared: list[Deferred] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._reporter = ErrorReporter(_log, "a task of the gateway")
         self._failures = RateLimitedLogger(_log)
@@ -96,7 +96,7 @@ class Gateway:
         assert network
         definitions = self._definitions = Definitions(self.node, network)
         sender = self._sender = Sender(network, options.clock)
-        intake = self._intake = Intake()
+        receiver = self._receiver = Receiver()
         self._declared = [
             network.answer(f"{ROOT}/ping/{self.id}", self._pong, is_control=True),
             network.answer(f"{ROOT}/status/{self.id}", self._status, is_control=True),
@@ -108,7 +108,7 @@ class Gateway:
                 network,
                 definitions,
                 sender,
-                intake,
+                receiver,
                 self.id,
                 options.name,
                 options.rules,
@@ -124,7 +124,7 @@ class Gateway:
                 network,
                 definitions,
                 sender,
-                intake,
+                receiver,
                 self.claim,
                 options.rules,
                 self._hidden,
@@ -137,7 +137,7 @@ class Gateway:
                 network,
                 definitions,
                 sender,
-                intake,
+                receiver,
                 self.claim,
                 options.rules,
                 options.ros1_namespace,
@@ -167,8 +167,8 @@ class Gateway:
             self._sender.close()
         if self.network:
             await self.network.close()
-        if self._intake:
-            self._intake.close()
+        if self._receiver:
+            self._receiver.close()
 
     def status(self) -> dict[str, object]:
         """Return what this gateway is, and what it has passed; all of it numbers, texts and lists, for JSON."""

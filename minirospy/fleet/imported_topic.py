@@ -31,9 +31,9 @@ from minirospy.fleet.keys import (
     replay_key,
     want_key,
 )
-from minirospy.fleet.network import FleetNetwork, Later
+from minirospy.fleet.network import Deferred, FleetNetwork
 from minirospy.fleet.rules import GatewayRules
-from minirospy.fleet.sender import Intake, Outflow, Sender
+from minirospy.fleet.sender import Outflow, Receiver, Sender
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
@@ -61,7 +61,7 @@ class Shared:
     network: FleetNetwork
     definitions: Definitions
     sender: Sender
-    intake: Intake
+    receiver: Receiver
     gateway: str
     rules: GatewayRules
     spawn: Callable[[Coroutine[object, object, None]], object]
@@ -86,15 +86,15 @@ class ImportedTopic:
         self._is_global = is_global
         self._shared = shared
         self._offset = offset
-        self._flow = Intake.flow()
+        self._flow = Receiver.flow()
         self._numbers: dict[str, int] = {}
         self._misfits = RateLimitedLogger(_log)
         self._publisher: Publisher[Message] | None = None
         self._statics: StaticTransforms | None = None
-        self._wanted: list[Later] = []
+        self._wanted: list[Deferred] = []
         self._unwanting: asyncio.TimerHandle | None = None
         self._subscription: RawSubscription | None = None
-        self._offers: dict[tuple[str, bool], Later] = {}
+        self._offers: dict[tuple[str, bool], Deferred] = {}
         self._outflow: Outflow | None = None
         self._is_closed = False
 
@@ -245,7 +245,7 @@ class ImportedTopic:
             )
             return
         is_replay = key.startswith(_REPLAY)
-        self._shared.intake.add(
+        self._shared.receiver.add(
             self._flow, self._deliver_replay if is_replay else self._deliver, message, attachment
         )
 
@@ -253,7 +253,7 @@ class ImportedTopic:
         self._publish(message)
 
     def _deliver(self, message: bytes, attachment: bytes) -> None:
-        """Publish a message here. In the intake's thread."""
+        """Publish a message here. In the receiver's thread."""
         stamp = parse_stamp(attachment)
         if stamp:
             before = self._numbers.get("out")

@@ -19,10 +19,10 @@ from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.holders import HOLD_SECONDS, parse_machines
 from minirospy.fleet.imported_topic import ImportedTopic, Shared
 from minirospy.fleet.keys import ROOT, Claim, ServiceToken, call_key, parse_claim
-from minirospy.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.fleet.network import Deferred, FleetNetwork, QueryFailed
 from minirospy.fleet.presence import Presence
 from minirospy.fleet.rules import GatewayRules
-from minirospy.fleet.sender import Intake, Sender
+from minirospy.fleet.sender import Receiver, Sender
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.master.heap import return_free_memory
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
@@ -80,7 +80,7 @@ class Importer:
         network: FleetNetwork,
         definitions: Definitions,
         sender: Sender,
-        intake: Intake,
+        receiver: Receiver,
         gateway: str,
         own_name: str,
         rules: GatewayRules,
@@ -93,7 +93,16 @@ class Importer:
         self._node = node
         self._network = network
         self._shared = Shared(
-            node, network, definitions, sender, intake, gateway, rules, spawn, clock, RateLimitedLogger(_log)
+            node,
+            network,
+            definitions,
+            sender,
+            receiver,
+            gateway,
+            rules,
+            spawn,
+            clock,
+            RateLimitedLogger(_log),
         )
         self._rules = rules
         self._spawn = spawn
@@ -121,7 +130,7 @@ class Importer:
             self._answering, lambda: self.contents.gateways, lambda: self._soon(_SETTLE_SECONDS)
         )
         self._watching: list[asyncio.Task[None]] = []
-        self._declared: list[Later] = []
+        self._declared: list[Deferred] = []
 
     @property
     def names(self) -> list[str]:

@@ -43,7 +43,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
-    """Run a coroutine on a node's loop, and wait: messages that come faster than the loop takes them stay in the intake."""
+    """Run a coroutine on a node's loop, and wait: messages that come faster than the loop takes them stay in the receiver."""
     assert node._loop
     done = asyncio.run_coroutine_threadsafe(work, node._loop)
     with contextlib.suppress(Exception):
@@ -174,7 +174,7 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher._wait_for_expected()
-        # What was held goes first: until then the intake's thread hands over to `hold`, which is on this loop.
+        # What was held goes first: until then the receiver's thread hands over to `hold`, which is on this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

@@ -162,11 +162,11 @@ class FleetNetwork:
 
     # --- tokens
 
-    def declare_token(self, key: str) -> Later:
+    def declare_token(self, key: str) -> Deferred:
         """Declare that something is there."""
         return self._declare(lambda: self._session.liveliness().declare_token(key))
 
-    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Later:
+    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Deferred:
         """Call ``changed(key, is_there)`` for each token that is there, and whenever one comes or goes."""
         put = self._zenoh.SampleKind.PUT
 
@@ -197,7 +197,7 @@ class FleetNetwork:
 
     def subscribe(
         self, key: str, deliver: Callable[[str, bytes, bytes], object], *, from_others: bool = False
-    ) -> Later:
+    ) -> Deferred:
         """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block.
 
         ``from_others``: not with those of this session.
@@ -217,7 +217,7 @@ class FleetNetwork:
 
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
-    def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Later:
+    def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Deferred:
         """Call ``changed(is_there)`` when another session subscribes to a key, and when none does any more."""
 
         def declare() -> Declared:
@@ -279,7 +279,7 @@ class FleetNetwork:
         *,
         is_control: bool = False,
         from_others: bool = False,
-    ) -> Later:
+    ) -> Deferred:
         """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
 
         ``is_control``: of the fleet itself: its handler waits for no node of a user. ``from_others``: not those of this session.
@@ -387,8 +387,8 @@ class FleetNetwork:
             raise QueryFailed(one_line(error)) from error
         await ended.wait()
 
-    def _declare(self, declare: Callable[[], Declared]) -> Later:
-        return Later(self._caller, declare, self._zenoh.ZError)
+    def _declare(self, declare: Callable[[], Declared]) -> Deferred:
+        return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
         """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
@@ -450,7 +450,7 @@ class _Share:
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
-class Later:
+class Deferred:
     """Something that is declared in the background, and undeclared after that."""
 
     def __init__(
@@ -507,7 +507,7 @@ class Beacon:
             self._outlet = declare()
             return self._outlet
 
-        self._declared = Later(caller, opened, fault)
+        self._declared = Deferred(caller, opened, fault)
 
     def put(self) -> None:
         """Put one, in the background; none while the one before waits."""

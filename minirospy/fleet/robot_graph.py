@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["RobotGraph"]
 
 _log = logging.getLogger(__name__)
-_FASTEST_LOOK, _SLOWEST_LOOK = 0.25, 2.0
+_MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
 """After this the graph is announced without what is still queried for."""
 
@@ -92,7 +92,7 @@ class RobotGraph:
 
     async def watch(self, look: Callable[[], Awaitable[bool]]) -> None:
         """Call ``look`` again and again: often while it returns that something has changed."""
-        pause = _FASTEST_LOOK
+        pause = _MIN_REFRESH_INTERVAL
         while True:
             await asyncio.sleep(pause)
             changed = False
@@ -106,8 +106,8 @@ class RobotGraph:
                 if self.is_master_reached:
                     _log.warning("the graph cannot be read: %s. Will keep trying.", error)
                 self.is_master_reached = False
-            slowest = max(_SLOWEST_LOOK, 20 * (time.monotonic() - started))
-            pause = _FASTEST_LOOK if changed else min(pause * 1.5, slowest)
+            slowest = max(_MAX_REFRESH_INTERVAL, 20 * (time.monotonic() - started))
+            pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _topic_token(self, export: Export) -> TopicToken | None:
         headers = [

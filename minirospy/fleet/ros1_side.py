@@ -24,7 +24,7 @@ from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.inbound import call_service
 from minirospy.fleet.keys import UNKNOWN_MD5, Claim, ServiceToken
-from minirospy.fleet.network import Beacon, FleetNetwork, Later, QueryFailed
+from minirospy.fleet.network import Beacon, Deferred, FleetNetwork, QueryFailed
 from minirospy.fleet.robot_graph import RobotGraph
 from minirospy.fleet.ros1_keys import (
     PERIOD,
@@ -39,7 +39,7 @@ from minirospy.fleet.ros1_keys import (
 )
 from minirospy.fleet.ros1_topic import Ros1Topic, Shared
 from minirospy.fleet.rules import GatewayRules, is_logger_service
-from minirospy.fleet.sender import Intake, Sender
+from minirospy.fleet.sender import Receiver, Sender
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
@@ -70,7 +70,7 @@ class Ros1Side:
         network: FleetNetwork,
         definitions: Definitions,
         sender: Sender,
-        intake: Intake,
+        receiver: Receiver,
         claim: Claim,
         rules: GatewayRules,
         namespace: str,
@@ -92,8 +92,8 @@ class Ros1Side:
         self._node = node
         self._network = network
         self._rules = rules
-        self._shared = Shared(node, network, definitions, sender, intake, rules, namespace, spawn)
-        self._answered: dict[ServiceToken, Later] = {}
+        self._shared = Shared(node, network, definitions, sender, receiver, rules, namespace, spawn)
+        self._answered: dict[ServiceToken, Deferred] = {}
         self._outlets: dict[str, Beacon] = {}
         # Beacons come in Zenoh's threads.
         self._lock = threading.Lock()
@@ -107,7 +107,7 @@ class Ros1Side:
         self._misfits = RateLimitedLogger(_log, 5)
         self._reporter = ErrorReporter(_log, "passing the keys of zenoh-bridge-ros1")
         self._marker: RawSubscription | None = None
-        self._beacons_received: Later | None = None
+        self._beacons_received: Deferred | None = None
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:

@@ -11,11 +11,11 @@ from minirospy.core.wire.header import Header
 from minirospy.fleet.definitions import Definitions
 from minirospy.fleet.inbound import InboundTopic, run_on_loop
 from minirospy.fleet.keys import Offer
-from minirospy.fleet.network import FleetNetwork, Later
+from minirospy.fleet.network import Deferred, FleetNetwork
 from minirospy.fleet.outbound import OutboundTopic
 from minirospy.fleet.ros1_keys import SharedTopic, data_key
 from minirospy.fleet.rules import GatewayRules
-from minirospy.fleet.sender import Intake, Sender
+from minirospy.fleet.sender import Receiver, Sender
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -38,7 +38,7 @@ class Shared:
     network: FleetNetwork
     definitions: Definitions
     sender: Sender
-    intake: Intake
+    receiver: Receiver
     rules: GatewayRules
     namespace: str
     spawn: Callable[[Coroutine[object, object, None]], object]
@@ -54,10 +54,10 @@ class Ros1Topic:
         self._shared = shared
         self._topic = topic._replace(is_offered=False, is_wanted=False)
         self._key = data_key(self.token.type, self.token.md5sum, self.token.topic, shared.namespace)
-        self._flow = Intake.flow()
-        self._matching: Later | None = None
+        self._flow = Receiver.flow()
+        self._matching: Deferred | None = None
         self._is_matched = False
-        self._subscribed: Later | None = None
+        self._subscribed: Deferred | None = None
         self._replaying: asyncio.TimerHandle | None = None
         self._is_closed = False
 
@@ -161,10 +161,10 @@ class Ros1Topic:
 
     def _arrived(self, _: str, message: bytes, __: bytes) -> None:
         """Take a message. In a thread of Zenoh's."""
-        self._shared.intake.add(self._flow, self._deliver, message, b"")
+        self._shared.receiver.add(self._flow, self._deliver, message, b"")
 
     def _deliver(self, message: bytes, _: bytes) -> None:
-        """Publish a message. In the intake's thread."""
+        """Publish a message. In the receiver's thread."""
         inbound = self.inbound
         if inbound is None or not inbound.publish(self.token.md5sum, message):
             run_on_loop(self._shared.node, self._hold(message))

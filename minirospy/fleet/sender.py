@@ -14,7 +14,7 @@ from minirospy.fleet.keys import Stamp, serialize_stamp
 from minirospy.fleet.network import FleetNetwork, Outlet
 from minirospy.fleet.rules import Priority, Throttle
 
-__all__ = ["Intake", "Outflow", "Sender"]
+__all__ = ["Outflow", "Receiver", "Sender"]
 
 _log = logging.getLogger(__name__)
 _CLOSE_SECONDS = 2.0
@@ -175,7 +175,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """The flows of an intake by key, at most so many: the least recently used one makes room. Safe for threads."""
+    """The flows of a receiver by key, at most so many: the least recently used one makes room. Safe for threads."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -192,19 +192,19 @@ class Flows:
                     if idle is None:
                         return None
                     del self._flows[idle]
-                flow = Intake.flow()
+                flow = Receiver.flow()
             self._flows[key] = flow
             return flow
 
 
-class Intake(_Worker):
+class Receiver(_Worker):
     """Messages that have arrived, until they are published: fair between robots' topics.
 
     Publishing may wait for a subscriber, some milliseconds; Zenoh's own thread would hold up all robots meanwhile.
     """
 
     def __init__(self) -> None:
-        super().__init__("fleet-intake")
+        super().__init__("fleet-receiver")
         self._reporter = ErrorReporter(_log, "publishing a message of the fleet")
         self._queue: FlowQueue[_Arrival] = FlowQueue()
 
@@ -225,7 +225,7 @@ class Intake(_Worker):
         message: bytes,
         attachment: bytes,
     ) -> None:
-        """Have ``deliver(message, attachment)`` called in the thread of the intake."""
+        """Have ``deliver(message, attachment)`` called in the thread of the receiver."""
         with self._condition:
             if not self._is_closed:
                 self._queue.add(flow, (deliver, message, attachment), len(message))

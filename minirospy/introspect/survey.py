@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from minirospy.base.environment import is_own_host
 from minirospy.introspect.doctor.graph import Answers, NodeAnswer, ask_nodes, differing_types, node_trouble
-from minirospy.introspect.doctor.reach import MasterPlace, host_port, look_up
+from minirospy.introspect.doctor.reach import MasterLocation, host_port, look_up
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.processes import ProcessLoad, ProcessLoads
 from minirospy.runtime.rpc.master_proxy import SystemState
@@ -45,7 +45,7 @@ class Survey:
     seconds: float
     state: SystemState
     answers: Answers
-    place: MasterPlace
+    place: MasterLocation
     counts: Mapping[tuple[int, object, Edge], Counts] = field(default_factory=dict)
     loads: Mapping[str, ProcessLoad] = field(default_factory=dict)
 
@@ -56,9 +56,9 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
     answers = ask_nodes(graph, state, with_stats=True)
     host, port = host_port(graph.master.uri)
     try:
-        place = MasterPlace(host, port, look_up(host))
+        place = MasterLocation(host, port, look_up(host))
     except OSError:
-        place = MasterPlace(host, port, [])
+        place = MasterLocation(host, port, [])
     counts: dict[tuple[int, object, Edge], Counts] = {}
     for answer in answers.values():
         counts.update(_counts(answer))
@@ -107,7 +107,7 @@ def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
     }
 
 
-def _described(answer: NodeAnswer, place: MasterPlace) -> dict[str, object]:
+def _described(answer: NodeAnswer, place: MasterLocation) -> dict[str, object]:
     host = host_port(answer.node.uri or "")[0]
     text, advice = node_trouble(host, answer.trouble, place) if answer.trouble else ("", "")
     return {

@@ -50,7 +50,7 @@ __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
 """Field of the connection header of what comes from ROS 2, so that no bridge to the same domain sends it back."""
-_FASTEST_LOOK = 0.25
+_MIN_REFRESH_INTERVAL = 0.25
 _QUERY_SECONDS = 3.0
 """After this topics are bridged without what is still queried of their publishers."""
 _JOIN_SECONDS = 2.0
@@ -65,7 +65,7 @@ _ROS1_QUEUE = 1000
 class Ros2Options:
     """``topics``, ``services``, ``actions``: which may be bridged. ``call_seconds``: how long a call of a service may take.
 
-    ``slowest_look``: seconds between looks at graphs that do not change.
+    ``max_refresh_interval``: seconds between looks at graphs that do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -73,7 +73,7 @@ class Ros2Options:
     actions: NameFilter = field(default_factory=NameFilter)
     call_seconds: float = 60.0
     rules: Rules = BUILT_IN
-    slowest_look: float = 1.0
+    max_refresh_interval: float = 1.0
 
 
 class _Types:
@@ -192,7 +192,7 @@ class Ros2Bridge:
         return has_changed
 
     async def _watch(self) -> None:
-        pause = _FASTEST_LOOK
+        pause = _MIN_REFRESH_INTERVAL
         is_reported = False
         # In Python 3.11 wait_for, which calls use, may swallow a cancellation.
         while not self._is_closed:
@@ -205,8 +205,8 @@ class Ros2Bridge:
                 if not is_reported:
                     self.node.log.warning("the graph cannot be read: %s. Will keep trying.", error)
                 is_reported = True
-            slowest = max(self.options.slowest_look, _FASTEST_LOOK)
-            pause = _FASTEST_LOOK if changed else min(pause * 1.5, slowest)
+            slowest = max(self.options.max_refresh_interval, _MIN_REFRESH_INTERVAL)
+            pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _snapshot(self) -> Snapshot:
         """Return the graph of ROS 1; notice which one it is."""

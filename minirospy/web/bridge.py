@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from minirospy.web.rosapi.services import Rosapi
     from minirospy.web.tf_republisher.republisher import Republisher
 
-__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Addition", "Bridge", "BridgeOptions"]
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOptions", "Extras"]
 
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
@@ -51,8 +51,8 @@ _DIAGNOSTICS_SECONDS = 1.0
 class BridgeOptions:
     """``address`` is where the listeners are, at a port for each protocol, None: not served.
 
-    ``certificate`` and ``key`` are PEM files. In seconds: ``slowest_look``; ``retry_delay`` after which a port that is in use
-    is tried again, None: never.
+    ``certificate`` and ``key`` are PEM files. Both times are in seconds: ``max_refresh_interval`` between two
+    queries of an unchanged graph, ``retry_delay`` before a port in use is tried again (None: never).
     """
 
     address: str = "127.0.0.1"
@@ -66,7 +66,7 @@ class BridgeOptions:
     assets: Sequence[str] = (ALLOWED,)
     certificate: str = ""
     key: str = ""
-    slowest_look: float = 1.0
+    max_refresh_interval: float = 1.0
     diagnostics: bool = True
     rosbridge: RosbridgeOptions = field(default_factory=RosbridgeOptions)
     retry_delay: float | None = None
@@ -78,8 +78,8 @@ class BridgeOptions:
 
 
 @dataclass(frozen=True)
-class Addition:
-    """What the listener of the Foxglove protocol serves in addition; ``pages`` are public: they need no token."""
+class Extras:
+    """What the Foxglove listener serves in addition to its protocol; ``pages`` are public and need no token."""
 
     endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)
@@ -93,14 +93,14 @@ class Bridge:
         node: Node,
         options: BridgeOptions | None = None,
         playback: Playback | None = None,
-        addition: Addition | None = None,
+        extras: Extras | None = None,
     ) -> None:
         self.options = options or BridgeOptions()
         self.node = node
         self.graph = SharedGraph(
             node,
             self.options.filters,
-            slowest_look=self.options.slowest_look,
+            max_refresh_interval=self.options.max_refresh_interval,
             clock=playback.now if playback else None,
         )
         self.foxglove = FoxgloveEndpoint(
@@ -120,7 +120,7 @@ class Bridge:
         self._beside: list[ClientTopics | Rosapi | Republisher] = []
         if self.options.rosbridge_port is not None:
             self._beside.append(client_topics)
-        self._addition = addition or Addition()
+        self._extras = extras or Extras()
         self._account = Account(self.options.limits.memory)
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
@@ -130,13 +130,13 @@ class Bridge:
         """Listen. Raise BridgeError."""
         tls = self._tls()
         served: list[tuple[str, list[Endpoint], int | None]] = [
-            ("foxglove", [self.foxglove, *self._addition.endpoints], self.options.foxglove_port),
+            ("foxglove", [self.foxglove, *self._extras.endpoints], self.options.foxglove_port),
             ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
             ("video", [], self.options.video_port),
         ]
         for name, endpoints, port in served:
             if port is not None:
-                public = self._addition.pages if name == "foxglove" else {}
+                public = self._extras.pages if name == "foxglove" else {}
                 self.listeners[name] = await self._listen(endpoints, port, tls, public)
         await self._start_beside()
         if self.options.diagnostics:

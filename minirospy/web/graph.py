@@ -30,7 +30,7 @@ __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", 
 
 _log = logging.getLogger(__name__)
 
-FASTEST_LOOK = 0.25
+MIN_REFRESH_INTERVAL = 0.25
 """Seconds from one look at the graph to the next while it changes."""
 
 _QUEUE = 100
@@ -198,10 +198,10 @@ class SharedGraph:
         node: Node,
         filters: Filters | None = None,
         *,
-        slowest_look: float = 1.0,
+        max_refresh_interval: float = 1.0,
         clock: Callable[[], int] | None = None,
     ) -> None:
-        """``slowest_look``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
+        """``max_refresh_interval``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
         self.node = node
         self._clock = clock
         self.waiting_bytes = 0
@@ -211,10 +211,10 @@ class SharedGraph:
         self.topics: dict[str, SharedTopic] = {}
         self.texts = TypeTexts(node)
         self._is_first_look = True
-        self._slowest_look = max(slowest_look, FASTEST_LOOK)
+        self._max_refresh_interval = max(max_refresh_interval, MIN_REFRESH_INTERVAL)
         self._listeners: list[GraphListener] = []
         self._publishers: dict[str, _SharedPublisher] = {}
-        self._look_soon = asyncio.Event()
+        self._refresh_soon = asyncio.Event()
         self._looking = asyncio.Lock()
         self._reporter = ErrorReporter(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
@@ -223,7 +223,7 @@ class SharedGraph:
         self._service_types = NodeQueries(
             self._service_type,
             ErrorReporter(_log, "the query for a service's type"),
-            arrived_late=self.look_soon,
+            arrived_late=self.refresh_soon,
         )
 
     def now(self) -> int:
@@ -252,7 +252,7 @@ class SharedGraph:
             self.snapshot = Snapshot()
             self._is_first_look = True
             self._watching = asyncio.ensure_future(keep_running(self._watch, self._reporter))
-        self._look_soon.set()
+        self._refresh_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
         """Call it no more; nobody looks at the graph while nobody watches."""
@@ -262,9 +262,9 @@ class SharedGraph:
             self._watching.cancel()
             self._watching = None
 
-    def look_soon(self) -> None:
+    def refresh_soon(self) -> None:
         """Look at the graph now: it has changed."""
-        self._look_soon.set()
+        self._refresh_soon.set()
 
     async def look(self) -> None:
         """Look at the graph, and report what has changed. Raise MasterUnreachableError, RpcError."""
@@ -285,13 +285,13 @@ class SharedGraph:
                         self._reporter.report(error)
 
     async def _watch(self) -> None:
-        pause = FASTEST_LOOK
+        pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
         # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the event.
         task = asyncio.current_task()
         while self._watching is task:
-            self._look_soon.clear()
+            self._refresh_soon.clear()
             before = self.snapshot
             try:
                 await self.look()
@@ -301,12 +301,12 @@ class SharedGraph:
                     _log.warning("the graph cannot be read: %s. Will keep trying.", error)
                 is_reported = True
             pause = (
-                FASTEST_LOOK
+                MIN_REFRESH_INTERVAL
                 if self.snapshot is not before and self.snapshot != before
-                else min(pause * 1.5, self._slowest_look)
+                else min(pause * 1.5, self._max_refresh_interval)
             )
             with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._look_soon.wait(), pause)
+                await asyncio.wait_for(self._refresh_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
         """Return a service's type; None if it is not known, or not installed here."""
@@ -358,7 +358,7 @@ class SharedGraph:
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
             joining = self.spawn(publisher._wait_for_expected())
             shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
-            self.look_soon()
+            self.refresh_soon()
         elif shared.type.md5sum != type_.md5sum:
             raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")
         shared.clients += 1
@@ -370,7 +370,7 @@ class SharedGraph:
         if not shared.clients and self._publishers.get(topic) is shared:
             del self._publishers[topic]
             self.spawn(shared.publisher.close())
-            self.look_soon()
+            self.refresh_soon()
 
     # --- services
 

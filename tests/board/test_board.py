@@ -17,8 +17,8 @@ import pytest
 from minirospy.base.errors import BoardError
 from minirospy.board import link
 from minirospy.board.board import Board
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.model import Function
-from minirospy.board.place import Place
 from minirospy.board.rpigpio import BCM, OUT, Gpio
 from tests.waiting import wait_until
 
@@ -29,16 +29,16 @@ def board() -> Iterator[Board]:
         yield board
 
 
-def servers(place: Place) -> list[psutil.Process]:
+def servers(directory: BoardDirectory) -> list[psutil.Process]:
     return [
         process
         for process in psutil.process_iter(["cmdline"])
-        if (process.info["cmdline"] or [])[-2:] == [str(place.folder), place.name]
+        if (process.info["cmdline"] or [])[-2:] == [str(directory.folder), directory.name]
     ]
 
 
-def wait_until_gone(place: Place) -> None:
-    _, left = psutil.wait_procs(servers(place), timeout=30)
+def wait_until_gone(directory: BoardDirectory) -> None:
+    _, left = psutil.wait_procs(servers(directory), timeout=30)
     assert not left
 
 
@@ -136,7 +136,7 @@ def test_many_start_one_server() -> None:
     opened[2].press(12)
     assert next(edges).level == 1
     # Those that lost the race may still be on their way out; one stays.
-    wait_until(lambda: len(servers(Place.find())) == 1)
+    wait_until(lambda: len(servers(BoardDirectory.find())) == 1)
 
     for child in children:
         child.communicate("\n", timeout=30)
@@ -151,7 +151,7 @@ def test_a_killed_server_is_replaced_unnoticed(board: Board) -> None:
     gpio.setmode(BCM)
     gpio.setup(7, OUT, initial=1)
     edges = board.watch([12], timeout=40)
-    for server in servers(Place.find()):
+    for server in servers(BoardDirectory.find()):
         server.kill()
     gpio.output(7, 0)
     gpio.output(7, 1)
@@ -165,21 +165,21 @@ def test_a_killed_server_is_replaced_unnoticed(board: Board) -> None:
 
 
 def test_an_unused_server_ends_and_the_next_one_goes_on() -> None:
-    place = Place.find()
+    directory = BoardDirectory.find()
     with Board() as board:
         board.press(11)
-    wait_until_gone(place)
-    assert not place.socket_path.exists()
+    wait_until_gone(directory)
+    assert not directory.socket_path.exists()
     with Board() as board:
         assert board.get(11) == 1
         board.release(11)
-    wait_until_gone(place)
+    wait_until_gone(directory)
 
 
 def test_spoilt_pins_are_a_fresh_board() -> None:
-    place = Place.find()
-    place.prepare()
-    place.state_path.write_bytes(b"\xc1 not pins")
+    directory = BoardDirectory.find()
+    directory.prepare()
+    directory.state_path.write_bytes(b"\xc1 not pins")
     with Board() as board:
         assert set(board.levels().values()) == {0}
 
@@ -188,16 +188,16 @@ def test_by_tcp_where_the_path_is_too_long_for_a_socket(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(tmp_path / ("d" * 120)))
-    place = Place.find()
-    assert not place.uses_unix_socket
+    directory = BoardDirectory.find()
+    assert not directory.uses_unix_socket
     with Board() as board, Board() as other:
         edges = other.watch([11], timeout=40)
         board.press(11)
         assert next(edges).level == 1
         if sys.platform != "win32":
-            assert place.address_path.stat().st_mode & 0o077 == 0
-    wait_until_gone(place)
-    assert not place.address_path.exists()
+            assert directory.address_path.stat().st_mode & 0o077 == 0
+    wait_until_gone(directory)
+    assert not directory.address_path.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
@@ -213,8 +213,8 @@ def test_a_server_that_a_ctrl_c_killed_is_started_again(monkeypatch: pytest.Monk
     start = link._start_server
     started: list[subprocess.Popen[bytes]] = []
 
-    def first_one_is_killed(place: Place) -> subprocess.Popen[bytes]:
-        started.append(subprocess.Popen(["sh", "-c", "kill -INT $$"]) if not started else start(place))
+    def first_one_is_killed(directory: BoardDirectory) -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen(["sh", "-c", "kill -INT $$"]) if not started else start(directory))
         return started[-1]
 
     monkeypatch.setattr(link, "_start_server", first_one_is_killed)
@@ -225,21 +225,21 @@ def test_a_server_that_a_ctrl_c_killed_is_started_again(monkeypatch: pytest.Monk
 
 def test_temporary_board_leaves_no_file(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MINIROSPY_BOARD_TEMPORARY", "1")
-    place = Place.find()
+    directory = BoardDirectory.find()
     with Board() as board:
         board.press(11)
-        assert place.lock_path.exists()
-    wait_until_gone(place)
-    assert not [*place.folder.glob(f"{place.name}.*")]
+        assert directory.lock_path.exists()
+    wait_until_gone(directory)
+    assert not [*directory.folder.glob(f"{directory.name}.*")]
 
 
 def test_kept_board_outlives_a_temporary_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    place = Place.find()
+    directory = BoardDirectory.find()
     with Board():
         pass
-    wait_until_gone(place)
+    wait_until_gone(directory)
     monkeypatch.setenv("MINIROSPY_BOARD_TEMPORARY", "1")
     with Board():
         pass
-    wait_until_gone(place)
-    assert place.state_path.exists()
+    wait_until_gone(directory)
+    assert directory.state_path.exists()

@@ -29,7 +29,7 @@ from minirospy.fleet.keys import (
 from minirospy.fleet.network import _CONTROL_QUERIES, _QUERIES
 from minirospy.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.fleet.rules import GatewayRules, Priority
-from minirospy.fleet.sender import _MAX_OUTLETS, Intake, Sender
+from minirospy.fleet.sender import _MAX_OUTLETS, Receiver, Sender
 from tests.waiting import until
 
 MD5 = "0123456789abcdef" * 2
@@ -89,7 +89,7 @@ def test_wants_of_peers_are_limited() -> None:
 
 
 def test_a_full_table_of_flows_makes_room_for_a_new_writer() -> None:
-    flows = Intake.flows(2)
+    flows = Receiver.flows(2)
     first, second = flows.of("first"), flows.of("second")
     assert first
     assert second

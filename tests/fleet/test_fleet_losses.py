@@ -663,7 +663,7 @@ def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> 
             blocked.set()
             released.wait()
 
-        # All loops of the test are this one; the intake and the guard have their threads.
+        # All loops of the test are this one; the receiver and the guard have their threads.
         proxy.cut()
         fleet.loop.loop.call_soon_threadsafe(block)
         try:

@@ -19,7 +19,7 @@ from minirospy.introspect.doctor.machine import check_packages, check_variables
 from minirospy.introspect.doctor.master import clock_finding
 from minirospy.introspect.doctor.reach import (
     Fault,
-    MasterPlace,
+    MasterLocation,
     addresses,
     addresses_of,
     in_parallel,
@@ -30,8 +30,8 @@ from minirospy.introspect.doctor.reach import (
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import built_in_roots
 
-HERE = MasterPlace("localhost", 11311, ["127.0.0.1"])
-AFAR = MasterPlace("robot", 11311, ["192.0.2.7"])
+HERE = MasterLocation("localhost", 11311, ["127.0.0.1"])
+AFAR = MasterLocation("robot", 11311, ["192.0.2.7"])
 
 
 # --- addresses
@@ -121,7 +121,7 @@ def test_server_without_ros_is_reported(listener: socket.socket) -> None:
 # --- variables
 
 
-def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
+def said(environ: dict[str, str], place: MasterLocation) -> list[Finding]:
     environ = {"ROS_HOME": "/tmp", **environ}
     environment = Environment.read(environ)
     known = addresses_of((environment.host, environ.get("ROS_HOSTNAME") or environment.host))
@@ -191,7 +191,7 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
         ),
     ],
 )
-def test_variables(environ: dict[str, str], place: MasterPlace, status: str, text: str) -> None:
+def test_variables(environ: dict[str, str], place: MasterLocation, status: str, text: str) -> None:
     (finding,) = said(environ, place)
     assert (finding.status.value, text in finding.text) == (status, True), finding
     assert bool(finding.advice) == (status != "ok")

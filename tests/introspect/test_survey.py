@@ -11,13 +11,13 @@ from minirospy import Node
 from minirospy.base.errors import MinirospyError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.doctor.graph import NodeAnswer
-from minirospy.introspect.doctor.reach import MasterPlace
+from minirospy.introspect.doctor.reach import MasterLocation
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.survey import Edge, Survey, _counts, describe, survey, traffic
 from minirospy.runtime.rpc.master_proxy import BusConnection, SystemState
 from minirospy.runtime.transport.loop import LoopThread
 
-PLACE = MasterPlace("localhost", 11311, ["127.0.0.1"])
+PLACE = MasterLocation("localhost", 11311, ["127.0.0.1"])
 
 
 def answer(stats: object, pid: int = 5) -> NodeAnswer:

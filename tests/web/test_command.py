@@ -120,7 +120,7 @@ def test_listening_bridge_requires_the_token_that_it_prints(
 def test_status_is_also_json(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     port = start("bridge", "--port", "0", "--name", "endpoint").port
     assert command.main(["--status", "--json", "--port", str(port)]) == 0
-    assert json.loads(capsys.readouterr().out)["node"] == "/door"
+    assert json.loads(capsys.readouterr().out)["node"] == "/endpoint"
 
 
 def test_status_lists_all_ports_of_a_bridge(start: Start, capsys: pytest.CaptureFixture[str]) -> None:

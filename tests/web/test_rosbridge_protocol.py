@@ -29,7 +29,7 @@ from minirospy.base.times import Time
 from minirospy.web.rosbridge import conversion, png, protocol
 from minirospy.web.rosbridge.cbor import encode_cbor
 from minirospy.web.rosbridge.protocol import OperationError, StatusLevel, Subscribe
-from minirospy.web.rosbridge.subscription import Fragments, Merged, Pacer, Room, merge
+from minirospy.web.rosbridge.subscription import Budget, Fragments, Merged, Pacer, merge
 from tests.web.rosbridge_messages import MESSAGES
 
 
@@ -405,7 +405,7 @@ def test_subscriptions_merge_to_what_satisfies_all() -> None:
 
 
 def test_throttled_messages_are_dropped_without_a_queue() -> None:
-    pacer: Pacer[int] = Pacer(Room(), lambda _: 1)
+    pacer: Pacer[int] = Pacer(Budget(), lambda _: 1)
     pacer.set(0.5, 0)
     assert [pacer.arrived(number, number * 0.2) for number in range(6)] == [
         True,
@@ -419,7 +419,7 @@ def test_throttled_messages_are_dropped_without_a_queue() -> None:
 
 
 def test_throttled_messages_wait_in_a_queue_of_the_newest() -> None:
-    pacer: Pacer[int] = Pacer(Room(), lambda _: 1)
+    pacer: Pacer[int] = Pacer(Budget(), lambda _: 1)
     pacer.set(1.0, 2)
     assert [pacer.arrived(number, 0.0) for number in range(4)] == [True, False, False, False]
     assert (pacer.due, pacer.next(0.5), pacer.dropped) == (1.0, None, 1)
@@ -427,8 +427,8 @@ def test_throttled_messages_wait_in_a_queue_of_the_newest() -> None:
 
 
 def test_messages_that_wait_share_the_room_of_their_client() -> None:
-    room = Room(10_000)
-    one, other = (Pacer[bytes](room, len) for _ in range(2))
+    budget = Budget(10_000)
+    one, other = (Pacer[bytes](budget, len) for _ in range(2))
     for pacer in (one, other):
         pacer.set(1000.0, 1_000_000)
         assert pacer.arrived(b"", 0.0)
@@ -439,10 +439,10 @@ def test_messages_that_wait_share_the_room_of_their_client() -> None:
     # The newest of a topic waits in any case.
     assert other.dropped == 0
     assert not other.arrived(bytes(1), 0.1)
-    assert (other.dropped, room.taken <= 10_000) == (1, True)
+    assert (other.dropped, budget.taken <= 10_000) == (1, True)
     one.clear()
     assert one.due is None
-    assert (other.next(1000.0), room.taken) == (bytes(1), 0)
+    assert (other.next(1000.0), budget.taken) == (bytes(1), 0)
 
 
 # --- fragments

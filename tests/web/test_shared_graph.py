@@ -132,12 +132,12 @@ def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns
     """In one of these turns asyncio.wait_for before Python 3.12 swallows the cancelling: the event has come with it."""
 
     async def look_and_close() -> None:
-        graph = SharedGraph(bridge.bridge.node, slowest_look=60.0)
+        graph = SharedGraph(bridge.bridge.node, max_refresh_interval=60.0)
         looked = asyncio.Event()
         graph.watch(lambda _: looked.set())
         await looked.wait()
         await asyncio.sleep(0)
-        graph.look_soon()
+        graph.refresh_soon()
         for _ in range(turns):
             await asyncio.sleep(0)
         await asyncio.wait_for(graph.close(), 60)

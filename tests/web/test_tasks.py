@@ -218,7 +218,7 @@ def test_watch_of_the_graph_and_its_listeners_goes_on(
     bridge: Running, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def run() -> None:
-        graph = SharedGraph(bridge.bridge.node, slowest_look=0.05)
+        graph = SharedGraph(bridge.bridge.node, max_refresh_interval=0.05)
         first, second = Failing({1}, 1), Failing(set(), 1)
         look = graph.look
 

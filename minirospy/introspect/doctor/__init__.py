@@ -13,7 +13,7 @@ from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError, UsageError
 from minirospy.introspect.doctor.findings import Finding, Status, ok, problem, warning
 from minirospy.introspect.doctor.machine import check_packages, check_python, check_variables
-from minirospy.introspect.doctor.reach import CONNECT_SECONDS, MasterPlace, addresses_of
+from minirospy.introspect.doctor.reach import CONNECT_SECONDS, MasterLocation, addresses_of
 
 __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
 
@@ -54,7 +54,7 @@ class Examination:
         host, port = environment.master_address
         # Of a name server that is out of reach one waits once.
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
-        place = MasterPlace(host, port, known[host])
+        place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
         if not self._offline:
             yield from self._network(environment, place, known[environment.host])
@@ -68,7 +68,7 @@ class Examination:
         return True
 
     def _network(
-        self, environment: Environment, place: MasterPlace, own_addresses: list[str]
+        self, environment: Environment, place: MasterLocation, own_addresses: list[str]
     ) -> Iterator[Finding]:
         from minirospy.introspect.doctor import graph as graph_checks
         from minirospy.introspect.doctor.frames import check_frames

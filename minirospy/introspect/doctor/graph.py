@@ -18,7 +18,7 @@ from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
     RESUME,
     Fault,
-    MasterPlace,
+    MasterLocation,
     Trouble,
     host_port,
     in_parallel,
@@ -97,7 +97,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
     }
 
 
-def check_nodes(answers: Answers, place: MasterPlace) -> Iterator[Finding]:
+def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
     """Nodes that do not answer: one line for those of a machine that fail in the same way."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
@@ -116,7 +116,7 @@ def check_nodes(answers: Answers, place: MasterPlace) -> Iterator[Finding]:
         )
 
 
-def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, str]:
+def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[str, str]:
     """Return (what, advice) for a node that has registered as being at ``host`` and does not answer there."""
     if trouble.fault is Fault.NAME:
         return (

@@ -23,7 +23,7 @@ from minirospy.introspect.doctor.own_node import PREFIX, DoctorNode, unreached_f
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
     Fault,
-    MasterPlace,
+    MasterLocation,
     Trouble,
     host_port,
     in_parallel,
@@ -91,7 +91,9 @@ def listeners(state: SystemState, answers: Answers) -> Answers:
     return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
 
 
-def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: MasterPlace) -> Iterator[Finding]:
+def check_listeners(
+    own: DoctorNode, graph: Graph, answers: Answers, place: MasterLocation
+) -> Iterator[Finding]:
     """Yield what the listeners among the nodes that answer say: one or two findings for each."""
     services = [
         node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble

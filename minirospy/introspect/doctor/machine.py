@@ -15,7 +15,7 @@ from minirospy.base import names
 from minirospy.base.environment import Environment
 from minirospy.base.errors import ManifestError, NotFoundError
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
-from minirospy.introspect.doctor.reach import MasterPlace, is_loopback, is_own_address
+from minirospy.introspect.doctor.reach import MasterLocation, is_loopback, is_own_address
 
 __all__ = ["check_packages", "check_python", "check_variables"]
 
@@ -52,7 +52,10 @@ def check_python() -> Iterator[Finding]:
 
 
 def check_variables(
-    environ: Mapping[str, str], environment: Environment, master: MasterPlace, known: Mapping[str, list[str]]
+    environ: Mapping[str, str],
+    environment: Environment,
+    master: MasterLocation,
+    known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
     """Yield the variables that say where the master and this machine are, one by one and beside each other.
 
@@ -68,7 +71,10 @@ def check_variables(
 
 
 def _host_findings(
-    environ: Mapping[str, str], environment: Environment, master: MasterPlace, known: Mapping[str, list[str]]
+    environ: Mapping[str, str],
+    environment: Environment,
+    master: MasterLocation,
+    known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
     hostname, ip = environ.get("ROS_HOSTNAME", ""), environ.get("ROS_IP", "")
     host = environment.host

@@ -11,7 +11,14 @@ from minirospy.base.errors import MasterUnreachableError, RpcError, RpcFault
 from minirospy.core.wire.http import serialize_request
 from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
-from minirospy.introspect.doctor.reach import CONNECT_SECONDS, RESUME, Fault, MasterPlace, Trouble, trouble_of
+from minirospy.introspect.doctor.reach import (
+    CONNECT_SECONDS,
+    RESUME,
+    Fault,
+    MasterLocation,
+    Trouble,
+    trouble_of,
+)
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
@@ -22,7 +29,7 @@ _FEEL_SECONDS = 0.1
 _WRONG_SECONDS = 1.0
 
 
-def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
+def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
     """Yield whether a master answers; a single problem if it does not."""
     if not place.addresses:
         yield problem(
@@ -47,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
     yield ok("master", f"{master.uri} answers: {name}{pid}")
 
 
-def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
+def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
     """Yield how far the master's clock is from ours; nothing if both are this machine's."""
     if place.is_local:
         return
@@ -77,7 +84,7 @@ def clock_finding(who: str, theirs: float, before: float, after: float) -> Findi
     return (problem if abs(difference) >= _WRONG_SECONDS else warning)("clock", text, advice)
 
 
-def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
+def _unreachable(uri: str, place: MasterLocation, trouble: Trouble) -> Finding:
     where = uri if place.host == place.addresses[0] else f"{uri} ({place.addresses[0]})"
 
     if place.is_local:
@@ -129,7 +136,7 @@ def _status(master: MasterProxy) -> dict[str, object]:
     return found if isinstance(found, dict) else {}
 
 
-def _http_date(place: MasterPlace) -> float | None:
+def _http_date(place: MasterLocation) -> float | None:
     """Return the time that the server writes into its answers, as Python's own does."""
     from email.utils import parsedate_to_datetime
 

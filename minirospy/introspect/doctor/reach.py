@@ -33,7 +33,7 @@ __all__ = [
     "CONNECT_SECONDS",
     "RESUME",
     "Fault",
-    "MasterPlace",
+    "MasterLocation",
     "Trouble",
     "addresses",
     "addresses_of",
@@ -87,7 +87,7 @@ class Trouble(NamedTuple):
     text: str
 
 
-class MasterPlace(NamedTuple):
+class MasterLocation(NamedTuple):
     """The master's place in ROS_MASTER_URI, and the addresses of that host ([]: the name is not known)."""
 
     host: str

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import BagError, MinirospyError, UsageError
 from minirospy.web.dashboard.bag_folder import BagFolder
-from minirospy.web.dashboard.bag_player import GraphStage, OpenBag
+from minirospy.web.dashboard.bag_player import GraphOutput, OpenBag
 from minirospy.web.dashboard.json_session import (
     Fields,
     Handler,
@@ -174,12 +174,12 @@ class BagSession(JsonSession):
     async def _open(self, fields: Fields) -> Fields:
         await self._close_bag()
         name = text_of(fields, "name")
-        stage = GraphStage(self._endpoint.graph())
+        output = GraphOutput(self._endpoint.graph())
 
         def opening() -> OpenBag:
             path = self._endpoint.folder.path_of(name)
             try:
-                return OpenBag(path, name, stage, self.post_change)
+                return OpenBag(path, name, output, self.post_change)
             except BagError as error:
                 text = str(error)
                 raise BagError(text if text.startswith(name) else f"{name}: {text}") from error
@@ -213,7 +213,7 @@ class BagSession(JsonSession):
         self._thumbnails.clear()
         self._sent.pop("state", None)
         if bag:
-            bag.stage.close()
+            bag.output.close()
             # A client that leaves now cancels the waiting, not the closing.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
@@ -249,14 +249,14 @@ class BagSession(JsonSession):
     async def _publish(self, fields: Fields) -> None:
         bag = self._opened()
         topics = [each for each in texts_of(fields, "topics") if each in bag.timeline.topics]
-        new = set(topics) - set(bag.stage.published)
-        for line in bag.stage.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
+        new = set(topics) - set(bag.output.published)
+        for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
-        bag.player.control(has_clock=bag.stage.has_clock)
+        bag.player.control(has_clock=bag.output.has_clock)
         # What was latched before would never reach those who subscribe now.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
-            bag.stage.send(topic, body)
+            bag.output.send(topic, body)
 
     # --- what is shown
 
@@ -299,8 +299,8 @@ class BagSession(JsonSession):
                 "paused": state.is_paused,
                 "ended": state.is_at_end,
                 "looping": bag.player.is_looping,
-                "published": bag.stage.published,
-                "clock": bag.stage.has_clock,
+                "published": bag.output.published,
+                "clock": bag.output.has_clock,
             },
         )
 

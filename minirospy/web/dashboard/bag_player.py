@@ -1,4 +1,4 @@
-"""One opened bag: its contents by time, and the player of `rosbag play`, whose stage is the dashboard's graph."""
+"""One opened bag: its contents by time, and the player of `rosbag play`, whose output is the dashboard's graph."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from minirospy.core.bag.base import StoredMessage
 from minirospy.core.bag.records import Connection
 from minirospy.core.bag.timeline import Timeline
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.ros.rosbag.recording.output import CLOCK, Controls
 from minirospy.ros.rosbag.recording.player import Player, PlayerState
 from minirospy.ros.rosbag.recording.schedule import PlayOptions
 from minirospy.ros.rosbag.recording.sources import Bags, open_reader
-from minirospy.ros.rosbag.recording.stage import CLOCK, Controls
 
 if TYPE_CHECKING:
     from minirospy.web.graph import Publication, SharedGraph
 
-__all__ = ["GraphStage", "OpenBag"]
+__all__ = ["GraphOutput", "OpenBag"]
 
 _log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ _MAX_WAITING = 200
 """Messages that wait for the loop; then the player waits, too."""
 
 
-class GraphStage:
+class GraphOutput:
     """Publishes what a player plays into a graph of a loop: the topics that are switched on, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
@@ -104,39 +104,39 @@ class GraphStage:
     # --- in the player's thread
 
     def open(self, player: Controls) -> None:
-        """See :meth:`Stage.open`: the session ends the player."""
+        """See :meth:`Output.open`: the session ends the player."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """See :meth:`Stage.advertise`: that is done when a topic is switched on."""
+        """See :meth:`Output.advertise`: that is done when a topic is switched on."""
 
     def offer(self, player: Controls) -> None:
-        """See :meth:`Stage.offer`: the page controls the player."""
+        """See :meth:`Output.offer`: the page controls the player."""
 
     def has_all_subscribers(self) -> bool:
-        """See :meth:`Stage.has_all_subscribers`."""
+        """See :meth:`Output.has_all_subscribers`."""
         return True
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """See :meth:`Stage.running`: there are no keys, and the process has other work."""
+        """See :meth:`Output.running`: there are no keys, and the process has other work."""
         return nullcontext()
 
     def publish(self, number: int, message: StoredMessage) -> None:
-        """See :meth:`Stage.publish`."""
+        """See :meth:`Output.publish`."""
         topic = message.connection.topic
         if topic in self._publications:
             self._post(lambda: self.send(topic, message.body))
 
     def publish_clock(self, time: int) -> None:
-        """See :meth:`Stage.publish_clock`."""
+        """See :meth:`Output.publish_clock`."""
         if self._clock:
             self._post(lambda: self._send_clock(time))
 
     def waiting_bytes(self) -> int:
-        """See :meth:`Stage.waiting_bytes`: they are taken when the playing has ended, too."""
+        """See :meth:`Output.waiting_bytes`: they are taken when the playing has ended, too."""
         return 0
 
     def print(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Stage.print`: nothing is printed, the page shows the state."""
+        """See :meth:`Output.print`: nothing is printed, the page shows the state."""
 
     def _send_clock(self, time: int) -> None:
         if self._clock:
@@ -166,10 +166,10 @@ class OpenBag:
     """
 
     def __init__(
-        self, path: Path, name: str, stage: GraphStage, on_change: Callable[[], object] = lambda: None
+        self, path: Path, name: str, output: GraphOutput, on_change: Callable[[], object] = lambda: None
     ) -> None:
         self.name = name
-        self.stage = stage
+        self.output = output
         self.failure = ""
         """Why the playing has ended, if it has."""
         self._files = ExitStack()
@@ -183,7 +183,7 @@ class OpenBag:
             self._files = opened.pop_all()
         self._is_ready = threading.Event()
         options = PlayOptions(paused=True, delay=0, quiet=True)
-        self.player = Player(self._bags, options, lambda first, last: self._is_ready.set(), stage)
+        self.player = Player(self._bags, options, lambda first, last: self._is_ready.set(), output)
         self.player.on_change = self._on_change = on_change
         self._thread = threading.Thread(target=self._play, name="bag-player", daemon=True)
         if self.timeline.topics:

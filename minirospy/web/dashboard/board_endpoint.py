@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import BoardError
 from minirospy.board.board import Board
+from minirospy.board.directory import BoardDirectory
 from minirospy.board.model import BUTTONS, LEDS, PINS, Function
-from minirospy.board.place import Place
 from minirospy.board.scanner import FIELDS
 from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession, number
 
@@ -74,16 +74,16 @@ class BoardSession(JsonSession):
         """Open the board."""
         name = self.client.request.query.get("board") or None
         try:
-            place = Place.find(name)
-            self._boards = await self.in_thread(place.names)
+            directory = BoardDirectory.find(name)
+            self._boards = await self.in_thread(directory.names)
             # A board that is opened is started where it does not run: a program.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
-                    f"there is no board [{place.name}]: {self.client.why_not_owner('start boards')}"
+                    f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
                 )
             self._opening = self._thread.submit(Board, name)
             self._board = await asyncio.wrap_future(self._opening)
-            self._boards = await self.in_thread(place.names)
+            self._boards = await self.in_thread(directory.names)
         except BoardError as error:
             self.send_error(str(error))
 

@@ -6,7 +6,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 from minirospy.aio.node import Node
-from minirospy.web.bridge import Addition, Bridge, BridgeOptions
+from minirospy.web.bridge import Bridge, BridgeOptions, Extras
 from minirospy.web.dashboard.bag_endpoint import BagEndpoint
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.board_endpoint import BoardEndpoint
@@ -52,7 +52,7 @@ class Dashboard:
         own = (self.rviz, self._bags, self._launches, self._joints)
         endpoints = (self._board, self._tools, driving, *own)
         pages = {**handlers(read_folder()), "/token": self.codes.serve}
-        self.bridge = Bridge(node, options, addition=Addition(endpoints, pages))
+        self.bridge = Bridge(node, options, extras=Extras(endpoints, pages))
 
     @property
     def port(self) -> int:

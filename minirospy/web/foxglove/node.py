@@ -59,7 +59,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         assets=texts(private, "asset_uri_allowlist", [ALLOWED]),
         certificate=certificate if uses_tls else "",
         key=value(private, "keyfile", str, "") if uses_tls else "",
-        slowest_look=value(private, "max_update_ms", int, 1000) / 1000,
+        max_refresh_interval=value(private, "max_update_ms", int, 1000) / 1000,
     )
 
 

@@ -73,7 +73,7 @@ class ClientService:
         self._ids = itertools.count(1)
         self._waiting: dict[object, asyncio.Future[Message]] = {}
         self._service: Service = graph.node.serve(name, self._class, self._handle)
-        graph.look_soon()
+        graph.refresh_soon()
 
     async def close(self, why: str) -> None:
         """End it; calls under way fail with ``why``."""
@@ -82,7 +82,7 @@ class ClientService:
                 future.set_exception(ServiceException(why))
         self._waiting.clear()
         await self._service.close()
-        self._graph.look_soon()
+        self._graph.refresh_soon()
 
     def answered(self, event: protocol.ServiceResponse) -> None:
         """Take over a client's answer. Raise BridgeError: values that do not fit, or no call waits for it."""

@@ -29,7 +29,7 @@ from minirospy.web.rosbridge import conversion, protocol
 from minirospy.web.rosbridge.authentication import authenticate
 from minirospy.web.rosbridge.protocol import Event, OperationError, StatusLevel
 from minirospy.web.rosbridge.services import ClientService, call
-from minirospy.web.rosbridge.subscription import Fragments, Room
+from minirospy.web.rosbridge.subscription import Budget, Fragments
 from minirospy.web.rosbridge.topic import MAX_IDS, ClientTopic
 from minirospy.web.rosbridge.types import message_class
 
@@ -95,7 +95,7 @@ class RosbridgeSession:
     def __init__(self, endpoint: RosbridgeEndpoint, client: WebClient) -> None:
         self.client = client
         self.connected = endpoint.graph.node.now()
-        self.room = Room()
+        self.budget = Budget()
         """For messages of topics whose rate the client limits."""
         self._endpoint = endpoint
         self._graph = endpoint.graph
@@ -194,7 +194,11 @@ class RosbridgeSession:
     def count(self) -> None:
         """Count what is kept of the client in the account of the server."""
         self.client.holds(
-            self._inbox_size + self._fragments.size + self.room.taken + self._calls_size + self._latched_size
+            self._inbox_size
+            + self._fragments.size
+            + self.budget.taken
+            + self._calls_size
+            + self._latched_size
         )
 
     def _received(self, data: str | bytes) -> None:

@@ -12,7 +12,7 @@ from minirospy.web.json_text import width_of
 from minirospy.web.rosbridge.protocol import Fragment, OperationError, Subscribe
 from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES
 
-__all__ = ["Fragments", "Merged", "Pacer", "Room", "merge"]
+__all__ = ["Budget", "Fragments", "Merged", "Pacer", "merge"]
 
 _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
@@ -48,7 +48,7 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
 
 
 @dataclass
-class Room:
+class Budget:
     """The bytes of messages that wait for their time, of all topics of a client, and how many may."""
 
     most: int = DEFAULT_LIMIT
@@ -58,10 +58,10 @@ class Room:
 class Pacer(Generic[_T]):
     """The messages of a topic in time: one in ``throttle`` seconds; the newest ``queue_length`` wait, others are dropped."""
 
-    def __init__(self, room: Room, size_of: Callable[[_T], int]) -> None:
-        """``room`` may be that of other topics, too; ``size_of`` returns the bytes of a message."""
+    def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:
+        """``budget`` may be that of other topics, too; ``size_of`` returns the bytes of a message."""
         self.throttle = 0.0
-        self._room = room
+        self._budget = budget
         self._size_of = size_of
         self.dropped = 0
         self._last = float("-inf")
@@ -80,7 +80,7 @@ class Pacer(Generic[_T]):
             return True
         if self._length:
             self._waiting.append(message)
-            self._room.taken += self._size_of(message) + ENTRY_BYTES
+            self._budget.taken += self._size_of(message) + ENTRY_BYTES
             self._trim()
         else:
             self.dropped += 1
@@ -105,12 +105,12 @@ class Pacer(Generic[_T]):
 
     def _popped(self) -> _T:
         message = self._waiting.popleft()
-        self._room.taken -= self._size_of(message) + ENTRY_BYTES
+        self._budget.taken -= self._size_of(message) + ENTRY_BYTES
         return message
 
     def _trim(self) -> None:
         while (count := len(self._waiting)) > self._length or (
-            count > 1 and self._room.taken > self._room.most
+            count > 1 and self._budget.taken > self._budget.most
         ):
             self._popped()
             self.dropped += 1

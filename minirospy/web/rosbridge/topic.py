@@ -31,7 +31,7 @@ class ClientTopic:
         self._topic = endpoint.graph.node.resolve(name)
         self._subscriptions: dict[object, protocol.Subscribe] = {}
         self._merged: Merged | None = None
-        self._pacer: Pacer[Arrival] = Pacer(session.room, lambda arrival: len(arrival.body))
+        self._pacer: Pacer[Arrival] = Pacer(session.budget, lambda arrival: len(arrival.body))
         self._timer: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         self._is_closed = False

@@ -229,7 +229,7 @@ def test_keys_pause_and_step(ear: Ear, start: Start, tmp_path: Path) -> None:
 def test_pause_requested_while_it_waits_for_subscribers_counts(paused: bool) -> None:
     """The service is offered before the clock runs."""
     bags: Any = Mock()
-    player = Player(bags, PlayOptions(paused=paused), stage=Mock())
+    player = Player(bags, PlayOptions(paused=paused), output=Mock())
     assert not player.set_paused(paused)
     assert player.set_paused(not paused)
     assert not player.set_paused(not paused)

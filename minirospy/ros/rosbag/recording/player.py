@@ -13,10 +13,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from minirospy.core.bag.base import StoredMessage
+from minirospy.ros.rosbag.recording.output import NodeOutput, Output
 from minirospy.ros.rosbag.recording.precise import PreciseWait
 from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, State
 from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
-from minirospy.ros.rosbag.recording.stage import NodeStage, Stage
 
 __all__ = ["Player", "PlayerState"]
 
@@ -41,14 +41,14 @@ class PlayerState(NamedTuple):
 
 
 class Player:
-    """Plays bags: as this process's node, which init_node has made, unless there is another ``stage``."""
+    """Plays bags: as this process's node, which init_node has made, unless there is another ``output``."""
 
     def __init__(
         self,
         bags: Bags,
         options: PlayOptions,
         on_ready: Callable[[int, int], object] | None = None,
-        stage: Stage | None = None,
+        output: Output | None = None,
     ) -> None:
         """``on_ready(first, last)`` gets the times of what is to be played, before that starts.
 
@@ -56,7 +56,7 @@ class Player:
         """
         self.on_change: Callable[[], object] = lambda: None
         """Called in the player's thread when :meth:`state` has changed by itself: a message was published, the end reached."""
-        self._stage = stage or NodeStage(options)
+        self._output = output or NodeOutput(options)
         self._bags = bags
         self._options = options
         self._on_ready = on_ready
@@ -74,7 +74,7 @@ class Player:
 
     def run(self) -> int:
         """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError."""
-        self._stage.open(self)
+        self._output.open(self)
         options = self._options
         times = self._bags.times()
         start = times[0] + options.start if times else 0
@@ -85,10 +85,10 @@ class Player:
             print("No messages to play on specified topics.  Exiting.", file=sys.stderr)
             return 0
 
-        self._stage.advertise(self._bags.connections(selection))
+        self._output.advertise(self._bags.connections(selection))
         if not options.quiet:
             self._say("")
-        self._stage.offer(self)
+        self._output.offer(self)
         last = self._bags.last_time(selection) if options.topics or end else times[1]
         latched = self._bags.last_latched(selection) if options.start else []
         self._span = first[1].time, last
@@ -208,12 +208,12 @@ class Player:
             self._wait_for_subscribers()
 
     def _play_precisely(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
-        """Play in the stage's context."""
+        """Play in the output's context."""
         messages.wait()
         # Before the keys are read: the first ones count.
         with self._lock:
             self._start(span)
-        with self._stage.running(self._on_key):
+        with self._output.running(self._on_key):
             self._play_all(messages, selection, span)
 
     def _start(self, span: tuple[int, int]) -> None:
@@ -230,7 +230,7 @@ class Player:
 
     def _wait_for_subscribers(self) -> None:
         self._say("Waiting for subscribers.")
-        while not self._ended and not self._stage.has_all_subscribers():
+        while not self._ended and not self._output.has_all_subscribers():
             self._sleep(_TICK // 10)
         if not self._ended:
             self._say("Finished waiting for subscribers.")
@@ -272,7 +272,7 @@ class Player:
     def _wait_for_slow_subscribers(self) -> None:
         """Wait while subscribers take what is left: it ends with this process."""
         left, end = 0, 0.0
-        while not self._ended and (waiting := self._stage.waiting_bytes()):
+        while not self._ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()
             if waiting != left:
                 left, end = waiting, now + _STALLED_SECONDS
@@ -348,7 +348,7 @@ class Player:
             self._wait.until(min(wait, now + _TICK))
 
     def _publish(self, number: int, message: StoredMessage) -> None:
-        self._stage.publish(number, message)
+        self._output.publish(number, message)
         self.on_change()
 
     def _tick(self, schedule: Schedule, now: int) -> None:
@@ -357,7 +357,7 @@ class Player:
             with self._lock:
                 shown = schedule.tick(now)
             if shown is not None:
-                self._stage.publish_clock(shown)
+                self._output.publish_clock(shown)
         if now >= self._next_line and not self._options.quiet:
             self._next_line = now + _TICK
             self._show_status(schedule, now)
@@ -393,4 +393,4 @@ class Player:
             self._wait.until(min(end, now + _TICK))
 
     def _say(self, text: str, end: str = "\n") -> None:
-        self._stage.print(text, end)
+        self._output.print(text, end)

@@ -21,7 +21,7 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions
 if TYPE_CHECKING:
     from std_srvs.srv import SetBoolRequest, SetBoolResponse
 
-__all__ = ["CLOCK", "Controls", "NodeStage", "Stage"]
+__all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
 _SWITCH_SECONDS = 0.00005
@@ -35,7 +35,7 @@ CLOCK = struct.Struct("<II")
 
 
 class Controls(Protocol):
-    """What a stage does with its player. From any thread."""
+    """What an output does with its player. From any thread."""
 
     def end(self) -> None:
         """End the playing."""
@@ -47,7 +47,7 @@ class Controls(Protocol):
         """Store the stamp of the last message of the topic that controls the rate."""
 
 
-class Stage(Protocol):
+class Output(Protocol):
     """The graph of a player. Called in the player's thread."""
 
     def open(self, player: Controls) -> None:
@@ -113,7 +113,7 @@ class _LateSubscribers(client.SubscribeListener):
             peer_publish(message)
 
 
-class NodeStage:
+class NodeOutput:
     """This process's node, which init_node has made, and the terminal."""
 
     def __init__(self, options: PlayOptions) -> None:
@@ -124,11 +124,11 @@ class NodeStage:
         self._is_header_first: bool | None = None
 
     def open(self, player: Controls) -> None:
-        """See :meth:`Stage.open`."""
+        """See :meth:`Output.open`."""
         client.on_shutdown(player.end)
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """See :meth:`Stage.advertise`."""
+        """See :meth:`Output.advertise`."""
         self._clock = client.Publisher("clock", frame_class(*_clock_type()), queue_size=1)
         for number, connection in connections:
             self._advertise(number, connection)
@@ -151,7 +151,7 @@ class NodeStage:
             self.print(" done.")
 
     def has_all_subscribers(self) -> bool:
-        """See :meth:`Stage.has_all_subscribers`."""
+        """See :meth:`Output.has_all_subscribers`."""
         return all(publisher.get_num_connections() for publisher, _ in self._publishers.values())
 
     @contextlib.contextmanager
@@ -168,25 +168,25 @@ class NodeStage:
             sys.setswitchinterval(interval)
 
     def publish(self, number: int, message: StoredMessage) -> None:
-        """See :meth:`Stage.publish`."""
+        """See :meth:`Output.publish`."""
         outlet = self._outlets[number, message.connection.id]
         if outlet:
             outlet.publish(message.body)
 
     def publish_clock(self, time: int) -> None:
-        """See :meth:`Stage.publish_clock`."""
+        """See :meth:`Output.publish_clock`."""
         if self._clock:
             message = self._clock.data_class()
             message._buff = CLOCK.pack(*divmod(time, _SECOND))
             self._clock.publish(message)
 
     def waiting_bytes(self) -> int:
-        """See :meth:`Stage.waiting_bytes`."""
+        """See :meth:`Output.waiting_bytes`."""
         topics = [publisher.impl for publisher, _ in self._publishers.values()]
         return sum(link.waiting_bytes for topic in topics if topic for link in topic.publication.links)
 
     def print(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Stage.print`."""
+        """See :meth:`Output.print`."""
         with contextlib.suppress(OSError, ValueError):
             if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
                 # The status line, written again and again in its place.

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from minirospy.base.errors import BoardError
 
-__all__ = ["Place"]
+__all__ = ["BoardDirectory"]
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,60}")
 _SOCKET_PATH_LIMIT = 100
@@ -25,14 +25,14 @@ _SOCKET_PATH_LIMIT = 100
 
 
 @dataclass(frozen=True)
-class Place:
+class BoardDirectory:
     """One board's name and folder."""
 
     name: str
     folder: Path
 
     @classmethod
-    def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> Place:
+    def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> BoardDirectory:
         """Return the place of board ``name`` (default: what the environment says).
 
         Raise BoardError on a name that is not a file name.
