@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.base import private_files
-from minirospy.board.place import Place
+from minirospy.board.directory import BoardDirectory
 from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.process import start_process
 from minirospy.ros.rostest.runner.junit import Result
@@ -200,7 +200,7 @@ def test_board_in_a_foreign_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "boards").symlink_to(tmp_path / "real")
     (tmp_path / "real").chmod(0o777)
     with pytest.raises(Exception, match="open to others"):
-        Place.find(environ={"MINIROSPY_RUNTIME_DIR": str(tmp_path / "boards")}).prepare()
+        BoardDirectory.find(environ={"MINIROSPY_RUNTIME_DIR": str(tmp_path / "boards")}).prepare()
 
 
 def test_roscore_follows_no_links_in_its_folder(
