@@ -2,7 +2,18 @@
 // Source: http://wiki.ros.org/actionlib/DetailedDescription.
 
 const STATUS_TYPE = "actionlib_msgs/GoalStatusArray";
-const STATUSES = ["Pending", "Active", "Preempted", "Succeeded", "Aborted", "Rejected", "Preempting", "Recalling", "Recalled", "Lost"];
+const STATUSES = [
+  "Pending",
+  "Active",
+  "Preempted",
+  "Succeeded",
+  "Aborted",
+  "Rejected",
+  "Preempting",
+  "Recalling",
+  "Recalled",
+  "Lost",
+];
 const RUNNING = new Set([0, 1, 6, 7]);
 
 /** Return the action servers among topics (name -> {type}): [{name, type}], type without its ending "Action". */
@@ -11,8 +22,9 @@ export function actionServers(channels) {
   for (const [topic, { type }] of channels) {
     if (type !== STATUS_TYPE || !topic.endsWith("/status")) continue;
     const name = topic.slice(0, -"/status".length);
-    const action = /^(.+)ActionFeedback$/.exec(channels.get(`${name}/feedback`)?.type ?? "")
-      ?? /^(.+)ActionResult$/.exec(channels.get(`${name}/result`)?.type ?? "");
+    const action =
+      /^(.+)ActionFeedback$/.exec(channels.get(`${name}/feedback`)?.type ?? "") ??
+      /^(.+)ActionResult$/.exec(channels.get(`${name}/result`)?.type ?? "");
     if (action) found.push({ name, type: action[1] });
   }
   return found;

@@ -1,6 +1,11 @@
 // Series that are computed from others while they stream: derivatives, moving averages, one series over another. Pure.
 
-export const KINDS = [["", "as it is"], ["derivative", "derivative"], ["average1", "average of 1 s"], ["average10", "average of 10 s"]];
+export const KINDS = [
+  ["", "as it is"],
+  ["derivative", "derivative"],
+  ["average1", "average of 1 s"],
+  ["average10", "average of 10 s"],
+];
 
 /** Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is none yet; null for "". */
 export function derivedOf(kind) {
@@ -46,7 +51,8 @@ class Average {
         this.values.push(values[index]);
         this.sum += values[index];
       }
-      while (this.first < this.times.length && this.times[this.first] < times[index] - this.seconds) this.sum -= this.values[this.first++];
+      while (this.first < this.times.length && this.times[this.first] < times[index] - this.seconds)
+        this.sum -= this.values[this.first++];
       if (this.first > 1024 && this.first > this.times.length / 2) this.forget();
       const count = this.times.length - this.first;
       found[index] = count ? this.sum / count : NaN;

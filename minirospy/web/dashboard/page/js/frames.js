@@ -58,14 +58,22 @@ export class Frames {
   problem(name, now) {
     const frame = this.frames.get(name);
     if (!frame) return "";
-    const parents = [...frame.parents].filter(([, at]) => frame.isStatic || now - at < CONFLICT_SECONDS).map(([parent]) => parent);
-    if (parents.length > 1) return t("It has {count} parents, {names}: let one node alone publish it.", { count: parents.length, names: parents.sort().join(t(" and ")) });
+    const parents = [...frame.parents]
+      .filter(([, at]) => frame.isStatic || now - at < CONFLICT_SECONDS)
+      .map(([parent]) => parent);
+    if (parents.length > 1)
+      return t("It has {count} parents, {names}: let one node alone publish it.", {
+        count: parents.length,
+        names: parents.sort().join(t(" and ")),
+      });
     if (this.isCycle(name)) return t("It is its own ancestor: no transform through it can be computed.");
     if (frame.isStatic) return "";
     const { age } = this.measured(name, now);
     // By the rate that it had: three seconds after its last message that is no longer measured.
     const limit = Math.max(LEAST_AGE, frame.usualHz ? OLD_PERIODS / frame.usualHz : 0);
-    return age > limit ? t("No transform for {age} s: its publisher has stopped, or is slow.", { age: age.toFixed(age < 10 ? 1 : 0) }) : "";
+    return age > limit
+      ? t("No transform for {age} s: its publisher has stopped, or is slow.", { age: age.toFixed(age < 10 ? 1 : 0) })
+      : "";
   }
 
   /** Remember the rates, by which frames are found to be old. */

@@ -1,15 +1,19 @@
 // What the graph shows: nodes, topics, actions folded into one, groups by namespace, and the traffic of what is drawn. Pure.
 
 const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
-const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
+const DEBUG_NODES =
+  /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
 const TO_SERVER = ["goal", "cancel"];
 const FROM_SERVER = ["status", "feedback", "result"];
 
 /** Return the names of the actions among topics. */
 export function actionsIn(topics) {
   const known = new Set(topics);
-  return [...known].filter((topic) => topic.endsWith("/goal")).map((topic) => topic.slice(0, -"/goal".length))
-    .filter((name) => ["cancel", ...FROM_SERVER].every((part) => known.has(`${name}/${part}`))).sort();
+  return [...known]
+    .filter((topic) => topic.endsWith("/goal"))
+    .map((topic) => topic.slice(0, -"/goal".length))
+    .filter((name) => ["cancel", ...FROM_SERVER].every((part) => known.has(`${name}/${part}`)))
+    .sort();
 }
 
 /**
@@ -21,7 +25,8 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
   const nodes = new Set();
   const topics = new Set();
   const edges = [];
-  for (const names of [...published.values(), ...subscribed.values(), ...services.values()]) for (const name of names) if (isNode(name)) nodes.add(name);
+  for (const names of [...published.values(), ...subscribed.values(), ...services.values()])
+    for (const name of names) if (isNode(name)) nodes.add(name);
   const all = new Set([...published.keys(), ...subscribed.keys()]);
   const actions = folds ? actionsIn(all) : [];
   const folded = new Set(actions.flatMap((name) => [...TO_SERVER, ...FROM_SERVER].map((part) => `${name}/${part}`)));
@@ -32,7 +37,8 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
     if (folded.has(topic) || (hidesDebug && DEBUG_TOPICS.has(topic))) continue;
     const [from, to] = ends(topic);
     if (mode === "nodes") {
-      for (const a of from) for (const b of to) edges.push({ from: `n${a}`, to: `n${b}`, label: topic, pairs: [[topic, a, b]] });
+      for (const a of from)
+        for (const b of to) edges.push({ from: `n${a}`, to: `n${b}`, label: topic, pairs: [[topic, a, b]] });
     } else if ((from.length && to.length) || (mode === "all" && from.length + to.length)) {
       topics.add(topic);
       for (const a of from) edges.push({ from: `n${a}`, to: `t${topic}`, label: "", pairs: [[topic, a, null]] });
@@ -53,19 +59,48 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
 function actionEdges(name, ends, mode) {
   const servers = new Set(ends(`${name}/status`)[0]);
   const clients = new Set(TO_SERVER.flatMap((part) => ends(`${name}/${part}`)[0]));
-  const watchers = new Set(FROM_SERVER.flatMap((part) => ends(`${name}/${part}`)[1]).filter((node) => !clients.has(node) && !servers.has(node)));
+  const watchers = new Set(
+    FROM_SERVER.flatMap((part) => ends(`${name}/${part}`)[1]).filter(
+      (node) => !clients.has(node) && !servers.has(node),
+    ),
+  );
   const of = (parts, sender, receiver) => parts.map((part) => [`${name}/${part}`, sender, receiver]);
   const found = [];
   if (mode === "nodes") {
     for (const server of servers) {
-      for (const client of clients) found.push({ from: `n${client}`, to: `n${server}`, label: `${name} (action)`, pairs: [...of(TO_SERVER, client, server), ...of(FROM_SERVER, server, client)] });
-      for (const watcher of watchers) found.push({ from: `n${server}`, to: `n${watcher}`, label: `${name} (action)`, pairs: of(FROM_SERVER, server, watcher) });
+      for (const client of clients)
+        found.push({
+          from: `n${client}`,
+          to: `n${server}`,
+          label: `${name} (action)`,
+          pairs: [...of(TO_SERVER, client, server), ...of(FROM_SERVER, server, client)],
+        });
+      for (const watcher of watchers)
+        found.push({
+          from: `n${server}`,
+          to: `n${watcher}`,
+          label: `${name} (action)`,
+          pairs: of(FROM_SERVER, server, watcher),
+        });
     }
     return found;
   }
-  for (const client of clients) found.push({ from: `n${client}`, to: `a${name}`, label: "", pairs: [...of(TO_SERVER, client, null), ...of(FROM_SERVER, null, client)] });
-  for (const server of servers) found.push({ from: `a${name}`, to: `n${server}`, label: "", pairs: [...of(TO_SERVER, null, server), ...of(FROM_SERVER, server, null)] });
-  for (const watcher of watchers) found.push({ from: `a${name}`, to: `n${watcher}`, label: "", pairs: of(FROM_SERVER, null, watcher) });
+  for (const client of clients)
+    found.push({
+      from: `n${client}`,
+      to: `a${name}`,
+      label: "",
+      pairs: [...of(TO_SERVER, client, null), ...of(FROM_SERVER, null, client)],
+    });
+  for (const server of servers)
+    found.push({
+      from: `a${name}`,
+      to: `n${server}`,
+      label: "",
+      pairs: [...of(TO_SERVER, null, server), ...of(FROM_SERVER, server, null)],
+    });
+  for (const watcher of watchers)
+    found.push({ from: `a${name}`, to: `n${watcher}`, label: "", pairs: of(FROM_SERVER, null, watcher) });
   return found;
 }
 
@@ -74,8 +109,10 @@ function filtered({ nodes, topics, actions, edges }, words) {
   if (words) {
     const fits = (key) => key.slice(1).toLowerCase().includes(words);
     const kept = new Set();
-    for (const { from, to, label } of edges) if (fits(from) || fits(to) || label.toLowerCase().includes(words)) kept.add(from).add(to);
-    for (const [kind, table] of Object.entries(tables)) for (const name of table) if (!kept.has(kind + name) && !(kind === "n" && fits(kind + name))) table.delete(name);
+    for (const { from, to, label } of edges)
+      if (fits(from) || fits(to) || label.toLowerCase().includes(words)) kept.add(from).add(to);
+    for (const [kind, table] of Object.entries(tables))
+      for (const name of table) if (!kept.has(kind + name) && !(kind === "n" && fits(kind + name))) table.delete(name);
   }
   const isThere = (key) => tables[key[0]].has(key.slice(1));
   return { nodes, topics, actions, edges: edges.filter(({ from, to }) => isThere(from) && isThere(to)) };

@@ -17,7 +17,8 @@ const KEYS = [
   ["Escape", "Close what is open"],
 ];
 
-const isTyping = (element) => /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "") && !/^(checkbox|radio|range|color)$/.test(element.type);
+const isTyping = (element) =>
+  /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "") && !/^(checkbox|radio|range|color)$/.test(element.type);
 
 /** Open the list of keys. */
 export function openHelp() {
@@ -27,9 +28,20 @@ export function openHelp() {
     return;
   }
   const dialog = h("dialog", { class: "help panel", "aria-labelledby": "help-title", onclose: () => dialog.remove() });
-  fill(dialog, h("h2", { id: "help-title" }, "Keys"),
-    h("table", {}, h("tbody", {}, KEYS.map(([keys, what]) => h("tr", {}, h("th", { scope: "row" }, h("kbd", {}, keys)), h("td", {}, t(what)))))),
-    h("button", { type: "button", class: "primary", onclick: () => dialog.close() }, "Close"));
+  fill(
+    dialog,
+    h("h2", { id: "help-title" }, "Keys"),
+    h(
+      "table",
+      {},
+      h(
+        "tbody",
+        {},
+        KEYS.map(([keys, what]) => h("tr", {}, h("th", { scope: "row" }, h("kbd", {}, keys)), h("td", {}, t(what)))),
+      ),
+    ),
+    h("button", { type: "button", class: "primary", onclick: () => dialog.close() }, "Close"),
+  );
   document.body.append(dialog);
   dialog.showModal();
 }
@@ -46,7 +58,14 @@ export function listenForKeys(step) {
     },
   };
   addEventListener("keydown", (event) => {
-    if (!Object.hasOwn(react, event.key) || event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement)) return;
+    if (
+      !Object.hasOwn(react, event.key) ||
+      event.ctrlKey ||
+      event.altKey ||
+      event.metaKey ||
+      isTyping(document.activeElement)
+    )
+      return;
     event.preventDefault();
     react[event.key]();
   });

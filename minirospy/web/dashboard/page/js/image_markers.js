@@ -20,8 +20,10 @@ export class ImageMarkers {
       return;
     }
     if (marker.action !== ADD) throw new Error(t("the action {action} is not known", { action: marker.action }));
-    if (marker.type > POINTS || marker.type < CIRCLE) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
-    if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} markers", { count: MOST }));
+    if (marker.type > POINTS || marker.type < CIRCLE)
+      throw new Error(t("the marker type {type} is not known", { type: marker.type }));
+    if (!this.markers.has(key) && this.markers.size >= MOST)
+      throw new Error(t("more than {count} markers", { count: MOST }));
     const lifetime = marker.lifetime.secs * 1000 + marker.lifetime.nsecs / 1e6;
     this.markers.set(key, { marker, until: lifetime > 0 ? now + lifetime : Infinity });
   }

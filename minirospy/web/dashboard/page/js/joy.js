@@ -13,7 +13,16 @@ export function joyOf({ mapping, axes, buttons }) {
   const trigger = (button) => 1 - 2 * (button?.value ?? 0);
   const pair = (plus, minus) => pressed(buttons[plus]) - pressed(buttons[minus]);
   return {
-    axes: [axis(axes[0]), axis(axes[1]), trigger(buttons[6]), axis(axes[2]), axis(axes[3]), trigger(buttons[7]), pair(14, 15), pair(12, 13)],
+    axes: [
+      axis(axes[0]),
+      axis(axes[1]),
+      trigger(buttons[6]),
+      axis(axes[2]),
+      axis(axes[3]),
+      trigger(buttons[7]),
+      pair(14, 15),
+      pair(12, 13),
+    ],
     buttons: [0, 1, 2, 3, 4, 5, 8, 9, 16, 10, 11].map((index) => pressed(buttons[index])),
   };
 }

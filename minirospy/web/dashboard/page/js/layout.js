@@ -19,7 +19,8 @@ export class Layout {
     if (text.length > MAX_TEXT) throw new Error("the layout is too long");
     const reader = { text, at: 0 };
     layout.root = layout.read(reader);
-    if (reader.at < text.length) throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected in a layout`);
+    if (reader.at < text.length)
+      throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected in a layout`);
     layout.tidy();
     return layout;
   }
@@ -30,7 +31,8 @@ export class Layout {
     reader.at += match[0].length;
     const weight = Math.min(1000, Math.max(0.01, Number(match[1] ?? 1)));
     if (reader.text[reader.at] === "(") {
-      if (match[2] !== "row" && match[2] !== "column") throw new Error(`"${match[2]}(" in a layout is neither row( nor column(`);
+      if (match[2] !== "row" && match[2] !== "column")
+        throw new Error(`"${match[2]}(" in a layout is neither row( nor column(`);
       const parts = [];
       do {
         reader.at += 1; // "(" or ","
@@ -57,7 +59,10 @@ export class Layout {
   /** Return all panes, in reading order. */
   panes() {
     const found = [];
-    const visit = (node) => { if (node.kind === "pane") found.push(node); else node.parts.forEach(visit); };
+    const visit = (node) => {
+      if (node.kind === "pane") found.push(node);
+      else node.parts.forEach(visit);
+    };
     if (this.root) visit(this.root);
     return found;
   }
@@ -160,7 +165,9 @@ function text(node, share) {
   if (node.kind === "pane") return `${share}${node.view}${node.words ? `?${node.words}` : ""}`;
   const total = node.parts.reduce((sum, each) => sum + each.weight, 0);
   const isEven = node.parts.every((each) => Math.abs(each.weight / total - 1 / node.parts.length) < 0.001);
-  const parts = node.parts.map((each) => text(each, isEven ? "" : `${Math.max(1, Math.round((each.weight / total) * 100))}:`));
+  const parts = node.parts.map((each) =>
+    text(each, isEven ? "" : `${Math.max(1, Math.round((each.weight / total) * 100))}:`),
+  );
   return `${share}${node.kind}(${parts.join(",")})`;
 }
 

@@ -120,7 +120,9 @@ export class Link extends EventTarget {
     const listener = () => react();
     for (const name of names) this.addEventListener(name, listener);
     react();
-    return () => { for (const name of names) this.removeEventListener(name, listener); };
+    return () => {
+      for (const name of names) this.removeEventListener(name, listener);
+    };
   }
 
   /** Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends it. */

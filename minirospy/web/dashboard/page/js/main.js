@@ -92,9 +92,13 @@ function placeOf(name) {
     views: VIEWS,
     isActive: () => true,
     /** Keep the view's settings in the address; as an object, or URLSearchParams. */
-    remember: (words) => { if (place === shown) history.replaceState(null, "", fragmentOf(name, words)); },
+    remember: (words) => {
+      if (place === shown) history.replaceState(null, "", fragmentOf(name, words));
+    },
     /** Show a view with these settings. */
-    open: (view, words) => { location.hash = fragmentOf(view, words); },
+    open: (view, words) => {
+      location.hash = fragmentOf(view, words);
+    },
   };
   return place;
 }
@@ -134,9 +138,12 @@ function showState() {
 function showNotice({ message, level = 1, id = null }) {
   const key = id ?? message;
   const known = [...notices.children].find((each) => each.dataset.key === key);
-  const notice = h("div", { class: `notice level${level}` },
+  const notice = h(
+    "div",
+    { class: `notice level${level}` },
     h("span", {}, message),
-    h("button", { type: "button", title: "Dismiss", onclick: () => notice.remove() }, "×"));
+    h("button", { type: "button", title: "Dismiss", onclick: () => notice.remove() }, "×"),
+  );
   notice.dataset.key = key;
   if (known) known.replaceWith(notice);
   else notices.append(notice);
@@ -162,7 +169,10 @@ function showLanguage() {
   button.lang = others[0];
   button.title = LANGUAGES[others[0]];
   button.setAttribute("aria-label", LANGUAGES[others[0]]);
-  for (const [id, title] of [["theme", "Dark or light"], ["help", "Keys"]]) {
+  for (const [id, title] of [
+    ["theme", "Dark or light"],
+    ["help", "Keys"],
+  ]) {
     const element = document.getElementById(id);
     element.title = t(title);
     element.setAttribute("aria-label", t(title));
@@ -173,7 +183,10 @@ function showLanguage() {
 }
 
 function switchLanguage() {
-  localStorage.setItem("language", Object.keys(LANGUAGES).find((each) => each !== language));
+  localStorage.setItem(
+    "language",
+    Object.keys(LANGUAGES).find((each) => each !== language),
+  );
   showLanguage();
   showState();
   route();

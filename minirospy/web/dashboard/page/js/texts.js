@@ -10,7 +10,11 @@ export let language = "en";
 
 /** Use the language that was chosen, else the first of the browser's that there is. */
 export function chooseLanguage(wanted, offered = []) {
-  const known = [wanted, ...offered].map((each) => String(each ?? "").slice(0, 2).toLowerCase());
+  const known = [wanted, ...offered].map((each) =>
+    String(each ?? "")
+      .slice(0, 2)
+      .toLowerCase(),
+  );
   language = known.find((each) => Object.hasOwn(TABLES, each)) ?? "en";
   table = TABLES[language];
 }
@@ -32,7 +36,9 @@ export function watchMissing() {
 export function t(text, values = null) {
   const isKnown = Object.hasOwn(table, text);
   const found = isKnown ? table[text] : text;
-  const result = values ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all)) : found;
+  const result = values
+    ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all))
+    : found;
   if (isWatched) {
     if (!isKnown && !made.has(text)) missing.add(text);
     made.add(result);

@@ -69,7 +69,8 @@ export class Tools {
     if (this.watchers.size === 1) this.watchAgain();
     return () => {
       this.watchers.delete(received);
-      if (!this.watchers.size && this.socket?.readyState === WebSocket.OPEN) this.request({ do: "unwatch" }).catch(() => {});
+      if (!this.watchers.size && this.socket?.readyState === WebSocket.OPEN)
+        this.request({ do: "unwatch" }).catch(() => {});
     };
   }
 

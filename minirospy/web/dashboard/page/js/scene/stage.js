@@ -3,8 +3,18 @@
 // long, they get coarser.
 
 import {
-  Color, ColorManagement, DirectionalLight, LinearSRGBColorSpace, OrthographicCamera, PerspectiveCamera, Raycaster, Scene, Vector2,
-  Vector3, WebGLRenderer } from "../../vendor/three/three.min.js";
+  Color,
+  ColorManagement,
+  DirectionalLight,
+  LinearSRGBColorSpace,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
 import { Labels } from "./labels.js";
 import { yawOf } from "./transforms.js";
@@ -29,7 +39,10 @@ export class Stage {
     this.canvas.setAttribute("aria-label", t("The scene: drag to turn, with shift to move, wheel to zoom"));
     const options = { antialias: true, alpha: false, powerPreference: "high-performance" };
     const gl = this.canvas.getContext("webgl2", options);
-    if (!gl) throw new Error(t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"));
+    if (!gl)
+      throw new Error(
+        t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"),
+      );
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl, ...options });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     const about = gl.getExtension("WEBGL_debug_renderer_info");
@@ -46,7 +59,16 @@ export class Stage {
     // As RViz's: from where the camera is, without any other. A surface that faces the camera has its own color.
     this.light = new DirectionalLight(0xffffff, Math.PI);
     this.scene.add(this.light, this.light.target);
-    this.view = { kind: "orbit", distance: 10, focus: [0, 0, 0], pitch: 0.785, yaw: 0.785, scale: 50, angle: 0, target: "<Fixed Frame>" };
+    this.view = {
+      kind: "orbit",
+      distance: 10,
+      focus: [0, 0, 0],
+      pitch: 0.785,
+      yaw: 0.785,
+      scale: 50,
+      angle: 0,
+      target: "<Fixed Frame>",
+    };
     this.base = { p: [0, 0, 0], yaw: 0 }; // of the target frame
     this.labels = new Labels();
     this.insets = new Set(); // other cameras' views: {canvas, texture, background, aim(), show()}
@@ -146,7 +168,10 @@ export class Stage {
     const { renderer, scene } = this;
     const { width: across, height: along } = inset.texture.image;
     const isLarge = inset.canvas.classList.contains("large");
-    const width = Math.min(this.width * (isLarge ? 0.9 : 0.34), (this.height * (isLarge ? 0.85 : 0.4) * across) / along);
+    const width = Math.min(
+      this.width * (isLarge ? 0.9 : 0.34),
+      (this.height * (isLarge ? 0.85 : 0.4) * across) / along,
+    );
     const height = (width * along) / across;
     const { background } = scene;
     scene.background = inset.background ?? background;
@@ -213,7 +238,11 @@ export class Stage {
   focalPoint() {
     const { p, yaw } = this.base;
     const [x, y, z] = this.view.focus;
-    return new Vector3(p[0] + x * Math.cos(yaw) - y * Math.sin(yaw), p[1] + x * Math.sin(yaw) + y * Math.cos(yaw), p[2] + z);
+    return new Vector3(
+      p[0] + x * Math.cos(yaw) - y * Math.sin(yaw),
+      p[1] + x * Math.sin(yaw) + y * Math.cos(yaw),
+      p[2] + z,
+    );
   }
 
   aim() {
@@ -266,7 +295,8 @@ export class Stage {
     const before = x === null ? null : this.ground(x, y);
     this.setView({ scale: Math.min(20_000, Math.max(0.05, this.view.scale * factor)) });
     const after = before && this.ground(x, y);
-    if (after) this.setView({ focus: [this.view.focus[0] + before.x - after.x, this.view.focus[1] + before.y - after.y, 0] });
+    if (after)
+      this.setView({ focus: [this.view.focus[0] + before.x - after.x, this.view.focus[1] + before.y - after.y, 0] });
   }
 
   rotate(dx, dy) {
@@ -305,10 +335,14 @@ export class Stage {
     const hits = this.hits(x, y, objects);
     // Of points the one next to the ray, not the first that the threshold lets through.
     const solid = hits.find(({ distanceToRay }) => distanceToRay === undefined);
-    const dots = hits.filter(({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3);
+    const dots = hits.filter(
+      ({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3,
+    );
     if (dots.length) {
       const best = dots.reduce((one, other) => (other.distanceToRay < one.distanceToRay ? other : one));
-      return best.object.localToWorld(new Vector3().fromBufferAttribute(best.object.geometry.attributes.position, best.index));
+      return best.object.localToWorld(
+        new Vector3().fromBufferAttribute(best.object.geometry.attributes.position, best.index),
+      );
     }
     return solid?.point ?? this.ground(x, y);
   }

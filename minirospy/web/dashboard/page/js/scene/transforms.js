@@ -23,7 +23,8 @@ export function multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
     aw * bx + ax * bw + ay * bz - az * by,
     aw * by - ax * bz + ay * bw + az * bx,
     aw * bz + ax * by - ay * bx + az * bw,
-    aw * bw - ax * bx - ay * by - az * bz];
+    aw * bw - ax * bx - ay * by - az * bz,
+  ];
 }
 
 /** Return a point rotated by a quaternion. */
@@ -76,7 +77,12 @@ export function fromRpy([roll, pitch, yaw]) {
   const [cr, sr] = [Math.cos(roll / 2), Math.sin(roll / 2)];
   const [cp, sp] = [Math.cos(pitch / 2), Math.sin(pitch / 2)];
   const [cy, sy] = [Math.cos(yaw / 2), Math.sin(yaw / 2)];
-  return [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy];
+  return [
+    sr * cp * cy - cr * sp * sy,
+    cr * sp * cy + sr * cp * sy,
+    cr * cp * sy - sr * sp * cy,
+    cr * cp * cy + sr * sp * sy,
+  ];
 }
 
 export const fromYaw = (yaw) => [0, 0, Math.sin(yaw / 2), Math.cos(yaw / 2)];
@@ -123,12 +129,14 @@ export class Frames {
     if (!child || !parent) return "TF_NO_FRAME_ID: a transform without frame_id or child_frame_id";
     const { translation: t, rotation: r } = transform;
     const numbers = [t.x, t.y, t.z, r.x, r.y, r.z, r.w];
-    if (!numbers.every(Number.isFinite)) return `TF_NAN_INPUT: the transform of child_frame_id "${child}" has nan values`;
+    if (!numbers.every(Number.isFinite))
+      return `TF_NAN_INPUT: the transform of child_frame_id "${child}" has nan values`;
     if (Math.abs(r.x ** 2 + r.y ** 2 + r.z ** 2 + r.w ** 2 - 1) > QUATERNION_TOLERANCE) {
       return `TF_DENORMALIZED_QUATERNION: the rotation of child_frame_id "${child}" is not normalized`;
     }
 
-    if (this.known.size >= MAX_FRAMES && !(this.known.has(parent) && this.known.has(child))) return `more than ${MAX_FRAMES} frames: "${child}" is left out`;
+    if (this.known.size >= MAX_FRAMES && !(this.known.has(parent) && this.known.has(child)))
+      return `more than ${MAX_FRAMES} frames: "${child}" is left out`;
 
     this.version += 1;
     let edge = this.edges.get(child);
@@ -178,7 +186,8 @@ export class Frames {
       counts.set(root, (counts.get(root) ?? 0) + 1);
     }
     let found = "";
-    for (const [name, count] of counts) if (!found || count > counts.get(found) || (count === counts.get(found) && name < found)) found = name;
+    for (const [name, count] of counts)
+      if (!found || count > counts.get(found) || (count === counts.get(found) && name < found)) found = name;
     return found;
   }
 
@@ -195,7 +204,10 @@ export class Frames {
     const down = this.chain(target);
     const common = up.find((frame) => down.includes(frame));
     if (common === undefined) {
-      throw new FrameError("unconnected", `Could not find a connection between '${target}' and '${source}' because they are not part of the same tree. Tf has two or more unconnected trees.`);
+      throw new FrameError(
+        "unconnected",
+        `Could not find a connection between '${target}' and '${source}' because they are not part of the same tree. Tf has two or more unconnected trees.`,
+      );
     }
     const sourceEdges = up.slice(0, up.indexOf(common)).map((frame) => this.edges.get(frame));
     const targetEdges = down.slice(0, down.indexOf(common)).map((frame) => this.edges.get(frame));
@@ -210,7 +222,8 @@ export class Frames {
   chain(frame) {
     const found = [frame];
     for (let name = this.parent(frame); name !== null; name = this.parent(name)) {
-      if (found.length > MAX_DEPTH || name === frame) throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
+      if (found.length > MAX_DEPTH || name === frame)
+        throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
       found.push(name);
     }
     return found;
@@ -219,7 +232,10 @@ export class Frames {
 
 /** Return why a display that is in `frame` cannot be shown, in RViz's words. */
 export function missingText(frame, fixedFrame, error) {
-  return t("No transform from [{frame}] to fixed frame [{fixed}]", { frame: plainName(frame), fixed: fixedFrame }) + (error ? `: ${error.message}` : "");
+  return (
+    t("No transform from [{frame}] to fixed frame [{fixed}]", { frame: plainName(frame), fixed: fixedFrame }) +
+    (error ? `: ${error.message}` : "")
+  );
 }
 
 function record(edge, seconds, value) {
@@ -268,7 +284,14 @@ function at(edge, seconds, source, target) {
   if (stamps[index] === seconds) return transforms[index];
   if (index === 0 || index === stamps.length) {
     const [kind, word, bound] = index ? ["future", "latest", stamps.at(-1)] : ["past", "earliest", stamps[0]];
-    throw new FrameError(kind, `Lookup would require extrapolation into the ${kind}.  Requested time ${seconds.toFixed(9)} but the ${word} data is at time ${bound.toFixed(9)}, when looking up transform from frame [${source}] to frame [${target}]`);
+    throw new FrameError(
+      kind,
+      `Lookup would require extrapolation into the ${kind}.  Requested time ${seconds.toFixed(9)} but the ${word} data is at time ${bound.toFixed(9)}, when looking up transform from frame [${source}] to frame [${target}]`,
+    );
   }
-  return interpolate(transforms[index - 1], transforms[index], (seconds - stamps[index - 1]) / (stamps[index] - stamps[index - 1]));
+  return interpolate(
+    transforms[index - 1],
+    transforms[index],
+    (seconds - stamps[index - 1]) / (stamps[index] - stamps[index - 1]),
+  );
 }

@@ -123,11 +123,13 @@ export class TopicDisplay extends Display {
       this.setStatus("Topic", 1, t("No topic is set"));
       return;
     }
-    this.ends = [this.listen(this.topic, this.mode, (message) => {
-      this.count += 1;
-      this.received(message);
-      this.setStatus("Topic", 0, t("Messages received"));
-    })];
+    this.ends = [
+      this.listen(this.topic, this.mode, (message) => {
+        this.count += 1;
+        this.received(message);
+        this.setStatus("Topic", 0, t("Messages received"));
+      }),
+    ];
     this.setStatus("Topic", 1, t("No messages received"));
     this.ends.push(this.context.link.watch(["channels"], () => this.checkType()));
   }
@@ -155,7 +157,16 @@ export class TopicDisplay extends Display {
     const channel = this.context.link.channels.get(this.topic);
     this.type = channel?.type;
     this.isWrong = Boolean(channel) && !this.types.includes(channel.type);
-    if (this.isWrong) this.setStatus("Topic", 2, t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: channel.type, wanted: this.types[0] }));
+    if (this.isWrong)
+      this.setStatus(
+        "Topic",
+        2,
+        t("{topic} has the type {type}, not {wanted}", {
+          topic: this.topic,
+          type: channel.type,
+          wanted: this.types[0],
+        }),
+      );
     else if (!this.count) this.setStatus("Topic", 1, t("No messages received"));
   }
 
