@@ -46,7 +46,9 @@ export function stampOf(seconds) {
   return { secs, nsecs: Math.min(999_999_999, Math.round((seconds - secs) * 1e9)) };
 }
 
-/** Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null where there is none. */
+/**
+ * Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null where there is none.
+ */
 export function progressOf(feedback) {
   for (const [name, value] of Object.entries(feedback ?? {})) {
     if (typeof value !== "number" || !Number.isFinite(value)) continue;

@@ -27,7 +27,8 @@ export class Axes {
     this.labels = new Map(all("label")); // axis -> text
     this.ranges = new Map(); // axis -> [low, high], null where it follows the values
     for (const [axis, text] of all("range")) this.setRange(axis, ...text.split(" ", 2).map(limitOf));
-    this.chosen = new Map(all("axis").map(([axis, label]) => [label, axis])); // label of a series -> axis, but the first
+    // label of a series -> axis, but the first
+    this.chosen = new Map(all("axis").map(([axis, label]) => [label, axis]));
     this.rows = new Map(); // axis -> its row of the table
     this.element = h("div", { class: "axes panel", role: "group", "aria-label": "Y axes", hidden: true });
     this.button = h(
@@ -147,7 +148,10 @@ export class Axes {
     return axis.width;
   }
 
-  /** Let the wheel and drags over the numbers of a chart's axes zoom and pan them; a double click lets them follow their values. */
+  /**
+   * Let the wheel and drags over the numbers of a chart's axes zoom and pan them; a double click lets them follow their
+   * values.
+   */
   attach(chart) {
     const elements = chart.root.querySelectorAll(".u-axis");
     chart.axes.forEach(({ scale }, index) => {

@@ -7,7 +7,10 @@ export const KINDS = [
   ["average10", "average of 10 s"],
 ];
 
-/** Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is none yet; null for "". */
+/**
+ * Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is
+ * none yet; null for "".
+ */
 export function derivedOf(kind) {
   if (kind === "derivative") return new Derivative();
   const seconds = Number(/^average(\d+)$/.exec(kind)?.[1] ?? 0);
@@ -69,7 +72,10 @@ class Average {
   }
 }
 
-/** Return [xs, ys]: a series over another one, by their samples from one time to another; at most ``most`` points, the last one always. */
+/**
+ * Return [xs, ys]: a series over another one, by their samples from one time to another; at most ``most`` points, the
+ * last one always.
+ */
 export function pairs(over, samples, from, to, most) {
   const first = samples.indexOf(from);
   const last = samples.indexOf(to + 1e-9);

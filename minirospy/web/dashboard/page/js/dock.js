@@ -78,7 +78,7 @@ export class Dock {
     fill(this.element, this.layout.root ? this.box(this.layout.root) : null, this.mark);
     for (const node of wanted) this.open(node);
     this.showActive();
-    if (this.element.contains(focused)) focused.focus({ preventScroll: true });
+    if (focused instanceof HTMLElement && this.element.contains(focused)) focused.focus({ preventScroll: true });
   }
 
   box(node) {
@@ -255,7 +255,9 @@ export class Dock {
     this.move(node, "center", other);
   }
 
-  /** Follow a link of a view inside of the layout: a view that is shown takes it over, else it gets a pane of its own. */
+  /**
+   * Follow a link of a view inside of the layout: a view that is shown takes it over, else it gets a pane of its own.
+   */
   follow(event) {
     const anchor = event.target.closest?.('a[href^="#/"]');
     if (!anchor || event.ctrlKey || event.metaKey || event.shiftKey || event.button) return;

@@ -1,5 +1,6 @@
 // Elements. Text of topics, nodes and log lines always goes in by textContent: it never becomes HTML.
-// What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of setText, by t().
+// What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of
+// setText, by t().
 
 import { isList } from "./ros1.js";
 import { t } from "./texts.js";
@@ -121,7 +122,10 @@ export function watchPresses(window) {
   window.addEventListener("click", resend, true);
 }
 
-/** Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has got it. */
+/**
+ * Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has
+ * got it.
+ */
 function resend(event) {
   const { element, x, y } = press ?? {};
   press = null;

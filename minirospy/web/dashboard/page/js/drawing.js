@@ -1,4 +1,5 @@
-// What the drawings of graphs, frames and state machines have in common: lines, loops, and names that are too long for a box. Pure.
+// What the drawings of graphs, frames and state machines have in common: lines, loops, and names that are too long for
+// a box. Pure.
 
 const LONGEST = 60; // characters of a name in a drawing
 const SPREAD = 9; // pixels from the middle of a side to the ends of a loop

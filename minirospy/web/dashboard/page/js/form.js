@@ -1,4 +1,5 @@
-// A form for the fields of a type: what a person fills in becomes a message. Fields are those of the definition, so none can be mistyped.
+// A form for the fields of a type: what a person fills in becomes a message. Fields are those of the definition, so
+// none can be mistyped.
 
 import { h } from "./dom.js";
 import { t } from "./texts.js";

@@ -12,7 +12,8 @@ const MAX_PARENTS = 20; // of a frame, the latest
 
 export class Frames {
   constructor() {
-    this.frames = new Map(); // child -> {child, parent, isStatic, transform, stamp, at, rate, parents: Map of parent -> time}
+    // child -> {child, parent, isStatic, transform, stamp, at, rate, parents: Map of parent -> time}
+    this.frames = new Map();
   }
 
   /** Take over a message of /tf or /tf_static that came at ``at`` (seconds of the page's clock, which never jumps). */

@@ -1,4 +1,5 @@
-// What the graph shows: nodes, topics, actions folded into one, groups by namespace, and the traffic of what is drawn. Pure.
+// What the graph shows: nodes, topics, actions folded into one, groups by namespace, and the traffic of what is drawn.
+// Pure.
 
 const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
 const DEBUG_NODES =
@@ -17,7 +18,8 @@ export function actionsIn(topics) {
 }
 
 /**
- * Return what is shown, {nodes, topics, actions: Sets of names, edges: [{from, to, label, pairs}]}; keys are n/NAME, t/NAME, a/NAME.
+ * Return what is shown, {nodes, topics, actions: Sets of names, edges: [{from, to, label, pairs}]}; keys are n/NAME,
+ * t/NAME, a/NAME.
  * ``pairs`` are the connections of an edge: [topic, sender or null, receiver or null].
  */
 export function elementsOf({ published, subscribed, services }, { mode, hidesDebug, filter, ownNode, folds }) {
@@ -129,7 +131,10 @@ export function groupsOf(keys) {
   return new Map([...found].filter(([, members]) => members.length > 1));
 }
 
-/** Return Map of key -> the keys that it is connected with, one list for all of them; each of ``links`` is keys that belong together. */
+/**
+ * Return Map of key -> the keys that it is connected with, one list for all of them; each of ``links`` is keys that
+ * belong together.
+ */
 export function connectedOf(keys, links) {
   const found = new Map(keys.map((key) => [key, [key]]));
   for (const [first, ...others] of links) {
@@ -145,7 +150,10 @@ export function connectedOf(keys, links) {
   return found;
 }
 
-/** Put boxes in rows, the highest first, so that all are as large as they can be in a view of this aspect: {width, height, places: [{x, y}]}. */
+/**
+ * Put boxes in rows, the highest first, so that all are as large as they can be in a view of this aspect: {width,
+ * height, places: [{x, y}]}.
+ */
 export function packed(boxes, aspect) {
   const order = [...boxes.keys()].sort((one, other) => boxes[other].height - boxes[one].height);
   const widest = Math.max(0, ...boxes.map(({ width }) => width));
@@ -177,7 +185,8 @@ function inRows(boxes, order, most) {
 }
 
 /**
- * Return the traffic of an edge by a report's rows [sender, topic, receiver, hz, bytes], {hz, bytes}; null where nothing is known.
+ * Return the traffic of an edge by a report's rows [sender, topic, receiver, hz, bytes], {hz, bytes}; null where
+ * nothing is known.
  * A message to three receivers is one message: of those of one sender the fastest counts.
  */
 export function trafficOf({ pairs }, rows) {

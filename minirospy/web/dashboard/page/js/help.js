@@ -22,6 +22,7 @@ const isTyping = (element) =>
 
 /** Open the list of keys. */
 export function openHelp() {
+  /** @type {HTMLDialogElement | null} */
   const known = document.querySelector("dialog.help");
   if (known) {
     known.close();
@@ -54,7 +55,9 @@ export function listenForKeys(step) {
     ".": () => step(1),
     "/": () => {
       const within = document.querySelector(".pane.active") ?? document.getElementById("view");
-      within.querySelector("input[type=search], input:not([type]), input[type=text]")?.focus();
+      /** @type {HTMLElement | null} */
+      const search = within.querySelector("input[type=search], input:not([type]), input[type=text]");
+      search?.focus();
     },
   };
   addEventListener("keydown", (event) => {

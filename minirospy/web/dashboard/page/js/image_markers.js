@@ -1,9 +1,10 @@
-// Markers over an image: circles, lines, polygons and points of visualization_msgs/ImageMarker, until they are removed or their lifetime ends.
+// Markers over an image: circles, lines, polygons and points of visualization_msgs/ImageMarker, until they are removed
+// or their lifetime ends.
 // A position is in pixels of the image, (0, 0) the center of the first one; a width or diameter, too.
 
 import { t } from "./texts.js";
 
-const [CIRCLE, LINE_STRIP, LINE_LIST, POLYGON, POINTS] = [0, 1, 2, 3, 4];
+const [CIRCLE, LINE_STRIP, , POLYGON, POINTS] = [0, 1, 2, 3, 4]; // 2 is LINE_LIST
 const [ADD, REMOVE] = [0, 1];
 const MOST = 5000;
 
@@ -78,7 +79,10 @@ function drawMarker(context, marker) {
   }
 }
 
-/** Return a color of std_msgs/ColorRGBA; without opacity it is opaque: image_view2, for which programs leave it out, ignores it. */
+/**
+ * Return a color of std_msgs/ColorRGBA; without opacity it is opaque: image_view2, for which programs leave it out,
+ * ignores it.
+ */
 function css({ r, g, b, a }) {
   const [red, green, blue] = [r, g, b].map((value) => Math.round(value * 255));
   return `rgba(${red}, ${green}, ${blue}, ${a || 1})`;

@@ -1,5 +1,7 @@
-// A gamepad of the browser as sensor_msgs/Joy has it: left and up are positive, in joy_node's order for Xbox pads. Pure.
-// Sources: https://www.w3.org/TR/gamepad (the standard mapping), http://wiki.ros.org/joy (the tables of axes and buttons).
+// A gamepad of the browser as sensor_msgs/Joy has it: left and up are positive, in joy_node's order for Xbox pads.
+// Pure.
+// Sources: https://www.w3.org/TR/gamepad (the standard mapping), http://wiki.ros.org/joy (the tables of axes and
+// buttons).
 
 const DEAD_ZONE = 0.05; // of an axis, as joy_node's
 

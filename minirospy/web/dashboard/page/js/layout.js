@@ -5,7 +5,10 @@ export const MAX_PANES = 24;
 const MAX_TEXT = 20_000;
 const SIDES = { left: ["row", 0], right: ["row", 1], top: ["column", 0], bottom: ["column", 1] };
 
-/** A tree of {kind: "pane", id, view, words, weight} and {kind: "row" or "column", parts, weight}; words is the text of a query. */
+/**
+ * A tree of {kind: "pane", id, view, words, weight} and {kind: "row" or "column", parts, weight}; words is the text of
+ * a query.
+ */
 export class Layout {
   constructor() {
     this.root = null;
@@ -81,7 +84,10 @@ export class Layout {
     return null;
   }
 
-  /** Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are too many. */
+  /**
+   * Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are
+   * too many.
+   */
   add(view, words, side = "right", target = null) {
     if (this.panes().length >= MAX_PANES) return null;
     const pane = this.pane(view, words);

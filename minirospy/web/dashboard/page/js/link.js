@@ -125,7 +125,10 @@ export class Link extends EventTarget {
     };
   }
 
-  /** Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends it. */
+  /**
+   * Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends
+   * it.
+   */
   subscribe(entry, received) {
     const key = this.nextKey++;
     this.entries.set(key, received);

@@ -1,5 +1,6 @@
 // Log lines: their fields, what filters them, and their text. Pure.
 
+/** @type {[number, string][]} */
 export const LEVELS = [
   [1, "Debug"],
   [2, "Info"],
@@ -31,7 +32,10 @@ const HEADS = [
 ];
 const WORDS = { DEBUG: 1, INFO: 2, WARN: 4, WARNING: 4, ERROR: 8, CRITICAL: 16, FATAL: 16 };
 
-/** Return the lines of a log file; what follows a line without a head of its own belongs to it. `name` is for those that name no node. */
+/**
+ * Return the lines of a log file; what follows a line without a head of its own belongs to it. `name` is for those that
+ * name no node.
+ */
 export function linesOf(text, name) {
   const found = [];
   for (const row of text.replace(/\x1b\[[\d;]*m/g, "").split(/\r?\n/)) {

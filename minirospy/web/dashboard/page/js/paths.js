@@ -1,4 +1,5 @@
-// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the elements with
+// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the
+// elements with
 // a value: "/markers/markers[:]{ns=='goal'}{id>=2}/pose/position/x". Pure.
 
 import { TextError, isList, isNumeric } from "./ros1.js";
@@ -31,7 +32,10 @@ export function topicOf(path, topics) {
 /** A path that leads to no number. */
 export class PathError extends TextError {}
 
-/** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws PathError. */
+/**
+ * Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws
+ * PathError.
+ */
 export function parseSteps(text) {
   const steps = [];
   let rest = text;
@@ -50,6 +54,7 @@ export function parseSteps(text) {
   return steps;
 }
 
+/** @param {string[]} match */
 function testOf([, , , , , path, operator, ...texts]) {
   const names = path.split(/[./]/);
   const text = texts.find((each) => each !== undefined).trim();

@@ -1,4 +1,5 @@
-// Userdata of smach: a pickle of plain values, read without making any object: what is not plain is named instead. Pure.
+// Userdata of smach: a pickle of plain values, read without making any object: what is not plain is named instead.
+// Pure.
 // Source: Python's Lib/pickletools.py (protocols 0 to 5, the opcodes that plain values need).
 
 const MARK = Symbol("mark");
@@ -8,7 +9,9 @@ const MAX_TEXT = 4000; // characters and values of one that is shown
 
 export class PickleError extends Error {}
 
-/** Return the value of a pickle (Uint8Array). Dicts are Maps, other objects {kind: "module.Name"}. Throws PickleError. */
+/**
+ * Return the value of a pickle (Uint8Array). Dicts are Maps, other objects {kind: "module.Name"}. Throws PickleError.
+ */
 export function readPickle(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const stack = [];
@@ -225,7 +228,9 @@ function joined(items, room, show) {
   return parts.join(", ");
 }
 
-/** Return [name, text] of the values in local_data: base64 (a string, as smach_ros writes it) or bytes. Throws Error. */
+/**
+ * Return [name, text] of the values in local_data: base64 (a string, as smach_ros writes it) or bytes. Throws Error.
+ */
 export function userdataOf(data) {
   let bytes = data;
   if (typeof data === "string") {

@@ -61,6 +61,11 @@ function items(reader, end, read) {
   return found;
 }
 
+/**
+ * Return the string that starts at the reader's place.
+ * @param {any} reader
+ * @param {string[]} opening the match of its prefix and quote
+ */
 function string(reader, [start, quote]) {
   reader.at += start.length;
   let found = "";

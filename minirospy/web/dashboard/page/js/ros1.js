@@ -113,7 +113,10 @@ function exact(value) {
   return Number.isSafeInteger(number) ? number : value;
 }
 
-/** Return the description of a type: {name, fields: [{name, type, isArray, length, message}], constants}. Throws MessageError. */
+/**
+ * Return the description of a type: {name, fields: [{name, type, isArray, length, message}], constants}. Throws
+ * MessageError.
+ */
 export function parseDefinition(name, text) {
   const sections = new Map();
   let current = { name, lines: [] };
@@ -405,7 +408,10 @@ export function zeroOf(definition) {
   return found;
 }
 
-/** Return whether a value of a message is an array: a message may have a field called "length", too. */
+/**
+ * Return whether a value of a message is an array: a message may have a field called "length", too.
+ * @returns {value is any[]}
+ */
 export function isList(value) {
   return Array.isArray(value) || ArrayBuffer.isView(value);
 }

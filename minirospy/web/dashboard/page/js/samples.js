@@ -1,4 +1,5 @@
-// The points of one plotted series, and what is drawn of many: exact points, or the extremes of each column of pixels. Pure.
+// The points of one plotted series, and what is drawn of many: exact points, or the extremes of each column of pixels.
+// Pure.
 
 const FIRST = 1024;
 export const MAX_POINTS = 4_000_000; // of one series; then the oldest quarter goes

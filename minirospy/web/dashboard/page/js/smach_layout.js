@@ -1,4 +1,5 @@
-// Containers of smach, laid out from the inside out: a container is a node of the one around it. Pure, but for the layout given.
+// Containers of smach, laid out from the inside out: a container is a node of the one around it. Pure, but for the
+// layout given.
 
 const PAD = 14;
 const TITLE = 30;
@@ -31,11 +32,14 @@ export function activeStates(structures, statuses) {
   return found;
 }
 
-/** Return {path, width, height, states, outcomes, edges} of a container; states have x, y (centers), width, height, and `inner` where they are containers that are open. */
+/**
+ * Return {path, width, height, states, outcomes, edges} of a container; states have x, y (centers), width, height, and
+ * `inner` where they are containers that are open.
+ */
 export function layoutContainer(
   path,
   structures,
-  { Graph, layout, widthOf, isFolded = () => false },
+  { Graph, layout, widthOf, isFolded = (_path) => false },
   around = new Set(),
 ) {
   const {

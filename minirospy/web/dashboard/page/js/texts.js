@@ -1,4 +1,5 @@
-// The texts of the page in the person's language. The English text is its own key: t("Pause"), t("{count} lines", { count }).
+// The texts of the page in the person's language. The English text is its own key: t("Pause"), t("{count} lines", {
+// count }).
 
 import { GERMAN } from "./german.js";
 
@@ -8,7 +9,11 @@ export const LANGUAGES = { en: "English", de: "Deutsch" };
 let table = TABLES.en;
 export let language = "en";
 
-/** Use the language that was chosen, else the first of the browser's that there is. */
+/**
+ * Use the language that was chosen, else the first of the browser's that there is.
+ * @param {string | null} wanted
+ * @param {readonly string[]} offered
+ */
 export function chooseLanguage(wanted, offered = []) {
   const known = [wanted, ...offered].map((each) =>
     String(each ?? "")
@@ -32,7 +37,9 @@ export function watchMissing() {
   return missing;
 }
 
-/** Return a text in the chosen language; {name} in it becomes values.name. A text without a translation stays as it is. */
+/**
+ * Return a text in the chosen language; {name} in it becomes values.name. A text without a translation stays as it is.
+ */
 export function t(text, values = null) {
   const isKnown = Object.hasOwn(table, text);
   const found = isKnown ? table[text] : text;

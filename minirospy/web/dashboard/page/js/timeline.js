@@ -81,8 +81,8 @@ export function clockText(seconds, step = 0.001) {
 /** Return bytes for people. */
 export function sizeText(bytes) {
   if (bytes < 1000) return `${bytes} B`;
-  const unit = bytes < 1e6 ? ["kB", 1e3] : bytes < 1e9 ? ["MB", 1e6] : ["GB", 1e9];
-  return `${(bytes / unit[1]).toFixed(1)} ${unit[0]}`;
+  const [unit, size] = bytes < 1e6 ? ["kB", 1e3] : bytes < 1e9 ? ["MB", 1e6] : ["GB", 1e9];
+  return `${(bytes / Number(size)).toFixed(1)} ${unit}`;
 }
 
 /** Return heights from 0 to 1 for counts of messages: one message is seen next to thousands. */

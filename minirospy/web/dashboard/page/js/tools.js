@@ -1,4 +1,5 @@
-// The page's side of the tools' endpoint: requests that the Foxglove protocol has no message for, and reports that come by themselves.
+// The page's side of the tools' endpoint: requests that the Foxglove protocol has no message for, and reports that come
+// by themselves.
 
 import { t } from "./texts.js";
 

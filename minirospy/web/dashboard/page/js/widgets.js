@@ -121,7 +121,10 @@ function valueOf(type, text) {
   return type.startsWith("float") ? number : Math.round(number);
 }
 
-/** Return the path split at a topic or service that is known: [name, steps]; null where none fits. Throws Error on a bad path. */
+/**
+ * Return the path split at a topic or service that is known: [name, steps]; null where none fits. Throws Error on a bad
+ * path.
+ */
 export function splitPath(path, names) {
   let found = null;
   for (const name of names) {

@@ -31,7 +31,7 @@ let nextId = 1;
 let isScheduled = false;
 let isAwaited = false; // a batch that the page has not handled yet
 
-const post = (message, transfer = []) => self.postMessage(message, transfer);
+const post = (message, transfer = []) => /** @type {any} */ (self).postMessage(message, transfer);
 /** Return the fields by which the page is notified of an error, in its language. */
 const faultOf = ({ message, text = message, values = null }) => ({ error: text, errorValues: values });
 const failing = (id) => (error) =>

@@ -1,4 +1,5 @@
-// The displays that there are: RViz's classes, the types of their topics, and their settings under the names of .rviz files. Pure.
+// The displays that there are: RViz's classes, the types of their topics, and their settings under the names of .rviz
+// files. Pure.
 
 const scheme = (options) => ({ kind: "choice", options });
 const bool = { kind: "bool" };

@@ -1,4 +1,5 @@
-// The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is kept as it is. Pure.
+// The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is
+// kept as it is. Pure.
 // Source: files that RViz of ROS Noetic saves.
 
 import { t } from "../texts.js";
@@ -53,6 +54,7 @@ export class Config {
     if (!isObject(raw) || !isObject(raw[MANAGER]))
       throw new Error(t('not a file of RViz: it has no "{name}"', { name: MANAGER }));
     this.raw = raw;
+    /** @type {any} */
     this.manager = raw[MANAGER];
     if (!Array.isArray(this.manager.Displays)) this.manager.Displays = [];
     if (!isObject(this.manager["Global Options"])) this.manager["Global Options"] = {};

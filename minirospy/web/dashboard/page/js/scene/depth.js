@@ -1,5 +1,6 @@
 // Points of a depth image and the info of its camera: positions in the camera's frame, z forward. Pure.
-// Source: http://wiki.ros.org/rviz/DisplayTypes/DepthCloud, REP 118 (16UC1 is in millimetres, 32FC1 in metres), sensor_msgs/CameraInfo.
+// Source: http://wiki.ros.org/rviz/DisplayTypes/DepthCloud, REP 118 (16UC1 is in millimetres, 32FC1 in metres),
+// sensor_msgs/CameraInfo.
 
 import { t } from "../texts.js";
 
@@ -34,7 +35,10 @@ export function lensOf({ K, width, height, binning_x: acrossBinned, binning_y: a
   return lens;
 }
 
-/** Return the points of an image as those of a cloud are, every `stride`-th pixel; `rgba` are the pixels' colors, or null. Throws Error. */
+/**
+ * Return the points of an image as those of a cloud are, every `stride`-th pixel; `rgba` are the pixels' colors, or
+ * null. Throws Error.
+ */
 export function pointsOfDepth(
   { width, height, encoding, step, is_bigendian: isBig, data },
   { fx, fy, cx, cy },

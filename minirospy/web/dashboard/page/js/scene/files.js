@@ -1,4 +1,5 @@
-// .rviz files: the server reads and writes their YAML; the file of the command (`rviz -d FILE`) is saved there, others by the browser.
+// .rviz files: the server reads and writes their YAML; the file of the command (`rviz -d FILE`) is saved there, others
+// by the browser.
 
 import { download, h } from "../dom.js";
 import { t } from "../texts.js";

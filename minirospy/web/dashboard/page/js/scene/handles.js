@@ -1,5 +1,7 @@
-// Interactive markers as they are shown and dragged: handles of controls that have no shapes, menus, where axes are, and what a drag does. Pure.
-// Points and directions are arrays in the frame of the marker's header. Source: visualization_msgs/InteractiveMarkerControl.
+// Interactive markers as they are shown and dragged: handles of controls that have no shapes, menus, where axes are,
+// and what a drag does. Pure.
+// Points and directions are arrays in the frame of the marker's header. Source:
+// visualization_msgs/InteractiveMarkerControl.
 
 import { t } from "../texts.js";
 import { fromMessage, IDENTITY, multiply, normalized, rotate } from "./transforms.js";
@@ -17,7 +19,10 @@ const RADIANS_OF_PIXEL = 0.01;
 
 // --- what a message says
 
-/** Return a marker with all that may be left out: {name, description, scale, pose, header, controls, menu}. Throws Error. */
+/**
+ * Return a marker with all that may be left out: {name, description, scale, pose, header, controls, menu}. Throws
+ * Error.
+ */
 export function complete(message) {
   const { name, description, header, controls, menu_entries: entries } = message;
   const shapes = controls.reduce((sum, { markers }) => sum + markers.length, 0);
@@ -79,11 +84,12 @@ function completeControl(control, scale) {
   return { ...made, shapes: defaultShapes(mode, q, scale) };
 }
 
-const shape = (type, q, scale, [r, g, b], rest) => ({
+/** @param {number[]} color */
+const shape = (type, q, scale, color, rest) => ({
   type,
   pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: q[0], y: q[1], z: q[2], w: q[3] } },
   scale: { x: scale[0], y: scale[1], z: scale[2] },
-  color: { r, g, b, a: 0.5 },
+  color: { r: color[0], g: color[1], b: color[2], a: 0.5 },
   points: [],
   colors: [],
   ...rest,
@@ -122,14 +128,17 @@ function defaultShapes(mode, q, scale) {
     ];
     points.push(inner, outer, innerNext, innerNext, outer, outerNext);
     // Stripes are turned, a plain ring is moved.
-    const light = mode === MOVE_PLANE ? 1 : mode === ROTATE_AXIS ? 0.6 + 0.4 * (part % 2) : 0.6 + 0.4 * (part % 4 > 1);
+    const light = mode === MOVE_PLANE ? 1 : mode === ROTATE_AXIS ? 0.6 + 0.4 * (part % 2) : part % 4 > 1 ? 1 : 0.6;
     const [r, g, b] = color.map((each) => each * light);
     colors.push({ r, g, b, a: 0.5 }, { r, g, b, a: 0.5 });
   }
   return [shape(11, q, [scale, scale, scale], color, { points, colors })];
 }
 
-/** Return the tree of menu entries: [{id, title, isChecked: true, false or null, command: what only RViz starts, children}]. */
+/**
+ * Return the tree of menu entries: [{id, title, isChecked: true, false or null, command: what only RViz starts,
+ * children}].
+ */
 function menuOf(entries) {
   const top = [];
   const known = new Map([[0, top]]);
@@ -152,6 +161,7 @@ function menuOf(entries) {
 
 // --- where controls are
 
+/** @param {number[]} axis @param {number} angle */
 const turn = ([x, y, z], angle) => [
   x * Math.sin(angle / 2),
   y * Math.sin(angle / 2),
@@ -159,7 +169,10 @@ const turn = ([x, y, z], angle) => [
   Math.cos(angle / 2),
 ];
 
-/** Return {frame, shapes}: the rotations of a control, and of its shapes. `view` is x forward, y left, z up of the picture. */
+/**
+ * Return {frame, shapes}: the rotations of a control, and of its shapes. `view` is x forward, y left, z up of the
+ * picture.
+ */
 export function rotationsOf({ facing, isIndependent, q, initial, rotation }, markerQ, view) {
   if (facing === VIEW_FACING) {
     const frame = multiply(view, turn([1, 0, 0], rotation));
@@ -193,7 +206,10 @@ function onPlane(through, normal, { origin, direction }) {
   return far > 0 ? plus(origin, direction, far) : null;
 }
 
-/** A drag of a control; `axis` is the control's x axis, `grabbed` the point under the mouse, `ray` that of the mouse: {origin, direction}. */
+/**
+ * A drag of a control; `axis` is the control's x axis, `grabbed` the point under the mouse, `ray` that of the mouse:
+ * {origin, direction}.
+ */
 export class Drag {
   constructor({ mode, pose, axis, grabbed, ray }) {
     this.mode = mode;
@@ -211,7 +227,10 @@ export class Drag {
     this.tangent = Math.abs(dot(ray.direction, axis)) < EDGE_ON ? tangent.map((part) => part / length) : null;
   }
 
-  /** Take over where the mouse is; `by` is {right, up, forward, metres (of a pixel), dx, dy, isFar, isTurn}. Return the marker's pose, null where it stays. */
+  /**
+   * Take over where the mouse is; `by` is {right, up, forward, metres (of a pixel), dx, dy, isFar, isTurn}. Return the
+   * marker's pose, null where it stays.
+   */
   move(ray, by) {
     const found = MOVES[this.mode]?.(this, ray, by) ?? null;
     if (found) this.pose = found;
@@ -281,7 +300,10 @@ const MOVES = {
 
 export const isDragged = (mode) => Object.hasOwn(MOVES, mode);
 
-/** Return a pose as a geometry_msgs/Pose. */
+/**
+ * Return a pose as a geometry_msgs/Pose.
+ * @param {{p: number[], q: number[]}} pose
+ */
 export function toMessage({ p: [x, y, z], q: [qx, qy, qz, qw] }) {
   return { position: { x, y, z }, orientation: { x: qx, y: qy, z: qz, w: qw } };
 }

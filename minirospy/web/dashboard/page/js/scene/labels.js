@@ -1,4 +1,5 @@
-// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names that would cover
+// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names
+// that would cover
 // each other are stacked.
 
 import { Vector3 } from "../../vendor/three/three.min.js";
@@ -24,7 +25,10 @@ export class Labels {
     this.all = new Set();
   }
 
-  /** Return a new label: its place is a Vector3 in the fixed frame; set isShown. Text has a height in metres, or none for names. */
+  /**
+   * Return a new label: its place is a Vector3 in the fixed frame; set isShown. Text has a height in metres, or none
+   * for names.
+   */
   add({ text, kind = "name", metres = null, color = null }) {
     const label = {
       text,

@@ -1,5 +1,7 @@
-// Which interactive markers a server has, by the numbers of its updates: a lost update is noticed, and all markers are fetched again. Pure.
-// Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Getting%20Started, visualization_msgs/InteractiveMarkerUpdate.
+// Which interactive markers a server has, by the numbers of its updates: a lost update is noticed, and all markers are
+// fetched again. Pure.
+// Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Getting%20Started,
+// visualization_msgs/InteractiveMarkerUpdate.
 
 import { t } from "../texts.js";
 
@@ -10,7 +12,9 @@ const QUIET_MS = 2000; // servers publish every half second
 
 export class MarkerUpdates {
   constructor() {
-    this.servers = new Map(); // server_id -> {sequence: null until all its markers are known, full, waiting, updated: the time of the last update}
+    // server_id -> {sequence: null until all its markers are known, full, waiting, updated: the time of the last
+    // update}
+    this.servers = new Map();
   }
 
   /** Return whether a server's markers are not known. */

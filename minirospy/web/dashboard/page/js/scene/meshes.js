@@ -15,7 +15,10 @@ import { bodyMaterial } from "./shapes.js";
 const cache = new WeakMap(); // link -> Map of uri -> promise of an object
 const EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=";
 
-/** Return a promise of an object: a copy with its own materials. `paint` {rgb, alpha} is for meshes without colors, or instead of them. */
+/**
+ * Return a promise of an object: a copy with its own materials. `paint` {rgb, alpha} is for meshes without colors, or
+ * instead of them.
+ */
 export async function loadMesh(link, uri, paint) {
   if (!cache.has(link)) cache.set(link, new Map());
   const known = cache.get(link);
@@ -119,7 +122,8 @@ async function readDae(link, uri, bytes) {
   };
   const parsed = new ColladaLoader(manager).parse(text, "");
   if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
-  // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and so does RViz.
+  // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
+  // so does RViz.
   parsed.scene.rotation.set(0, 0, 0);
   const group = new Group();
   group.add(parsed.scene);

@@ -1,4 +1,5 @@
-// Points of scans and clouds: positions and colors for drawing. Pure. Colors are chosen as RViz's color transformers choose.
+// Points of scans and clouds: positions and colors for drawing. Pure. Colors are chosen as RViz's color transformers
+// choose.
 
 import { t } from "../texts.js";
 import { rainbow, rgbOf } from "./colors.js";
@@ -24,7 +25,10 @@ const TYPED = {
   8: Float64Array,
 };
 
-/** Where the points of a message are: {count, positions: Float32Array, channels: Map of name -> Float32Array or Uint32Array (rgb)}. */
+/**
+ * Where the points of a message are: {count, positions: Float32Array, channels: Map of name -> Float32Array or
+ * Uint32Array (rgb)}.
+ */
 
 /** Return the points of a sensor_msgs/LaserScan in its frame. */
 export function pointsOfScan({
@@ -68,7 +72,9 @@ export function pointsOfOldCloud({ points, channels }) {
   return { count: points.length, total: points.length, positions, channels: found };
 }
 
-/** Return the points of a sensor_msgs/PointCloud2, every `stride`-th; `wanted` are the channels to read. Throws Error. */
+/**
+ * Return the points of a sensor_msgs/PointCloud2, every `stride`-th; `wanted` are the channels to read. Throws Error.
+ */
 export function pointsOfCloud(message, wanted = [], stride = 1) {
   const { width, height, point_step: step, data } = message;
   const fields = new Map(message.fields.map((field) => [field.name, field]));
@@ -160,7 +166,10 @@ export function suitableTransformer(names) {
   return names.includes("intensity") ? "Intensity" : "AxisColor";
 }
 
-/** Return the colors (RGB bytes) of points, null for the flat color. `transform` leads into the fixed frame, for colors of an axis there. */
+/**
+ * Return the colors (RGB bytes) of points, null for the flat color. `transform` leads into the fixed frame, for colors
+ * of an axis there.
+ */
 export function colorsOf(points, settings, transform = null) {
   const transformer = settings["Color Transformer"];
   if (transformer === "RGB8")

@@ -1,4 +1,5 @@
-// Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are shared.
+// Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are
+// shared.
 
 import {
   BoxGeometry,
@@ -33,7 +34,8 @@ const HEAD = new ConeGeometry(0.5, 1, 20).rotateZ(-Math.PI / 2).translate(0.5, 0
 export const BOX = new BoxGeometry(1, 1, 1);
 export const BALL = new SphereGeometry(0.5, 24, 16);
 export const ROLL = new CylinderGeometry(0.5, 0.5, 1, 28).rotateX(Math.PI / 2); // along z
-// Boxes of lists and clouds have the same light from everywhere: by their sides, +x, -x, +y, -y, +z, -z, as measured in RViz.
+// Boxes of lists and clouds have the same light from everywhere: by their sides, +x, -x, +y, -y, +z, -z, as measured in
+// RViz.
 const CRATE = new BoxGeometry(1, 1, 1);
 CRATE.setAttribute(
   "color",
@@ -41,7 +43,10 @@ CRATE.setAttribute(
 );
 const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL, CRATE]);
 
-/** Return the material of a body: color [r, g, b] of 0 to 255. */
+/**
+ * Return the material of a body.
+ * @param {number[]} rgb from 0 to 255
+ */
 export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
   const material = new MeshLambertMaterial({
     transparent: alpha < 0.9998,
@@ -53,7 +58,10 @@ export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
   return material;
 }
 
-/** Return the material of what no light changes: color [r, g, b] of 0 to 255. */
+/**
+ * Return the material of what no light changes.
+ * @param {number[]} rgb from 0 to 255
+ */
 export function plainMaterial([r, g, b], alpha = 1, options = {}) {
   const material = new MeshBasicMaterial({
     transparent: alpha < 0.9998,
@@ -90,7 +98,10 @@ const AXES = [
   [0, 0, 255],
 ].map((rgb) => bodyMaterial(rgb));
 
-/** Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is here. */
+/**
+ * Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is
+ * here.
+ */
 export function axes(length, radius) {
   const group = new Group();
   AXES.forEach((material, index) => {
@@ -103,7 +114,10 @@ export function axes(length, radius) {
   return group;
 }
 
-/** Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three numbers of 0 to 1 each. */
+/**
+ * Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three
+ * numbers of 0 to 1 each.
+ */
 export function segments(
   positions,
   { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 1.5, metres = null } = {},
@@ -164,7 +178,10 @@ void main() {
   gl_FragColor = vec4(shade * light, opacity);
 }`;
 
-/** Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres (`grows`: times z) or pixels. */
+/**
+ * Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres (`grows`: times z) or
+ * pixels.
+ */
 export function points(
   positions,
   colors,
@@ -190,6 +207,7 @@ export function points(
     },
   });
   const found = new Points(geometry, material);
+  /** @type {any} */
   const viewport = {
     copy({ w }) {
       this.height = w;
@@ -211,7 +229,7 @@ export function solids(positions, colors, { rgb = [255, 255, 255], alpha = 1, si
   if (isRound) material.onBeforeCompile = shadeBalls;
   const count = positions.length / 3;
   const mesh = new InstancedMesh(isRound ? BALL : CRATE, material, count);
-  const matrix = new Matrix4().makeScale(...size);
+  const matrix = new Matrix4().makeScale(size[0], size[1], size[2]);
   for (let index = 0; index < count; index++)
     mesh.setMatrixAt(
       index,
@@ -247,7 +265,10 @@ export function triangles(positions, colors, rgb, alpha) {
   return new Mesh(geometry, bodyMaterial(rgb, alpha, { side: DoubleSide }));
 }
 
-/** Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard deviation. */
+/**
+ * Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard
+ * deviation.
+ */
 export function ellipse(covariance, width = 6) {
   // In the plane, exactly: what robots on floors have; its height is that of z alone.
   const [a, b, d] = [covariance[0], covariance[1], covariance[width + 1]];

@@ -1,5 +1,6 @@
 // The picture: WebGL, cameras as RViz's views have them, labels, and drawing only what has changed. z is up, as in ROS.
-// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page; where they take
+// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page;
+// where they take
 // long, they get coarser.
 
 import {
@@ -37,8 +38,9 @@ export class Stage {
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("aria-label", t("The scene: drag to turn, with shift to move, wheel to zoom"));
+    /** @type {{ antialias: boolean, alpha: boolean, powerPreference: "high-performance" }} */
     const options = { antialias: true, alpha: false, powerPreference: "high-performance" };
-    const gl = this.canvas.getContext("webgl2", options);
+    const gl = /** @type {WebGL2RenderingContext} */ (this.canvas.getContext("webgl2", options));
     if (!gl)
       throw new Error(
         t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"),
@@ -83,7 +85,7 @@ export class Stage {
     this.ratio = 0;
     this.coarser = 0; // pictures that were too slow, less those that were not
     this.onTick = () => {};
-    this.onAim = () => {}; // before each picture, with its camera
+    this.onAim = (_camera) => {}; // before each picture, with its camera
     this.onView = () => {};
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(frame);
@@ -108,7 +110,10 @@ export class Stage {
     return this.view.kind === "top" ? this.flat : this.perspective;
   }
 
-  /** Return how many pixels (of the screen, not of the drawing) a metre has at a distance of 1, or everywhere in a flat view. */
+  /**
+   * Return how many pixels (of the screen, not of the drawing) a metre has at a distance of 1, or everywhere in a flat
+   * view.
+   */
   get pixelsPerMetre() {
     return this.view.kind === "top" ? this.view.scale : this.height / (2 * Math.tan(FIELD_OF_VIEW / 2));
   }
@@ -147,7 +152,7 @@ export class Stage {
     this.gl.flush();
     this.labels.draw(this);
     this.drawn += 1;
-    this.canvas.dataset.drawn = this.drawn;
+    this.canvas.dataset.drawn = String(this.drawn);
   }
 
   addInset(inset) {
@@ -260,7 +265,7 @@ export class Stage {
       const away = new Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch));
       camera.position.copy(focus).addScaledVector(away, distance);
       camera.lookAt(focus);
-      camera.aspect = this.width / this.height;
+      this.perspective.aspect = this.width / this.height;
       camera.near = Math.max(0.005, distance / 500);
       camera.far = Math.max(1000, distance * 50);
     }
@@ -339,6 +344,7 @@ export class Stage {
       ({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3,
     );
     if (dots.length) {
+      /** @type {any} */
       const best = dots.reduce((one, other) => (other.distanceToRay < one.distanceToRay ? other : one));
       return best.object.localToWorld(
         new Vector3().fromBufferAttribute(best.object.geometry.attributes.position, best.index),

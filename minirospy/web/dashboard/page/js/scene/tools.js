@@ -1,4 +1,5 @@
-// What the mouse does: turning, moving and zooming the view; poses, goals and points that are published; measuring; focus.
+// What the mouse does: turning, moving and zooming the view; poses, goals and points that are published; measuring;
+// focus.
 
 import { Group } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";

@@ -1,5 +1,6 @@
 // Frames and the transforms between them over time, as tf2 has them. Pure.
-// A transform is {p: [x, y, z], q: [x, y, z, w]}; that from `source` to `target` turns coordinates in source into those in target.
+// A transform is {p: [x, y, z], q: [x, y, z, w]}; that from `source` to `target` turns coordinates in source into those
+// in target.
 // Source: tf2's BufferCore (http://wiki.ros.org/tf2); the texts of its errors are tf2's.
 
 import { t } from "../texts.js";
@@ -18,6 +19,11 @@ export class FrameError extends Error {
   }
 }
 
+/**
+ * Return the product of two quaternions [x, y, z, w].
+ * @param {number[]} one
+ * @param {number[]} other
+ */
 export function multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
   return [
     aw * bx + ax * bw + ay * bz - az * by,
@@ -27,7 +33,11 @@ export function multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
   ];
 }
 
-/** Return a point rotated by a quaternion. */
+/**
+ * Return a point rotated by a quaternion.
+ * @param {number[]} quaternion
+ * @param {number[]} point
+ */
 export function rotate([x, y, z, w], [px, py, pz]) {
   const tx = 2 * (y * pz - z * py);
   const ty = 2 * (z * px - x * pz);
@@ -72,7 +82,10 @@ export function normalized(q) {
   return length > 0 ? q.map((value) => value / length) : [0, 0, 0, 1];
 }
 
-/** Return the quaternion of roll, pitch and yaw, as URDF has them. */
+/**
+ * Return the quaternion of roll, pitch and yaw, as URDF has them.
+ * @param {number[]} rpy
+ */
 export function fromRpy([roll, pitch, yaw]) {
   const [cr, sr] = [Math.cos(roll / 2), Math.sin(roll / 2)];
   const [cp, sp] = [Math.cos(pitch / 2), Math.sin(pitch / 2)];
@@ -191,7 +204,10 @@ export class Frames {
     return found;
   }
 
-  /** Return the transform from `source` to `target` at a time in seconds; null is the newest that all frames between have. Throws FrameError. */
+  /**
+   * Return the transform from `source` to `target` at a time in seconds; null is the newest that all frames between
+   * have. Throws FrameError.
+   */
   lookup(targetName, sourceName, seconds = null) {
     const target = plainName(targetName);
     const source = plainName(sourceName);

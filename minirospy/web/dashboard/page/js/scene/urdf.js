@@ -1,4 +1,5 @@
-// Robot descriptions: the text of a URDF becomes links with their shapes, and joints. Pure. Source: http://wiki.ros.org/urdf/XML.
+// Robot descriptions: the text of a URDF becomes links with their shapes, and joints. Pure. Source:
+// http://wiki.ros.org/urdf/XML.
 
 import { t } from "../texts.js";
 import { compose, fromRpy, IDENTITY, normalized } from "./transforms.js";
@@ -6,9 +7,12 @@ import { parseXml } from "./xml.js";
 
 export class UrdfError extends Error {}
 
-/** Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint}. Throws UrdfError or XmlError.
+/**
+ * Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint}.
+ * Throws UrdfError or XmlError.
  *
- * A visual is {origin, geometry: {kind, size | radius, length | uri, scale}, color: [r, g, b, a] | null}; a joint {name, type, parent, child,
+ * A visual is {origin, geometry: {kind, size | radius, length | uri, scale}, color: [r, g, b, a] | null}; a joint
+ * {name, type, parent, child,
  * origin, axis, mimic: {joint, multiplier, offset} | null}. */
 export function parseUrdf(text) {
   const robot = parseXml(text);
@@ -57,7 +61,10 @@ export function parseUrdf(text) {
   return { name: robot.attributes.name ?? "", root: roots[0], links, joints };
 }
 
-/** Return the transforms of all links to the root link, for positions of joints by name; a joint that is not named is at 0. */
+/**
+ * Return the transforms of all links to the root link, for positions of joints by name; a joint that is not named is at
+ * 0.
+ */
 export function linkPoses({ root, joints }, positions) {
   const byParent = new Map();
   for (const joint of joints.values()) byParent.set(joint.parent, [...(byParent.get(joint.parent) ?? []), joint]);

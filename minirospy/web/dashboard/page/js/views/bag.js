@@ -9,7 +9,7 @@ import { language, t, errorText } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
-const PROTOCOL = "minirospy.core.bag.v1";
+const PROTOCOL = "minirospy.bag.v1";
 const IMAGES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 const HEAVY = new Set([...IMAGES, "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud"]); // measured when chosen
 const RULER = 26;
@@ -489,7 +489,7 @@ class Player {
     );
     fill(this.moments);
     const order = [...this.rows].sort(
-      (one, other) => IMAGES.has(other.type) - IMAGES.has(one.type) || other.count - one.count,
+      (one, other) => Number(IMAGES.has(other.type)) - Number(IMAGES.has(one.type)) || other.count - one.count,
     );
     for (const row of order.slice(0, MAX_SHOWN_FIRST)) this.setShown(row, true);
     this.publishing.checked = false;
@@ -672,7 +672,7 @@ class Player {
     const time = view.getFloat64(3, true);
     const isMoment = view.getUint8(0) === MOMENT;
     const { bag } = this;
-    let message = null;
+    let message;
     let error = "";
     try {
       const definition = this.link.definition(row.type, row.definition);
@@ -683,7 +683,7 @@ class Player {
         const image = await pictureOf(message);
         const isWanted = bag === this.bag;
         if (isWanted) row.thumbnails.set(time, small(image, IMAGE_ROW - 6));
-        image.close?.();
+        if (image instanceof ImageBitmap) image.close();
         if (!isWanted) return;
         const apart = row.thumbnails.get(time).width + 6;
         if (apart !== row.apart) {
@@ -859,7 +859,7 @@ class Card {
           this.canvas.height = image.height;
         }
         this.canvas.getContext("2d").drawImage(image, 0, 0);
-        image.close?.();
+        if (image instanceof ImageBitmap) image.close();
       } catch (error) {
         this.fail(error.message);
       }

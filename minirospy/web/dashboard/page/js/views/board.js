@@ -1,4 +1,5 @@
-// The workshop's board: lights, buttons (mouse, touch, keys 1 and 2), and the room of the scanner with a person to drag.
+// The workshop's board: lights, buttons (mouse, touch, keys 1 and 2), and the room of the scanner with a person to
+// drag.
 
 import { fill, h, setText, svg } from "../dom.js";
 import { t } from "../texts.js";
@@ -221,7 +222,7 @@ export class Board {
   }
 
   key(event) {
-    const focused = document.activeElement?.dataset?.pin;
+    const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset?.pin;
     const pin =
       { 1: 11, 2: 12 }[event.key] ??
       (focused && (event.key === " " || event.key === "Enter") ? Number(focused) : undefined);

@@ -1,4 +1,5 @@
-// Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values on a click.
+// Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values
+// on a click.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { timeText } from "../logs.js";

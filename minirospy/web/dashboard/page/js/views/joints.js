@@ -1,4 +1,5 @@
-// The joints of robot_description: a slider for each that can be set; the server publishes joint_states, as joint_state_publisher_gui.
+// The joints of robot_description: a slider for each that can be set; the server publishes joint_states, as
+// joint_state_publisher_gui.
 
 import { h, setText } from "../dom.js";
 import { Endpoint } from "../endpoint.js";

@@ -1,20 +1,21 @@
-// Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log lines.
+// Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log
+// lines.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { Endpoint } from "../endpoint.js";
 import { t } from "../texts.js";
 
-const PROTOCOL = "minirospy.ros.roslaunch.launcher.v1";
+const PROTOCOL = "minirospy.launch.v1";
 const MAX_LOG = 400_000; // characters
 const GOOD = "d0";
 const LEVELS = {
-  running: GOOD,
-  starting: "d1",
-  ending: "d1",
-  stopping: "d1",
-  stopped: "d3",
-  ended: "d3",
-  failed: "d2",
+  "running": GOOD,
+  "starting": "d1",
+  "ending": "d1",
+  "stopping": "d1",
+  "stopped": "d3",
+  "ended": "d3",
+  "failed": "d2",
 };
 
 export class Launch {

@@ -1,4 +1,5 @@
-// Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after the dead.
+// Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after
+// the dead.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";

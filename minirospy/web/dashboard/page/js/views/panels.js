@@ -1,4 +1,5 @@
-// Small panels for lessons: values, lamps, gauges, switches, sliders and buttons, bound to a field of a topic or a service; kept in the link.
+// Small panels for lessons: values, lamps, gauges, switches, sliders and buttons, bound to a field of a topic or a
+// service; kept in the link.
 
 import { fill, h, setText, shown, svg, uniqueId } from "../dom.js";
 import { numberOf, numericPaths } from "../paths.js";
@@ -326,7 +327,10 @@ class Panel {
     if (!spec.isService) this.end = link.subscribe({ topic: name, mode: "latest" }, (item) => this.received(item));
   }
 
-  /** Return the topic and the steps of a path to what nodes subscribe to and nobody publishes; null until its type is known. */
+  /**
+   * Return the topic and the steps of a path to what nodes subscribe to and nobody publishes; null until its type is
+   * known.
+   */
   subscribed() {
     const { link, spec } = this;
     const found = splitPath(spec.path, link.graph.subscribed.keys());
@@ -353,7 +357,9 @@ class Panel {
     setText(this.note, text);
   }
 
-  /** Publish a topic that is to be set before its first message: those before its subscribers are connected are lost. */
+  /**
+   * Publish a topic that is to be set before its first message: those before its subscribers are connected are lost.
+   */
   advertise(name) {
     const channel = this.channel(name);
     if (this.isAdvertised || this.spec.isService || !KINDS[this.spec.kind].isWriter || channel.schema === undefined)
@@ -467,7 +473,8 @@ class Panel {
       svg("text", { x: 10, y: 75, class: "end" }, spec.min),
       svg("text", { x: 110, y: 75, class: "end" }, spec.max),
     );
-    const digits = Math.min(6, Math.max(0, 3 - Math.floor(Math.log10(Math.abs(max - min) || 1)))); // a thousandth of its range
+    // a thousandth of its range
+    const digits = Math.min(6, Math.max(0, 3 - Math.floor(Math.log10(Math.abs(max - min) || 1))));
     this.show = (value) => {
       const found = numberOf(value) ?? NaN;
       const share = max === min ? 0 : Math.min(1, Math.max(0, (found - min) / (max - min)));

@@ -129,7 +129,7 @@ export class Parameters {
     let count = 0;
     for (const [name, row] of this.rows) {
       row.element.hidden = !`${name} ${row.text}`.toLowerCase().includes(words);
-      count += !row.element.hidden;
+      if (!row.element.hidden) count += 1;
     }
     setText(this.count, t("{count} of {all} parameters", { count, all: this.rows.size }));
   }

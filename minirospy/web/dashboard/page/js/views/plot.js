@@ -38,6 +38,7 @@ export class Plot {
     this.place = place;
     this.ends = new Map(); // path -> what ends its subscription
     this.series = new Map(); // label -> {label, path, samples, color, axis, isHidden}
+    this.removed = new Set(); // labels of series that the user removed while others of their path are shown
     this.problems = new Map(); // path without a series -> why: an error, or "" while its topic is not there
     this.origin = null;
     this.zoom = null; // {min, max} of time, null: it follows
@@ -53,7 +54,8 @@ export class Plot {
       this.unsaved = setTimeout(() => this.remember(), QUIET_MS);
     });
     this.over = words.get("x") ?? ""; // label of the series on the x axis; time where it is empty
-    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse())); // label -> kind, where it is not as it comes
+    // label -> kind, where it is not as it comes
+    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse()));
 
     this.known = h("datalist", { id: uniqueId("paths") });
     this.input = h("input", {
@@ -201,7 +203,7 @@ export class Plot {
       this.forget(series.path);
     } else {
       series.isRemoved = true;
-      (this.removed ??= new Set()).add(series.label);
+      this.removed.add(series.label);
     }
     series.row.remove();
     if (this.over === series.label) this.over = "";
@@ -306,7 +308,7 @@ export class Plot {
       this.showProblems();
     }
     for (const { label, times, values, stamps } of item.series ?? []) {
-      if (this.removed?.has(label)) continue;
+      if (this.removed.has(label)) continue;
       let series = this.series.get(label);
       if (!series) {
         series = this.makeSeries(label, path);
@@ -447,11 +449,11 @@ export class Plot {
         range: (_, low, high) =>
           this.axes.rangeOf(
             label,
-            low === null || low === high ? rangeOf([[low ?? NaN]]) : globalThis.uPlot.rangeNum(low, high, 0.1, true),
+            low === null || low === high ? rangeOf([[low ?? NaN]]) : uPlot.rangeNum(low, high, 0.1, true),
           ),
       },
     ];
-    this.chart = new globalThis.uPlot(
+    this.chart = new uPlot(
       {
         width: this.area.clientWidth,
         height: this.area.clientHeight,
@@ -536,7 +538,7 @@ export class Plot {
       this.axes.scaleOf(label),
       { range: () => this.axes.rangeOf(label, this.ranges.get(this.axes.scaleOf(label)) ?? [0, 1]) },
     ];
-    const chart = new globalThis.uPlot(
+    const chart = new uPlot(
       {
         mode: 2,
         width: this.area.clientWidth,
@@ -646,13 +648,15 @@ export class Plot {
         const shown = this.visible();
         const data = shown.map(({ samples }) => pairs(over, samples, from, to, MAX_PAIRS));
         const scales = shown.map(({ label }) => this.axes.scaleOf(label));
-        this.ranges = new Map([
-          ["x", rangeOf(data.map(([xs]) => xs))],
-          ...scales.map((scale) => [
-            scale,
-            rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys)),
+        this.ranges = new Map(
+          /** @type {[string, any][]} */ ([
+            ["x", rangeOf(data.map(([xs]) => xs))],
+            ...scales.map((scale) => [
+              scale,
+              rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys)),
+            ]),
           ]),
-        ]);
+        );
         this.chart.setData([null, ...data]);
         this.showValues();
         return;

@@ -132,7 +132,9 @@ export class Publish {
     if (this.isNew) this.name.focus();
   }
 
-  /** Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have. */
+  /**
+   * Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have.
+   */
   async describe(type) {
     const { topic } = this;
     this.asked = topic;

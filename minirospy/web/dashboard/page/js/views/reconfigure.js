@@ -1,4 +1,5 @@
-// Reconfigure: the parameters of dynamic_reconfigure servers as sliders, switches and selections; saved to and loaded from YAML.
+// Reconfigure: the parameters of dynamic_reconfigure servers as sliders, switches and selections; saved to and loaded
+// from YAML.
 
 import { download, fill, h, setText } from "../dom.js";
 import { converted, describe, requestOf, shownNumber, sliderStep, statesOf, valuesOf, yamlOf } from "../reconfigure.js";

@@ -1,4 +1,5 @@
-// State machines of smach, as smach_viewer shows them: containers in containers, active states, userdata; and where they start the next time.
+// State machines of smach, as smach_viewer shows them: containers in containers, active states, userdata; and where
+// they start the next time.
 
 import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
 import { brief, loopOf, pathOf } from "../drawing.js";
@@ -9,7 +10,6 @@ import { activeOf, activeStates, layoutContainer, roots } from "../smach_layout.
 import { language, t } from "../texts.js";
 
 const STRUCTURE = "smach_msgs/SmachContainerStructure";
-const STATUS = "smach_msgs/SmachContainerStatus";
 const INIT = "smach_msgs/SmachContainerInitialStatusCmd";
 const INIT_TEXT = `# The path to the node in the server
 string path
@@ -138,10 +138,12 @@ export class Smach {
   }
 
   subscribe() {
-    for (const [name, received] of [
+    /** @type {[string, (line: any) => void][]} */
+    const topics = [
       ["container_structure", (line) => this.structure(line)],
       ["container_status", (line) => this.status(line)],
-    ]) {
+    ];
+    for (const [name, received] of topics) {
       const topic = `${this.server}/smach/${name}`;
       if (this.ends.has(topic)) continue;
       this.ends.set(
@@ -176,7 +178,7 @@ export class Smach {
   draw() {
     setText(this.empty, this.structures.size ? "" : t("Waiting for the structure …"));
     const signature = JSON.stringify([
-      [...this.structures.values()].map(({ header, ...rest }) => rest),
+      [...this.structures.values()].map(({ header: _header, ...rest }) => rest),
       [...this.folded],
     ]);
     if (signature !== this.signature) {

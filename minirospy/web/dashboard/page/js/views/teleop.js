@@ -1,4 +1,5 @@
-// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server publishes them,
+// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server
+// publishes them,
 // and zero where nothing is held any more, or the page is lost.
 
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
@@ -247,6 +248,7 @@ export class Teleop {
     else if (this.isDriving) this.release();
   }
 
+  /** @param {number[]} velocity */
   push([forward, left]) {
     this.isDriving = true;
     const linear = forward * (Number(this.forward.value) || 0);

@@ -101,7 +101,7 @@ export class Tf {
       });
     }
     let bad = 0;
-    for (const [name, box] of this.boxes) bad += this.show(name, box, now);
+    for (const [name, box] of this.boxes) if (this.show(name, box, now)) bad += 1;
     const roots = this.frames.roots();
     setText(
       this.summary,

@@ -110,7 +110,7 @@ export class Topics {
     for (const row of this.rows.values()) {
       const text = `${row.channel.topic} ${row.channel.type}`.toLowerCase();
       row.element.hidden = !words.every((word) => text.includes(word));
-      count += !row.element.hidden;
+      if (!row.element.hidden) count += 1;
     }
     setText(this.count, t("{count} of {all} topics", { count, all: this.rows.size }));
     setText(
@@ -240,6 +240,7 @@ export class Tree {
 
   show(message) {
     const isArray = isList(message);
+    /** @type {(string | number)[]} */
     const names = isArray
       ? Array.from({ length: Math.min(message.length, MAX_ITEMS) }, (_, index) => index)
       : Object.keys(message);

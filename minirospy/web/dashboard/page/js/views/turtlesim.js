@@ -1,4 +1,5 @@
-// The turtles of turtlesim on their paper: drawn from their poses, with the trails of their pens; spawn, kill, clear, reset, pens.
+// The turtles of turtlesim on their paper: drawn from their poses, with the trails of their pens; spawn, kill, clear,
+// reset, pens.
 
 import { fill, h, number, setText, svg } from "../dom.js";
 import { t } from "../texts.js";
@@ -131,7 +132,9 @@ export class Turtlesim {
     this.update();
   }
 
-  /** Read the background from the simulator's parameters; it is that of the paper from the next clear on, and at first. */
+  /**
+   * Read the background from the simulator's parameters; it is that of the paper from the next clear on, and at first.
+   */
   readBackground() {
     const key = [...this.link.parameters.keys()].find(
       (name) => name.startsWith(`${this.at}/`) && name.endsWith("/background_r"),

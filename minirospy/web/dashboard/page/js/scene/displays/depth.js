@@ -44,7 +44,9 @@ export class DepthCloud extends Cloud {
     this.show();
   }
 
-  /** Show the newest depths, once all is there: in the colors of the same moment where those come, else in the newest. */
+  /**
+   * Show the newest depths, once all is there: in the colors of the same moment where those come, else in the newest.
+   */
   show() {
     const { message, info, colors, isColored } = this;
     if (!message || !info || (isColored && !colors)) return;

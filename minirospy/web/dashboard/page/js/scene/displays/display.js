@@ -9,7 +9,10 @@ import { t } from "../../texts.js";
 
 export const LEVELS = ["ok", "warn", "error"];
 
-/** One display. The context: {link, stage, frames, fixedFrame, place(item), transformNow(frame), time(), statusChanged()}. */
+/**
+ * One display. The context: {link, stage, frames, fixedFrame, place(item), transformNow(frame), time(),
+ * statusChanged()}.
+ */
 export class Display {
   constructor(context, settings) {
     this.context = context;
@@ -111,6 +114,11 @@ export class TopicDisplay extends Display {
   /** How messages come: "latest" where only the newest counts, "all" where each does. */
   get mode() {
     return "latest";
+  }
+
+  /** Show a message. */
+  received(_message) {
+    throw new TypeError(`${this.constructor.name} does not show messages`);
   }
 
   start() {

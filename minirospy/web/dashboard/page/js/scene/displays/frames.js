@@ -25,6 +25,11 @@ function someOf(texts, most, between) {
 }
 
 class Anchored extends Display {
+  /** Return the object to show. @returns {any} */
+  make() {
+    throw new TypeError(`${this.constructor.name} makes no object`);
+  }
+
   start() {
     this.item = this.add(this.make(), "", 0, true);
   }
@@ -48,7 +53,7 @@ export class Grid extends Anchored {
     const grid = hairlines(positions, this.color(), this.number("Alpha", 0.5));
     if (this.get("Plane") === "XZ") grid.rotation.x = Math.PI / 2;
     if (this.get("Plane") === "YZ") grid.rotation.y = Math.PI / 2;
-    grid.position.set(...["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
+    grid.position.fromArray(["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
     const group = new Group();
     group.add(grid);
     return group;
@@ -120,7 +125,7 @@ export class TF extends Display {
       head: 0,
       headWidth: 0.04 * scale,
     });
-    shape.children[1].material = bodyMaterial(ARROW_COLORS[0]);
+    /** @type {any} */ (shape.children[1]).material = bodyMaterial(ARROW_COLORS[0]);
     return shape;
   }
 
@@ -169,7 +174,10 @@ export class TF extends Display {
     else if (names.size) this.setStatus("Transforms", 0, t("{count} frames", { count: names.size }));
   }
 
-  /** Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand still. */
+  /**
+   * Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand
+   * still.
+   */
   isSilent(name) {
     const edge = this.context.frames.edges.get(name);
     const timeout = this.number("Frame Timeout", 15) * 1000;

@@ -1,4 +1,5 @@
-// Interactive markers of servers: shown with their handles and texts, moved by a person (grips.js), who is reported to the server.
+// Interactive markers of servers: shown with their handles and texts, moved by a person (grips.js), who is reported to
+// the server.
 
 import { Group, Matrix4, Quaternion, Vector3 } from "../../../vendor/three/three.min.js";
 import { complete, MAX_TEXT, rotationsOf, toMessage, VIEW_FACING } from "../handles.js";
@@ -14,7 +15,6 @@ export const [KEEP_ALIVE, POSE_UPDATE, MENU_SELECT, BUTTON_CLICK, MOUSE_DOWN, MO
 const TYPE = "visualization_msgs/InteractiveMarkerFeedback";
 const FEEDBACK = schema(
   "Header header\nstring client_id\nstring marker_name\nstring control_name\nuint8 event_type\nPose pose\nuint32 menu_entry_id\nPoint mouse_point\nbool mouse_point_valid",
-  "geometry_msgs/Pose",
 );
 const MOST = 1000; // interactive markers
 const MAX_STATUSES = 20; // of single markers
@@ -26,6 +26,9 @@ export class Shown {
   constructor(display) {
     this.display = display;
     this.object = new Group();
+    this.name = "";
+    this.description = "";
+    this.scale = 1; // metres
     this.controls = [];
     this.labels = []; // {label, control, anchor}
     this.held = null; // by a drag: {pose, header} that the server wants meanwhile
@@ -137,10 +140,10 @@ export class Shown {
     const { pose, display } = this;
     const view = this.controls.some(({ facing }) => facing === VIEW_FACING) ? this.viewed(camera) : null;
     this.axes.visible = display.get("Show Axes") === true;
-    for (const part of [this.axes, ...this.controls.map(({ group }) => group)]) part.position.set(...pose.p);
-    this.axes.quaternion.set(...pose.q);
+    for (const part of [this.axes, ...this.controls.map(({ group }) => group)]) part.position.fromArray(pose.p);
+    this.axes.quaternion.fromArray(pose.q);
     for (const control of this.controls) {
-      control.group.quaternion.set(...rotationsOf(control, pose.q, view).shapes);
+      control.group.quaternion.fromArray(rotationsOf(control, pose.q, view).shapes);
       control.group.visible = control.isAlways || display.context.isInteracting;
     }
     this.object.updateMatrixWorld(true);

@@ -113,8 +113,8 @@ export class MapDisplay extends TopicDisplay {
     );
     plane.renderOrder = this.get("Draw Behind") ? -2 : -1;
     const { p, q } = fromMessage(info.origin);
-    plane.position.set(...p);
-    plane.quaternion.set(...q);
+    plane.position.fromArray(p);
+    plane.quaternion.fromArray(q);
     const group = new Group();
     group.add(plane);
     // A map stays where its frame is.

@@ -180,8 +180,8 @@ export function makeMarker(marker, display) {
   }
   const placed = new Group();
   placed.add(made);
-  placed.position.set(...pose.p);
-  placed.quaternion.set(...pose.q);
+  placed.position.fromArray(pose.p);
+  placed.quaternion.fromArray(pose.q);
   group.add(placed);
   return { object: group, label: null };
 }

@@ -10,8 +10,8 @@ const MAX_KEPT = 2000;
 
 function posed(object, pose) {
   const { p, q } = fromMessage(pose);
-  object.position.set(...p);
-  object.quaternion.set(...q);
+  object.position.fromArray(p);
+  object.quaternion.fromArray(q);
   return object;
 }
 
@@ -26,6 +26,11 @@ function grouped(...objects) {
 
 /** A display whose settings only change how the last message looks. */
 class LastMessage extends TopicDisplay {
+  /** Return the object that shows a message. @returns {any} */
+  make(_message) {
+    throw new TypeError(`${this.constructor.name} makes no object`);
+  }
+
   start() {
     this.message = null;
     super.start();
@@ -67,7 +72,7 @@ export class Pose extends LastMessage {
     const group = grouped(posed(this.pointer(), stamped));
     if (message.pose.covariance && this.get("Covariance/Position/Value") !== false) {
       const ball = ellipse(message.pose.covariance);
-      ball.position.set(...fromMessage(stamped).p);
+      ball.position.fromArray(fromMessage(stamped).p);
       group.add(ball);
     }
     return group;
@@ -150,7 +155,7 @@ export class Odometry extends LastMessage {
     if (this.get("Covariance/Position/Value") !== false && message.pose.covariance.some((value) => value > 0)) {
       // Of the newest only, or the trail is covered.
       this.ball = ellipse(message.pose.covariance);
-      this.ball.position.set(...now.p);
+      this.ball.position.fromArray(now.p);
       group.add(this.ball);
     }
     this.addAt(message.header, group);
@@ -176,7 +181,7 @@ export class Path extends LastMessage {
         (others ? t(", {count} of another frame than the path's", { count: others }) : ""),
     );
     const group = new Group();
-    group.position.set(...["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
+    group.position.fromArray(["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
     const isBroad = this.get("Line Style") === "Billboards";
     if (poses.length > 1) {
       // RViz draws broad lines without their alpha.

@@ -1,4 +1,5 @@
-// The robot: the links of its description at the frames of TF; where TF has none of them, by the positions of its joints.
+// The robot: the links of its description at the frames of TF; where TF has none of them, by the positions of its
+// joints.
 
 import { Group, Mesh } from "../../../vendor/three/three.min.js";
 import { loadMesh } from "../meshes.js";
@@ -79,8 +80,8 @@ export class RobotModel extends Display {
     ];
     for (const { origin, geometry, color } of shown) {
       const holder = new Group();
-      holder.position.set(...origin.p);
-      holder.quaternion.set(...origin.q);
+      holder.position.fromArray(origin.p);
+      holder.quaternion.fromArray(origin.q);
       this.fill(holder, geometry, color);
       group.add(holder);
     }
@@ -110,7 +111,7 @@ export class RobotModel extends Display {
     }
     const material = bodyMaterial([r, g, b], alpha);
     const shape = new Mesh({ box: BOX, sphere: BALL, cylinder: ROLL }[geometry.kind], material);
-    if (geometry.kind === "box") shape.scale.set(...geometry.size);
+    if (geometry.kind === "box") shape.scale.fromArray(geometry.size);
     else if (geometry.kind === "sphere") shape.scale.setScalar(geometry.radius * 2);
     else shape.scale.set(geometry.radius * 2, geometry.radius * 2, geometry.length);
     holder.add(shape);
