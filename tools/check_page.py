@@ -20,9 +20,10 @@ ROOT = Path(__file__).resolve().parents[1]
 TOOLS = ROOT / "tools" / "page"
 MODULES = TOOLS / "node_modules"
 PAGE = "minirospy/web/dashboard/page/js"
+TESTS = "tests/web/page"
 MIN_NODE = (20, 19)  # eslint 10 needs it
 CHECKS = (
-    ("eslint/bin/eslint.js", "--config", "tools/page/eslint.config.js", PAGE),
+    ("eslint/bin/eslint.js", "--config", "tools/page/eslint.config.js", PAGE, TESTS),
     (
         "prettier/bin/prettier.cjs",
         "--config",
@@ -31,6 +32,7 @@ CHECKS = (
         "warn",
         "--check",
         f"{PAGE}/**/*.js",
+        TESTS,
     ),
     ("typescript/bin/tsc", "--project", "tools/page/tsconfig.json"),
 )
