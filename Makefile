@@ -28,7 +28,7 @@ help:
 	@echo "make pythons  run the fast tests on every Python found, with -X dev"
 	@echo "make ros2     test the bridge to ROS 2 against real ROS 2, which it installs from PyPI"
 	@echo "make ros2-core  the same without the peers over Zenoh, whose installation takes minutes"
-	@echo "make lint     check style (ruff) and types (mypy)"
+	@echo "make lint     check style (ruff) and types (mypy); the page by eslint and tsc if node is installed"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and the bridge, random files to the readers, ten minutes each"
@@ -92,6 +92,7 @@ lint: $(STAMP)
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m ruff format --check .
 	@$(BIN)/python -m mypy
+	@$(BIN)/python tools/check_page.py
 
 mutants: $(STAMP)
 	@$(BIN)/python tests/mutants.py

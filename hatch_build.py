@@ -72,9 +72,12 @@ def lean(text: str) -> str:
     if text.count("`") % 2:
         return text
     lines = []
-    is_literal = False
+    is_literal = is_comment = False
     for line in text.splitlines():
         short = line.strip()
+        if is_comment or (not is_literal and short.startswith("/**") and "*/" not in short):
+            is_comment = not short.endswith("*/")
+            continue
         if not is_literal and (not short or _COMMENT.fullmatch(short)):
             continue
         found = None if is_literal else _CODE_AND_COMMENT.fullmatch(short)

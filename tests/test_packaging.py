@@ -172,6 +172,7 @@ def test_record_fits_the_files_of_the_wheel(wheel: Path) -> None:
         ("  a = `\n  // b\n\n  c`;\n  d();\n", "a = `\n  // b\n\n  c`;\nd();\n"),
         ("  a = `b`;\n  // c\n", "a = `b`;\n"),
         ("  a = '`';\n  // b\n", "  a = '`';\n  // b\n"),
+        ("/**\n * Return `a`.\n */\nb();\n", "b();\n"),
     ],
 )
 def test_files_of_the_page_are_lean(text: str, wanted: str) -> None:

@@ -19,7 +19,7 @@ import tarfile
 import tempfile
 from pathlib import Path
 
-FOLDER = Path(__file__).parents[1] / "minirospy" / "dashboard" / "page" / "vendor"
+FOLDER = Path(__file__).parents[1] / "minirospy" / "web" / "dashboard" / "page" / "vendor"
 
 
 def main() -> int:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SUBPROTOCOL", "BagEndpoint", "BagSession"]
 
-SUBPROTOCOL = "minirospy.core.bag.v1"
+SUBPROTOCOL = "minirospy.bag.v1"
 
 _PLAYING_SECONDS = 0.05
 _RECORDING_SECONDS = 0.25

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 
-SUBPROTOCOL = "minirospy.ros.roslaunch.launcher.v1"
+SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
 """A file that grows reports nothing: it is looked at so often while a page shows it."""

@@ -22,9 +22,10 @@ def test_index_is_served_at_the_root() -> None:
     assert FILES["/"].content_type.startswith("text/html")
 
 
-def test_every_file_of_the_folder_is_served_but_the_list_of_versions() -> None:
+def test_every_file_of_the_folder_is_served_but_versions_and_types() -> None:
     names = {"/" + path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*") if path.is_file()}
-    assert names - set(FILES) == {"/vendor/versions.json"}
+    types = {name for name in names if name.endswith(".d.ts")}
+    assert names - set(FILES) - types == {"/vendor/versions.json"}
 
 
 def test_page_loads_files_that_exist() -> None:
@@ -61,8 +62,10 @@ def test_page_has_nothing_inline() -> None:
 
 def test_vendored_files_are_those_that_are_named() -> None:
     packages = json.loads((VENDOR / "versions.json").read_text(encoding="utf-8"))
-    found = {path.relative_to(VENDOR) for path in VENDOR.rglob("*") if path.is_file()} - {
-        Path("versions.json")
+    found = {
+        path.relative_to(VENDOR)
+        for path in VENDOR.rglob("*")
+        if path.is_file() and not path.name.endswith((".d.ts", "versions.json"))
     }
     for folder, package in packages.items():
         assert package["integrity"].startswith("sha512-")

@@ -10,7 +10,7 @@ from minirospy.ros.robot_state_publisher import joint_parameters
 from minirospy.web.dashboard.files import FOLDER
 
 JS = FOLDER / "js"
-STRING = r'"(?:[^"\\\n]|\\.)*"'
+STRING = r"""(?:"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')"""
 SOURCES = {
     path.relative_to(JS).as_posix(): path.read_text(encoding="utf-8")
     for path in sorted(JS.rglob("*.js"))
@@ -26,7 +26,7 @@ def german() -> dict[str, str]:
 
 
 def literals(text: str) -> set[str]:
-    found = re.findall(STRING, text) + re.findall(r"'(?:[^'\\\n]|\\.)*'", text)
+    found = re.findall(r'"(?:[^"\\\n]|\\.)*"', text) + re.findall(r"'(?:[^'\\\n]|\\.)*'", text)
     return {ast.literal_eval(each) for each in found}
 
 
@@ -36,7 +36,7 @@ def test_every_text_is_in_the_table() -> None:
     used = {
         (name, ast.literal_eval(each))
         for name, text in SOURCES.items()
-        for each in re.findall(rf"\bt\(({STRING}|'(?:[^'\\\n]|\\.)*')", text)
+        for each in re.findall(rf"\bt\(\s*({STRING})", text)
         if name != "texts.js"
     }
     assert len(used) > 80
@@ -72,7 +72,7 @@ def test_every_error_of_the_codec_and_the_worker_is_in_the_table() -> None:
     thrown = {
         ast.literal_eval(each)
         for name in ("ros1.js", "paths.js", "worker.js")
-        for call in re.findall(r"(?:Error|fail|reject)\((.*)", SOURCES[name])
+        for call in re.findall(r"(?:Error|fail|reject)\(\s*(.*)", SOURCES[name])
         for each in re.findall(STRING, call)
         if re.search(r"[a-z]", each)
     }

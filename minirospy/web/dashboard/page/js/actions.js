@@ -2,7 +2,18 @@
 // Source: http://wiki.ros.org/actionlib/DetailedDescription.
 
 const STATUS_TYPE = "actionlib_msgs/GoalStatusArray";
-const STATUSES = ["Pending", "Active", "Preempted", "Succeeded", "Aborted", "Rejected", "Preempting", "Recalling", "Recalled", "Lost"];
+const STATUSES = [
+  "Pending",
+  "Active",
+  "Preempted",
+  "Succeeded",
+  "Aborted",
+  "Rejected",
+  "Preempting",
+  "Recalling",
+  "Recalled",
+  "Lost",
+];
 const RUNNING = new Set([0, 1, 6, 7]);
 
 /** Return the action servers among topics (name -> {type}): [{name, type}], type without its ending "Action". */
@@ -11,8 +22,9 @@ export function actionServers(channels) {
   for (const [topic, { type }] of channels) {
     if (type !== STATUS_TYPE || !topic.endsWith("/status")) continue;
     const name = topic.slice(0, -"/status".length);
-    const action = /^(.+)ActionFeedback$/.exec(channels.get(`${name}/feedback`)?.type ?? "")
-      ?? /^(.+)ActionResult$/.exec(channels.get(`${name}/result`)?.type ?? "");
+    const action =
+      /^(.+)ActionFeedback$/.exec(channels.get(`${name}/feedback`)?.type ?? "") ??
+      /^(.+)ActionResult$/.exec(channels.get(`${name}/result`)?.type ?? "");
     if (action) found.push({ name, type: action[1] });
   }
   return found;
@@ -34,7 +46,9 @@ export function stampOf(seconds) {
   return { secs, nsecs: Math.min(999_999_999, Math.round((seconds - secs) * 1e9)) };
 }
 
-/** Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null where there is none. */
+/**
+ * Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null where there is none.
+ */
 export function progressOf(feedback) {
   for (const [name, value] of Object.entries(feedback ?? {})) {
     if (typeof value !== "number" || !Number.isFinite(value)) continue;

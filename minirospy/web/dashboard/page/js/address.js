@@ -9,8 +9,17 @@ export function addressOf(fragment) {
 /** Return settings as URLSearchParams; of an object those that are not empty, arrays as several of one name. */
 export function wordsOf(words) {
   if (words instanceof URLSearchParams) return words;
-  const pairs = typeof words === "string" || Array.isArray(words) ? new URLSearchParams(words) : Object.entries(words ?? {}).flatMap(([name, value]) => (Array.isArray(value) ? value : [value]).map((each) => [name, each]));
-  return new URLSearchParams([...pairs].filter(([, value]) => value !== "" && value !== null && value !== undefined && value !== false).map(([name, value]) => [name, value === true ? "1" : String(value)]));
+  const pairs =
+    typeof words === "string" || Array.isArray(words)
+      ? new URLSearchParams(words)
+      : Object.entries(words ?? {}).flatMap(([name, value]) =>
+          (Array.isArray(value) ? value : [value]).map((each) => [name, each]),
+        );
+  return new URLSearchParams(
+    [...pairs]
+      .filter(([, value]) => value !== "" && value !== null && value !== undefined && value !== false)
+      .map(([name, value]) => [name, value === true ? "1" : String(value)]),
+  );
 }
 
 /** Return the fragment of a view with settings. */

@@ -27,26 +27,49 @@ export class Axes {
     this.labels = new Map(all("label")); // axis -> text
     this.ranges = new Map(); // axis -> [low, high], null where it follows the values
     for (const [axis, text] of all("range")) this.setRange(axis, ...text.split(" ", 2).map(limitOf));
-    this.chosen = new Map(all("axis").map(([axis, label]) => [label, axis])); // label of a series -> axis, but the first
+    // label of a series -> axis, but the first
+    this.chosen = new Map(all("axis").map(([axis, label]) => [label, axis]));
     this.rows = new Map(); // axis -> its row of the table
     this.element = h("div", { class: "axes panel", role: "group", "aria-label": "Y axes", hidden: true });
-    this.button = h("button", { type: "button", "aria-expanded": "false", onclick: () => {
-      this.element.hidden = !this.element.hidden;
-      this.button.setAttribute("aria-expanded", String(!this.element.hidden));
-    } }, "Y axes");
-    this.autoButton = h("button", { type: "button", class: "primary keeps-place", title: "All y axes follow their values again", onclick: () => {
-      this.ranges.clear();
-      this.showRanges();
-      this.changed(false);
-    } }, "Auto range");
+    this.button = h(
+      "button",
+      {
+        type: "button",
+        "aria-expanded": "false",
+        onclick: () => {
+          this.element.hidden = !this.element.hidden;
+          this.button.setAttribute("aria-expanded", String(!this.element.hidden));
+        },
+      },
+      "Y axes",
+    );
+    this.autoButton = h(
+      "button",
+      {
+        type: "button",
+        class: "primary keeps-place",
+        title: "All y axes follow their values again",
+        onclick: () => {
+          this.ranges.clear();
+          this.showRanges();
+          this.changed(false);
+        },
+      },
+      "Auto range",
+    );
     this.showRanges();
   }
 
   /** Return what the address keeps. */
   words() {
-    return [...[...this.chosen].map(([label, axis]) => ["axis", `${axis} ${label}`]),
+    return [
+      ...[...this.chosen].map(([label, axis]) => ["axis", `${axis} ${label}`]),
       ...[...this.labels].map(([axis, text]) => ["label", `${axis} ${text}`]),
-      ...[...this.ranges].map(([axis, range]) => ["range", `${axis} ${range.map((each) => (each === null ? "auto" : number(each))).join(" ")}`])];
+      ...[...this.ranges].map(([axis, range]) => [
+        "range",
+        `${axis} ${range.map((each) => (each === null ? "auto" : number(each))).join(" ")}`,
+      ]),
+    ];
   }
 
   /** Return the axis of a series. */
@@ -56,11 +79,18 @@ export class Axes {
 
   /** Return the choice of an axis for a series. */
   choice({ label }) {
-    const choice = h("select", { class: "small", "aria-label": t("Axis of {label}", { label }), onchange: () => {
-      this.choose(label, Number(choice.value));
-      this.changed(true);
-    } },
-      Array.from({ length: MAX_AXES }, (_, index) => h("option", { value: index + 1 }, titleOf(index + 1))));
+    const choice = h(
+      "select",
+      {
+        class: "small",
+        "aria-label": t("Axis of {label}", { label }),
+        onchange: () => {
+          this.choose(label, Number(choice.value));
+          this.changed(true);
+        },
+      },
+      Array.from({ length: MAX_AXES }, (_, index) => h("option", { value: index + 1 }, titleOf(index + 1))),
+    );
     choice.value = this.of(label);
     return choice;
   }
@@ -98,7 +128,9 @@ export class Axes {
       const own = series.filter((each) => this.of(each.label) === axis);
       const label = this.labels.get(axis);
       return style({
-        scale: `y${axis}`, side: isLeft(axis) ? 3 : 1, size: (...words) => this.size(...words),
+        scale: `y${axis}`,
+        side: isLeft(axis) ? 3 : 1,
+        size: (...words) => this.size(...words),
         ...(index ? { grid: { show: false } } : {}),
         ...(used.length > 1 && own.length === 1 ? { stroke: own[0].color } : {}),
         ...(label ? { label, labelSize: 20, labelGap: 0, labelFont: FONT } : {}),
@@ -116,7 +148,10 @@ export class Axes {
     return axis.width;
   }
 
-  /** Let the wheel and drags over the numbers of a chart's axes zoom and pan them; a double click lets them follow their values. */
+  /**
+   * Let the wheel and drags over the numbers of a chart's axes zoom and pan them; a double click lets them follow their
+   * values.
+   */
   attach(chart) {
     const elements = chart.root.querySelectorAll(".u-axis");
     chart.axes.forEach(({ scale }, index) => {
@@ -131,16 +166,22 @@ export class Axes {
       element.classList.add("scaled");
       element.title = t("wheel: zoom · drag: pan · double click: follow the values");
       element.addEventListener("dblclick", () => set(null, null));
-      element.addEventListener("wheel", (event) => {
-        event.preventDefault();
-        event.stopPropagation();
-        const { min, max } = chart.scales[scale];
-        const by = event.deltaX || (event.shiftKey ? event.deltaY : 0);
-        const at = by ? (max - min) * 0.0015 * by : chart.posToVal(event.clientY - chart.over.getBoundingClientRect().top, scale);
-        const factor = Math.min(10, Math.max(0.1, Math.exp(event.deltaY * 0.002)));
-        if (by) set(min + at, max + at);
-        else set(at - (at - min) * factor, at + (max - at) * factor);
-      }, { passive: false });
+      element.addEventListener(
+        "wheel",
+        (event) => {
+          event.preventDefault();
+          event.stopPropagation();
+          const { min, max } = chart.scales[scale];
+          const by = event.deltaX || (event.shiftKey ? event.deltaY : 0);
+          const at = by
+            ? (max - min) * 0.0015 * by
+            : chart.posToVal(event.clientY - chart.over.getBoundingClientRect().top, scale);
+          const factor = Math.min(10, Math.max(0.1, Math.exp(event.deltaY * 0.002)));
+          if (by) set(min + at, max + at);
+          else set(at - (at - min) * factor, at + (max - at) * factor);
+        },
+        { passive: false },
+      );
       element.addEventListener("pointerdown", (event) => {
         if (event.button) return;
         const { min, max } = chart.scales[scale];
@@ -150,7 +191,9 @@ export class Axes {
         };
         element.setPointerCapture(event.pointerId);
         element.addEventListener("pointermove", move);
-        element.addEventListener("lostpointercapture", () => element.removeEventListener("pointermove", move), { once: true });
+        element.addEventListener("lostpointercapture", () => element.removeEventListener("pointermove", move), {
+          once: true,
+        });
       });
     });
   }
@@ -161,19 +204,40 @@ export class Axes {
     this.rows.clear();
     for (const axis of used) {
       const title = titleOf(axis);
-      const limit = (spoken) => h("input", { inputmode: "decimal", size: 7, placeholder: "auto", "aria-label": spoken, autocomplete: "off", onchange: () => {
-        this.setRange(axis, ...limits.map(({ value }) => limitOf(value.replace(",", "."))));
-        this.showRanges();
-        this.changed(false);
-      } });
+      const limit = (spoken) =>
+        h("input", {
+          inputmode: "decimal",
+          size: 7,
+          placeholder: "auto",
+          "aria-label": spoken,
+          autocomplete: "off",
+          onchange: () => {
+            this.setRange(axis, ...limits.map(({ value }) => limitOf(value.replace(",", "."))));
+            this.showRanges();
+            this.changed(false);
+          },
+        });
       const limits = [limit(t("{title}: from", { title })), limit(t("{title}: to", { title }))];
-      const label = h("input", { placeholder: "label, unit", "aria-label": t("{title}: label, unit", { title }), autocomplete: "off", maxlength: 60, onchange: () => {
-        if (label.value.trim()) this.labels.set(axis, label.value.trim());
-        else this.labels.delete(axis);
-        this.changed(true);
-      } });
+      const label = h("input", {
+        placeholder: "label, unit",
+        "aria-label": t("{title}: label, unit", { title }),
+        autocomplete: "off",
+        maxlength: 60,
+        onchange: () => {
+          if (label.value.trim()) this.labels.set(axis, label.value.trim());
+          else this.labels.delete(axis);
+          this.changed(true);
+        },
+      });
       label.value = this.labels.get(axis) ?? "";
-      const row = h("div", { class: "bar" }, h("span", { class: "axis" }, title), label, h("label", {}, t("from"), limits[0]), h("label", {}, t("to"), limits[1]));
+      const row = h(
+        "div",
+        { class: "bar" },
+        h("span", { class: "axis" }, title),
+        label,
+        h("label", {}, t("from"), limits[0]),
+        h("label", {}, t("to"), limits[1]),
+      );
       this.rows.set(axis, { row, limits });
     }
     this.element.replaceChildren(...[...this.rows.values()].map(({ row }) => row));
@@ -183,7 +247,9 @@ export class Axes {
   showRanges() {
     for (const [axis, { limits }] of this.rows) {
       const range = this.ranges.get(axis) ?? [null, null];
-      limits.forEach((input, index) => { input.value = range[index] === null ? "" : number(range[index]); });
+      limits.forEach((input, index) => {
+        input.value = range[index] === null ? "" : number(range[index]);
+      });
     }
     this.autoButton.classList.toggle("unused", !this.ranges.size);
   }

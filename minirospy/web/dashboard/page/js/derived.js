@@ -1,8 +1,16 @@
 // Series that are computed from others while they stream: derivatives, moving averages, one series over another. Pure.
 
-export const KINDS = [["", "as it is"], ["derivative", "derivative"], ["average1", "average of 1 s"], ["average10", "average of 10 s"]];
+export const KINDS = [
+  ["", "as it is"],
+  ["derivative", "derivative"],
+  ["average1", "average of 1 s"],
+  ["average10", "average of 10 s"],
+];
 
-/** Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is none yet; null for "". */
+/**
+ * Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is
+ * none yet; null for "".
+ */
 export function derivedOf(kind) {
   if (kind === "derivative") return new Derivative();
   const seconds = Number(/^average(\d+)$/.exec(kind)?.[1] ?? 0);
@@ -46,7 +54,8 @@ class Average {
         this.values.push(values[index]);
         this.sum += values[index];
       }
-      while (this.first < this.times.length && this.times[this.first] < times[index] - this.seconds) this.sum -= this.values[this.first++];
+      while (this.first < this.times.length && this.times[this.first] < times[index] - this.seconds)
+        this.sum -= this.values[this.first++];
       if (this.first > 1024 && this.first > this.times.length / 2) this.forget();
       const count = this.times.length - this.first;
       found[index] = count ? this.sum / count : NaN;
@@ -63,7 +72,10 @@ class Average {
   }
 }
 
-/** Return [xs, ys]: a series over another one, by their samples from one time to another; at most ``most`` points, the last one always. */
+/**
+ * Return [xs, ys]: a series over another one, by their samples from one time to another; at most ``most`` points, the
+ * last one always.
+ */
 export function pairs(over, samples, from, to, most) {
   const first = samples.indexOf(from);
   const last = samples.indexOf(to + 1e-9);

@@ -17,7 +17,8 @@ const ICONS = {
 const STEP = 0.05; // of a divider that is moved by keys
 
 /** Return how many panes are one below another. */
-const rowsOf = (node) => (node.kind === "pane" ? 1 : node.parts.map(rowsOf).reduce((a, b) => (node.kind === "row" ? Math.max(a, b) : a + b)));
+const rowsOf = (node) =>
+  node.kind === "pane" ? 1 : node.parts.map(rowsOf).reduce((a, b) => (node.kind === "row" ? Math.max(a, b) : a + b));
 
 export class Dock {
   /** views: name -> [title, class]; changed() is called when the layout or a view's settings have changed. */
@@ -77,7 +78,7 @@ export class Dock {
     fill(this.element, this.layout.root ? this.box(this.layout.root) : null, this.mark);
     for (const node of wanted) this.open(node);
     this.showActive();
-    if (this.element.contains(focused)) focused.focus({ preventScroll: true });
+    if (focused instanceof HTMLElement && this.element.contains(focused)) focused.focus({ preventScroll: true });
   }
 
   box(node) {
@@ -96,22 +97,56 @@ export class Dock {
   }
 
   makePane(node) {
-    const choice = h("select", { class: "pane-view", "aria-label": t("View of this pane"), onchange: () => this.replace(node, choice.value) });
+    const choice = h("select", {
+      class: "pane-view",
+      "aria-label": t("View of this pane"),
+      onchange: () => this.replace(node, choice.value),
+    });
     for (const [name, [title]] of Object.entries(this.views)) choice.append(h("option", { value: name }, t(title)));
     if (!Object.hasOwn(this.views, node.view)) choice.append(h("option", { value: node.view }, node.view));
     choice.value = node.view;
-    const button = (label, icon, react) => h("button", { type: "button", title: label, "aria-label": label, onclick: react },
-      svg("svg", { class: "icon", viewBox: "0 0 16 16", "aria-hidden": "true" }, svg("path", { d: ICONS[icon] })));
-    const handle = h("span", { class: "pane-grip", tabindex: 0, role: "button", "aria-label": t("Move this pane: arrow keys, or drag"), title: t("Drag to move"),
-      onkeydown: (event) => this.moveByKey(event, node) }, "⠿");
+    const button = (label, icon, react) =>
+      h(
+        "button",
+        { type: "button", title: label, "aria-label": label, onclick: react },
+        svg("svg", { class: "icon", viewBox: "0 0 16 16", "aria-hidden": "true" }, svg("path", { d: ICONS[icon] })),
+      );
+    const handle = h(
+      "span",
+      {
+        class: "pane-grip",
+        tabindex: 0,
+        role: "button",
+        "aria-label": t("Move this pane: arrow keys, or drag"),
+        title: t("Drag to move"),
+        onkeydown: (event) => this.moveByKey(event, node),
+      },
+      "⠿",
+    );
     const largest = button(t("Maximise"), "largest", () => this.maximise(node));
-    const head = h("div", { class: "pane-head", ondblclick: (event) => { if (event.target === head) this.maximise(node); } }, handle, choice,
+    const head = h(
+      "div",
+      {
+        class: "pane-head",
+        ondblclick: (event) => {
+          if (event.target === head) this.maximise(node);
+        },
+      },
+      handle,
+      choice,
       h("span", { class: "pane-about" }),
       button(t("Split: another view to the right"), "right", () => this.split(node, "right")),
       button(t("Split: another view below"), "bottom", () => this.split(node, "bottom")),
-      largest, button(t("Close this pane"), "close", () => this.remove(node)));
+      largest,
+      button(t("Close this pane"), "close", () => this.remove(node)),
+    );
     const body = h("div", { class: "pane-body view" });
-    const element = h("section", { class: "pane", onpointerdown: () => this.activate(node.id), onfocusin: () => this.activate(node.id) }, head, body);
+    const element = h(
+      "section",
+      { class: "pane", onpointerdown: () => this.activate(node.id), onfocusin: () => this.activate(node.id) },
+      head,
+      body,
+    );
     element.dataset.pane = node.id;
     this.dragBy(head, node);
     return { element, head, body, choice, largest, view: null };
@@ -152,7 +187,8 @@ export class Dock {
   }
 
   showActive() {
-    this.element.style.minHeight = this.layout.root && this.largest === null ? `${LEAST_REM * rowsOf(this.layout.root)}rem` : "";
+    this.element.style.minHeight =
+      this.layout.root && this.largest === null ? `${LEAST_REM * rowsOf(this.layout.root)}rem` : "";
     for (const [id, { element, largest }] of this.panes) {
       element.classList.toggle("active", id === this.active);
       element.classList.toggle("largest", id === this.largest);
@@ -219,7 +255,9 @@ export class Dock {
     this.move(node, "center", other);
   }
 
-  /** Follow a link of a view inside of the layout: a view that is shown takes it over, else it gets a pane of its own. */
+  /**
+   * Follow a link of a view inside of the layout: a view that is shown takes it over, else it gets a pane of its own.
+   */
   follow(event) {
     const anchor = event.target.closest?.('a[href^="#/"]');
     if (!anchor || event.ctrlKey || event.metaKey || event.shiftKey || event.button) return;
@@ -244,13 +282,22 @@ export class Dock {
 
   divider(split, index) {
     const isRow = split.kind === "row";
-    const element = h("div", { class: "divider", role: "separator", tabindex: 0, "aria-orientation": isRow ? "vertical" : "horizontal", "aria-label": t("Divider: arrow keys, or drag"),
-      "aria-valuemin": 5, "aria-valuemax": 95 });
+    const element = h("div", {
+      class: "divider",
+      role: "separator",
+      tabindex: 0,
+      "aria-orientation": isRow ? "vertical" : "horizontal",
+      "aria-label": t("Divider: arrow keys, or drag"),
+      "aria-valuemin": 5,
+      "aria-valuemax": 95,
+    });
     const share = () => split.parts[index].weight / (split.parts[index].weight + split.parts[index + 1].weight);
     const resize = (wanted) => {
       this.layout.resize(split, index, wanted);
       const total = split.parts.reduce((sum, part) => sum + part.weight, 0);
-      [element.previousSibling, element.nextSibling].forEach((each, offset) => { each.style.flexGrow = String((split.parts[index + offset].weight / total) * 100); });
+      [element.previousSibling, element.nextSibling].forEach((each, offset) => {
+        each.style.flexGrow = String((split.parts[index + offset].weight / total) * 100);
+      });
       element.setAttribute("aria-valuenow", String(Math.round(share() * 100)));
     };
     element.setAttribute("aria-valuenow", String(Math.round(share() * 100)));
@@ -262,12 +309,24 @@ export class Dock {
     element.addEventListener("pointermove", (event) => {
       if (!element.classList.contains("dragged")) return;
       const [one, other] = [element.previousSibling, element.nextSibling].map((each) => each.getBoundingClientRect());
-      resize(isRow ? (event.clientX - one.left) / (other.right - one.left) : (event.clientY - one.top) / (other.bottom - one.top));
+      resize(
+        isRow
+          ? (event.clientX - one.left) / (other.right - one.left)
+          : (event.clientY - one.top) / (other.bottom - one.top),
+      );
     });
     for (const name of ["pointerup", "pointercancel"]) {
-      element.addEventListener(name, () => { if (element.classList.contains("dragged")) { element.classList.remove("dragged"); this.changed(); } });
+      element.addEventListener(name, () => {
+        if (element.classList.contains("dragged")) {
+          element.classList.remove("dragged");
+          this.changed();
+        }
+      });
     }
-    element.addEventListener("dblclick", () => { resize(0.5); this.changed(); });
+    element.addEventListener("dblclick", () => {
+      resize(0.5);
+      this.changed();
+    });
     element.addEventListener("keydown", (event) => {
       const step = (isRow ? { ArrowLeft: -STEP, ArrowRight: STEP } : { ArrowUp: -STEP, ArrowDown: STEP })[event.key];
       if (!step) return;
@@ -290,7 +349,8 @@ export class Dock {
       head.setPointerCapture(event.pointerId);
     });
     head.addEventListener("pointermove", (event) => {
-      if (!start || (!target && Math.hypot(event.clientX - start.clientX, event.clientY - start.clientY) < DRAG_PIXELS)) return;
+      if (!start || (!target && Math.hypot(event.clientX - start.clientX, event.clientY - start.clientY) < DRAG_PIXELS))
+        return;
       target = this.placeAt(event.clientX, event.clientY, node);
       head.closest(".pane").classList.add("dragged");
       this.showMark(target);
@@ -304,7 +364,9 @@ export class Dock {
     };
     head.addEventListener("pointerup", () => end(true));
     head.addEventListener("pointercancel", () => end(false));
-    head.addEventListener("keydown", (event) => { if (event.key === "Escape") end(false); });
+    head.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") end(false);
+    });
   }
 
   /** Return where a pane would be docked: {side, node, box}; node is null for a side of the whole layout. */

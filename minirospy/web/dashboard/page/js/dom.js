@@ -1,5 +1,6 @@
 // Elements. Text of topics, nodes and log lines always goes in by textContent: it never becomes HTML.
-// What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of setText, by t().
+// What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of
+// setText, by t().
 
 import { isList } from "./ros1.js";
 import { t } from "./texts.js";
@@ -33,7 +34,11 @@ function filled(element, properties, children) {
 function append(element, children, isWorded = false) {
   for (const child of children.flat(Infinity)) {
     if (child === null || child === undefined || child === false) continue;
-    element.append(child instanceof Node ? child : document.createTextNode(isWorded && IS_PHRASE.test(child) ? t(String(child)) : String(child)));
+    element.append(
+      child instanceof Node
+        ? child
+        : document.createTextNode(isWorded && IS_PHRASE.test(child) ? t(String(child)) : String(child)),
+    );
   }
 }
 
@@ -62,7 +67,10 @@ export function redraw(element, draw) {
   const focused = element.contains(document.activeElement) ? document.activeElement : null;
   const name = focused && identityOf(focused);
   draw();
-  if (focused && !focused.isConnected) [...element.querySelectorAll(focused.tagName)].find((each) => identityOf(each) === name)?.focus({ preventScroll: true });
+  if (focused && !focused.isConnected)
+    [...element.querySelectorAll(focused.tagName)]
+      .find((each) => identityOf(each) === name)
+      ?.focus({ preventScroll: true });
 }
 
 // What was focused, and its successor in the new drawing.
@@ -86,28 +94,66 @@ function drawWaiting() {
 
 /** Notice what is pressed in a window, for redraw(). */
 export function watchPresses(window) {
-  window.addEventListener("pointerdown", ({ target, button, clientX: x, clientY: y }) => {
-    pressed = button === 0 ? target.closest(PRESSABLE) : null;
-    press = pressed && { element: pressed, x, y };
-  }, true);
+  window.addEventListener(
+    "pointerdown",
+    ({ target, button, clientX: x, clientY: y }) => {
+      pressed = button === 0 ? target.closest(PRESSABLE) : null;
+      press = pressed && { element: pressed, x, y };
+    },
+    true,
+  );
   // A list of choices or another window may take the release.
-  window.addEventListener("pointermove", ({ buttons }) => { if (pressed && !buttons) release(); }, true);
+  window.addEventListener(
+    "pointermove",
+    ({ buttons }) => {
+      if (pressed && !buttons) release();
+    },
+    true,
+  );
   for (const name of ["pointerup", "pointercancel"]) window.addEventListener(name, release, true);
   // Elements lose the focus, too: the one before loses it to what is pressed.
-  window.addEventListener("blur", ({ target }) => { if (target === window) release(); }, true);
+  window.addEventListener(
+    "blur",
+    ({ target }) => {
+      if (target === window) release();
+    },
+    true,
+  );
   window.addEventListener("click", resend, true);
 }
 
-/** Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has got it. */
+/**
+ * Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has
+ * got it.
+ */
 function resend(event) {
   const { element, x, y } = press ?? {};
   press = null;
-  if (!element?.isConnected || !event.isTrusted || event.composedPath().includes(element) || !event.target.contains(element)) return;
+  if (
+    !element?.isConnected ||
+    !event.isTrusted ||
+    event.composedPath().includes(element) ||
+    !event.target.contains(element)
+  )
+    return;
   if (Math.hypot(event.clientX - x, event.clientY - y) > SLOP) return;
   event.preventDefault();
   event.stopPropagation();
   const { clientX, clientY, detail, ctrlKey, shiftKey, altKey, metaKey } = event;
-  element.dispatchEvent(new MouseEvent("click", { bubbles: true, cancelable: true, view: window, clientX, clientY, detail, ctrlKey, shiftKey, altKey, metaKey }));
+  element.dispatchEvent(
+    new MouseEvent("click", {
+      bubbles: true,
+      cancelable: true,
+      view: window,
+      clientX,
+      clientY,
+      detail,
+      ctrlKey,
+      shiftKey,
+      altKey,
+      metaKey,
+    }),
+  );
 }
 
 let uniqueIds = 0;
@@ -124,7 +170,10 @@ export function setText(element, text) {
 
 /** Return a value as JSON that YAML reads, too; no letter of its texts turns the direction of what is around it. */
 export function quoted(value) {
-  return JSON.stringify(value).replace(/[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]/g, (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`);
+  return JSON.stringify(value).replace(
+    /[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]/g,
+    (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`,
+  );
 }
 
 /** Return a value as one line of text for people; long arrays are cut. */
@@ -136,7 +185,9 @@ export function shown(value, most = 120) {
     const some = Array.from({ length: Math.min(value.length, 12) }, (_, index) => shown(value[index], 20));
     text = `[${some.join(", ")}${value.length > some.length ? ", …" : ""}] (${value.length})`;
   } else if (value !== null && typeof value === "object") {
-    text = `{${Object.entries(value).map(([name, each]) => `${name}: ${shown(each, 30)}`).join(", ")}}`;
+    text = `{${Object.entries(value)
+      .map(([name, each]) => `${name}: ${shown(each, 30)}`)
+      .join(", ")}}`;
   } else text = String(value);
   return text.length > most ? `${text.slice(0, most - 1)}…` : text;
 }

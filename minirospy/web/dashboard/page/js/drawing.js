@@ -1,11 +1,15 @@
-// What the drawings of graphs, frames and state machines have in common: lines, loops, and names that are too long for a box. Pure.
+// What the drawings of graphs, frames and state machines have in common: lines, loops, and names that are too long for
+// a box. Pure.
 
 const LONGEST = 60; // characters of a name in a drawing
 const SPREAD = 9; // pixels from the middle of a side to the ends of a loop
 
 /** Return a name that fits a box; what is left out is in the middle, as names differ at their ends. */
 export function brief(name, most = LONGEST) {
-  const letters = [...name.slice(0, 4 * most), ...(name.length > 8 * most ? name.slice(-4 * most) : name.slice(4 * most))];
+  const letters = [
+    ...name.slice(0, 4 * most),
+    ...(name.length > 8 * most ? name.slice(-4 * most) : name.slice(4 * most)),
+  ];
   if (letters.length <= most) return name;
   const end = Math.floor((most - 1) / 2);
   return `${letters.slice(0, most - 1 - end).join("")}…${letters.slice(-end).join("")}`;
@@ -22,6 +26,11 @@ export function loopOf({ x, y, width, height }, label) {
   const side = isRight ? x + width / 2 : y + height / 2;
   // A cubic curve reaches three quarters of the way to its control points.
   const far = side + ((isRight ? label.x : label.y) - side) * (4 / 3);
-  const [at, middle] = [isRight ? (along, across) => `${along.toFixed(1)} ${across.toFixed(1)}` : (along, across) => `${across.toFixed(1)} ${along.toFixed(1)}`, isRight ? y : x];
+  const [at, middle] = [
+    isRight
+      ? (along, across) => `${along.toFixed(1)} ${across.toFixed(1)}`
+      : (along, across) => `${across.toFixed(1)} ${along.toFixed(1)}`,
+    isRight ? y : x,
+  ];
   return `M${at(side, middle - SPREAD)}C${at(far, middle - 2 * SPREAD)} ${at(far, middle + 2 * SPREAD)} ${at(side, middle + SPREAD)}`;
 }

@@ -1,4 +1,5 @@
-// Driving through the server's own endpoint: it publishes what is held, and zero where this page lets go, is lost, or is silent for half a second.
+// Driving through the server's own endpoint: it publishes what is held, and zero where this page lets go, is lost, or
+// is silent for half a second.
 
 const AGAIN_MS = 500;
 const MAX_WAITING = 2000; // bytes that the network has not taken; more would arrive late

@@ -1,4 +1,5 @@
-// A WebSocket to a part of the server with a protocol of its own (bags, launch files, joints): connects again by itself, as the link does.
+// A WebSocket to a part of the server with a protocol of its own (bags, launch files, joints): connects again by
+// itself, as the link does.
 
 import { t } from "./texts.js";
 
@@ -6,7 +7,10 @@ const FIRST_DELAY_MS = 300;
 const LONGEST_DELAY_MS = 4000;
 
 export class Endpoint {
-  /** `handlers`: by the name of the only field of a text message, or of the first; `binary` for binary ones; `opened`, `closed`. */
+  /**
+   * `handlers`: by the name of the only field of a text message, or of the first; `binary` for binary ones; `opened`,
+   * `closed`.
+   */
   constructor(link, protocol, handlers) {
     this.link = link;
     this.protocol = protocol;

@@ -12,7 +12,8 @@ const MAX_PARENTS = 20; // of a frame, the latest
 
 export class Frames {
   constructor() {
-    this.frames = new Map(); // child -> {child, parent, isStatic, transform, stamp, at, rate, parents: Map of parent -> time}
+    // child -> {child, parent, isStatic, transform, stamp, at, rate, parents: Map of parent -> time}
+    this.frames = new Map();
   }
 
   /** Take over a message of /tf or /tf_static that came at ``at`` (seconds of the page's clock, which never jumps). */
@@ -58,14 +59,22 @@ export class Frames {
   problem(name, now) {
     const frame = this.frames.get(name);
     if (!frame) return "";
-    const parents = [...frame.parents].filter(([, at]) => frame.isStatic || now - at < CONFLICT_SECONDS).map(([parent]) => parent);
-    if (parents.length > 1) return t("It has {count} parents, {names}: let one node alone publish it.", { count: parents.length, names: parents.sort().join(t(" and ")) });
+    const parents = [...frame.parents]
+      .filter(([, at]) => frame.isStatic || now - at < CONFLICT_SECONDS)
+      .map(([parent]) => parent);
+    if (parents.length > 1)
+      return t("It has {count} parents, {names}: let one node alone publish it.", {
+        count: parents.length,
+        names: parents.sort().join(t(" and ")),
+      });
     if (this.isCycle(name)) return t("It is its own ancestor: no transform through it can be computed.");
     if (frame.isStatic) return "";
     const { age } = this.measured(name, now);
     // By the rate that it had: three seconds after its last message that is no longer measured.
     const limit = Math.max(LEAST_AGE, frame.usualHz ? OLD_PERIODS / frame.usualHz : 0);
-    return age > limit ? t("No transform for {age} s: its publisher has stopped, or is slow.", { age: age.toFixed(age < 10 ? 1 : 0) }) : "";
+    return age > limit
+      ? t("No transform for {age} s: its publisher has stopped, or is slow.", { age: age.toFixed(age < 10 ? 1 : 0) })
+      : "";
   }
 
   /** Remember the rates, by which frames are found to be old. */

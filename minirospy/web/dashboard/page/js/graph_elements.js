@@ -1,19 +1,25 @@
-// What the graph shows: nodes, topics, actions folded into one, groups by namespace, and the traffic of what is drawn. Pure.
+// What the graph shows: nodes, topics, actions folded into one, groups by namespace, and the traffic of what is drawn.
+// Pure.
 
 const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
-const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
+const DEBUG_NODES =
+  /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
 const TO_SERVER = ["goal", "cancel"];
 const FROM_SERVER = ["status", "feedback", "result"];
 
 /** Return the names of the actions among topics. */
 export function actionsIn(topics) {
   const known = new Set(topics);
-  return [...known].filter((topic) => topic.endsWith("/goal")).map((topic) => topic.slice(0, -"/goal".length))
-    .filter((name) => ["cancel", ...FROM_SERVER].every((part) => known.has(`${name}/${part}`))).sort();
+  return [...known]
+    .filter((topic) => topic.endsWith("/goal"))
+    .map((topic) => topic.slice(0, -"/goal".length))
+    .filter((name) => ["cancel", ...FROM_SERVER].every((part) => known.has(`${name}/${part}`)))
+    .sort();
 }
 
 /**
- * Return what is shown, {nodes, topics, actions: Sets of names, edges: [{from, to, label, pairs}]}; keys are n/NAME, t/NAME, a/NAME.
+ * Return what is shown, {nodes, topics, actions: Sets of names, edges: [{from, to, label, pairs}]}; keys are n/NAME,
+ * t/NAME, a/NAME.
  * ``pairs`` are the connections of an edge: [topic, sender or null, receiver or null].
  */
 export function elementsOf({ published, subscribed, services }, { mode, hidesDebug, filter, ownNode, folds }) {
@@ -21,7 +27,8 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
   const nodes = new Set();
   const topics = new Set();
   const edges = [];
-  for (const names of [...published.values(), ...subscribed.values(), ...services.values()]) for (const name of names) if (isNode(name)) nodes.add(name);
+  for (const names of [...published.values(), ...subscribed.values(), ...services.values()])
+    for (const name of names) if (isNode(name)) nodes.add(name);
   const all = new Set([...published.keys(), ...subscribed.keys()]);
   const actions = folds ? actionsIn(all) : [];
   const folded = new Set(actions.flatMap((name) => [...TO_SERVER, ...FROM_SERVER].map((part) => `${name}/${part}`)));
@@ -32,7 +39,8 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
     if (folded.has(topic) || (hidesDebug && DEBUG_TOPICS.has(topic))) continue;
     const [from, to] = ends(topic);
     if (mode === "nodes") {
-      for (const a of from) for (const b of to) edges.push({ from: `n${a}`, to: `n${b}`, label: topic, pairs: [[topic, a, b]] });
+      for (const a of from)
+        for (const b of to) edges.push({ from: `n${a}`, to: `n${b}`, label: topic, pairs: [[topic, a, b]] });
     } else if ((from.length && to.length) || (mode === "all" && from.length + to.length)) {
       topics.add(topic);
       for (const a of from) edges.push({ from: `n${a}`, to: `t${topic}`, label: "", pairs: [[topic, a, null]] });
@@ -53,19 +61,48 @@ export function elementsOf({ published, subscribed, services }, { mode, hidesDeb
 function actionEdges(name, ends, mode) {
   const servers = new Set(ends(`${name}/status`)[0]);
   const clients = new Set(TO_SERVER.flatMap((part) => ends(`${name}/${part}`)[0]));
-  const watchers = new Set(FROM_SERVER.flatMap((part) => ends(`${name}/${part}`)[1]).filter((node) => !clients.has(node) && !servers.has(node)));
+  const watchers = new Set(
+    FROM_SERVER.flatMap((part) => ends(`${name}/${part}`)[1]).filter(
+      (node) => !clients.has(node) && !servers.has(node),
+    ),
+  );
   const of = (parts, sender, receiver) => parts.map((part) => [`${name}/${part}`, sender, receiver]);
   const found = [];
   if (mode === "nodes") {
     for (const server of servers) {
-      for (const client of clients) found.push({ from: `n${client}`, to: `n${server}`, label: `${name} (action)`, pairs: [...of(TO_SERVER, client, server), ...of(FROM_SERVER, server, client)] });
-      for (const watcher of watchers) found.push({ from: `n${server}`, to: `n${watcher}`, label: `${name} (action)`, pairs: of(FROM_SERVER, server, watcher) });
+      for (const client of clients)
+        found.push({
+          from: `n${client}`,
+          to: `n${server}`,
+          label: `${name} (action)`,
+          pairs: [...of(TO_SERVER, client, server), ...of(FROM_SERVER, server, client)],
+        });
+      for (const watcher of watchers)
+        found.push({
+          from: `n${server}`,
+          to: `n${watcher}`,
+          label: `${name} (action)`,
+          pairs: of(FROM_SERVER, server, watcher),
+        });
     }
     return found;
   }
-  for (const client of clients) found.push({ from: `n${client}`, to: `a${name}`, label: "", pairs: [...of(TO_SERVER, client, null), ...of(FROM_SERVER, null, client)] });
-  for (const server of servers) found.push({ from: `a${name}`, to: `n${server}`, label: "", pairs: [...of(TO_SERVER, null, server), ...of(FROM_SERVER, server, null)] });
-  for (const watcher of watchers) found.push({ from: `a${name}`, to: `n${watcher}`, label: "", pairs: of(FROM_SERVER, null, watcher) });
+  for (const client of clients)
+    found.push({
+      from: `n${client}`,
+      to: `a${name}`,
+      label: "",
+      pairs: [...of(TO_SERVER, client, null), ...of(FROM_SERVER, null, client)],
+    });
+  for (const server of servers)
+    found.push({
+      from: `a${name}`,
+      to: `n${server}`,
+      label: "",
+      pairs: [...of(TO_SERVER, null, server), ...of(FROM_SERVER, server, null)],
+    });
+  for (const watcher of watchers)
+    found.push({ from: `a${name}`, to: `n${watcher}`, label: "", pairs: of(FROM_SERVER, null, watcher) });
   return found;
 }
 
@@ -74,8 +111,10 @@ function filtered({ nodes, topics, actions, edges }, words) {
   if (words) {
     const fits = (key) => key.slice(1).toLowerCase().includes(words);
     const kept = new Set();
-    for (const { from, to, label } of edges) if (fits(from) || fits(to) || label.toLowerCase().includes(words)) kept.add(from).add(to);
-    for (const [kind, table] of Object.entries(tables)) for (const name of table) if (!kept.has(kind + name) && !(kind === "n" && fits(kind + name))) table.delete(name);
+    for (const { from, to, label } of edges)
+      if (fits(from) || fits(to) || label.toLowerCase().includes(words)) kept.add(from).add(to);
+    for (const [kind, table] of Object.entries(tables))
+      for (const name of table) if (!kept.has(kind + name) && !(kind === "n" && fits(kind + name))) table.delete(name);
   }
   const isThere = (key) => tables[key[0]].has(key.slice(1));
   return { nodes, topics, actions, edges: edges.filter(({ from, to }) => isThere(from) && isThere(to)) };
@@ -92,7 +131,10 @@ export function groupsOf(keys) {
   return new Map([...found].filter(([, members]) => members.length > 1));
 }
 
-/** Return Map of key -> the keys that it is connected with, one list for all of them; each of ``links`` is keys that belong together. */
+/**
+ * Return Map of key -> the keys that it is connected with, one list for all of them; each of ``links`` is keys that
+ * belong together.
+ */
 export function connectedOf(keys, links) {
   const found = new Map(keys.map((key) => [key, [key]]));
   for (const [first, ...others] of links) {
@@ -108,7 +150,10 @@ export function connectedOf(keys, links) {
   return found;
 }
 
-/** Put boxes in rows, the highest first, so that all are as large as they can be in a view of this aspect: {width, height, places: [{x, y}]}. */
+/**
+ * Put boxes in rows, the highest first, so that all are as large as they can be in a view of this aspect: {width,
+ * height, places: [{x, y}]}.
+ */
 export function packed(boxes, aspect) {
   const order = [...boxes.keys()].sort((one, other) => boxes[other].height - boxes[one].height);
   const widest = Math.max(0, ...boxes.map(({ width }) => width));
@@ -140,7 +185,8 @@ function inRows(boxes, order, most) {
 }
 
 /**
- * Return the traffic of an edge by a report's rows [sender, topic, receiver, hz, bytes], {hz, bytes}; null where nothing is known.
+ * Return the traffic of an edge by a report's rows [sender, topic, receiver, hz, bytes], {hz, bytes}; null where
+ * nothing is known.
  * A message to three receivers is one message: of those of one sender the fastest counts.
  */
 export function trafficOf({ pairs }, rows) {

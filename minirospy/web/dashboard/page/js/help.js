@@ -17,19 +17,32 @@ const KEYS = [
   ["Escape", "Close what is open"],
 ];
 
-const isTyping = (element) => /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "") && !/^(checkbox|radio|range|color)$/.test(element.type);
+const isTyping = (element) =>
+  /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "") && !/^(checkbox|radio|range|color)$/.test(element.type);
 
 /** Open the list of keys. */
 export function openHelp() {
+  /** @type {HTMLDialogElement | null} */
   const known = document.querySelector("dialog.help");
   if (known) {
     known.close();
     return;
   }
   const dialog = h("dialog", { class: "help panel", "aria-labelledby": "help-title", onclose: () => dialog.remove() });
-  fill(dialog, h("h2", { id: "help-title" }, "Keys"),
-    h("table", {}, h("tbody", {}, KEYS.map(([keys, what]) => h("tr", {}, h("th", { scope: "row" }, h("kbd", {}, keys)), h("td", {}, t(what)))))),
-    h("button", { type: "button", class: "primary", onclick: () => dialog.close() }, "Close"));
+  fill(
+    dialog,
+    h("h2", { id: "help-title" }, "Keys"),
+    h(
+      "table",
+      {},
+      h(
+        "tbody",
+        {},
+        KEYS.map(([keys, what]) => h("tr", {}, h("th", { scope: "row" }, h("kbd", {}, keys)), h("td", {}, t(what)))),
+      ),
+    ),
+    h("button", { type: "button", class: "primary", onclick: () => dialog.close() }, "Close"),
+  );
   document.body.append(dialog);
   dialog.showModal();
 }
@@ -42,11 +55,20 @@ export function listenForKeys(step) {
     ".": () => step(1),
     "/": () => {
       const within = document.querySelector(".pane.active") ?? document.getElementById("view");
-      within.querySelector("input[type=search], input:not([type]), input[type=text]")?.focus();
+      /** @type {HTMLElement | null} */
+      const search = within.querySelector("input[type=search], input:not([type]), input[type=text]");
+      search?.focus();
     },
   };
   addEventListener("keydown", (event) => {
-    if (!Object.hasOwn(react, event.key) || event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement)) return;
+    if (
+      !Object.hasOwn(react, event.key) ||
+      event.ctrlKey ||
+      event.altKey ||
+      event.metaKey ||
+      isTyping(document.activeElement)
+    )
+      return;
     event.preventDefault();
     react[event.key]();
   });

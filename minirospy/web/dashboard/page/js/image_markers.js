@@ -1,9 +1,10 @@
-// Markers over an image: circles, lines, polygons and points of visualization_msgs/ImageMarker, until they are removed or their lifetime ends.
+// Markers over an image: circles, lines, polygons and points of visualization_msgs/ImageMarker, until they are removed
+// or their lifetime ends.
 // A position is in pixels of the image, (0, 0) the center of the first one; a width or diameter, too.
 
 import { t } from "./texts.js";
 
-const [CIRCLE, LINE_STRIP, LINE_LIST, POLYGON, POINTS] = [0, 1, 2, 3, 4];
+const [CIRCLE, LINE_STRIP, , POLYGON, POINTS] = [0, 1, 2, 3, 4]; // 2 is LINE_LIST
 const [ADD, REMOVE] = [0, 1];
 const MOST = 5000;
 
@@ -20,8 +21,10 @@ export class ImageMarkers {
       return;
     }
     if (marker.action !== ADD) throw new Error(t("the action {action} is not known", { action: marker.action }));
-    if (marker.type > POINTS || marker.type < CIRCLE) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
-    if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} markers", { count: MOST }));
+    if (marker.type > POINTS || marker.type < CIRCLE)
+      throw new Error(t("the marker type {type} is not known", { type: marker.type }));
+    if (!this.markers.has(key) && this.markers.size >= MOST)
+      throw new Error(t("more than {count} markers", { count: MOST }));
     const lifetime = marker.lifetime.secs * 1000 + marker.lifetime.nsecs / 1e6;
     this.markers.set(key, { marker, until: lifetime > 0 ? now + lifetime : Infinity });
   }
@@ -76,7 +79,10 @@ function drawMarker(context, marker) {
   }
 }
 
-/** Return a color of std_msgs/ColorRGBA; without opacity it is opaque: image_view2, for which programs leave it out, ignores it. */
+/**
+ * Return a color of std_msgs/ColorRGBA; without opacity it is opaque: image_view2, for which programs leave it out,
+ * ignores it.
+ */
 function css({ r, g, b, a }) {
   const [red, green, blue] = [r, g, b].map((value) => Math.round(value * 255));
   return `rgba(${red}, ${green}, ${blue}, ${a || 1})`;

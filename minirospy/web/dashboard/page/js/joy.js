@@ -1,5 +1,7 @@
-// A gamepad of the browser as sensor_msgs/Joy has it: left and up are positive, in joy_node's order for Xbox pads. Pure.
-// Sources: https://www.w3.org/TR/gamepad (the standard mapping), http://wiki.ros.org/joy (the tables of axes and buttons).
+// A gamepad of the browser as sensor_msgs/Joy has it: left and up are positive, in joy_node's order for Xbox pads.
+// Pure.
+// Sources: https://www.w3.org/TR/gamepad (the standard mapping), http://wiki.ros.org/joy (the tables of axes and
+// buttons).
 
 const DEAD_ZONE = 0.05; // of an axis, as joy_node's
 
@@ -13,7 +15,16 @@ export function joyOf({ mapping, axes, buttons }) {
   const trigger = (button) => 1 - 2 * (button?.value ?? 0);
   const pair = (plus, minus) => pressed(buttons[plus]) - pressed(buttons[minus]);
   return {
-    axes: [axis(axes[0]), axis(axes[1]), trigger(buttons[6]), axis(axes[2]), axis(axes[3]), trigger(buttons[7]), pair(14, 15), pair(12, 13)],
+    axes: [
+      axis(axes[0]),
+      axis(axes[1]),
+      trigger(buttons[6]),
+      axis(axes[2]),
+      axis(axes[3]),
+      trigger(buttons[7]),
+      pair(14, 15),
+      pair(12, 13),
+    ],
     buttons: [0, 1, 2, 3, 4, 5, 8, 9, 16, 10, 11].map((index) => pressed(buttons[index])),
   };
 }

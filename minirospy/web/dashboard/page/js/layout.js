@@ -5,7 +5,10 @@ export const MAX_PANES = 24;
 const MAX_TEXT = 20_000;
 const SIDES = { left: ["row", 0], right: ["row", 1], top: ["column", 0], bottom: ["column", 1] };
 
-/** A tree of {kind: "pane", id, view, words, weight} and {kind: "row" or "column", parts, weight}; words is the text of a query. */
+/**
+ * A tree of {kind: "pane", id, view, words, weight} and {kind: "row" or "column", parts, weight}; words is the text of
+ * a query.
+ */
 export class Layout {
   constructor() {
     this.root = null;
@@ -19,7 +22,8 @@ export class Layout {
     if (text.length > MAX_TEXT) throw new Error("the layout is too long");
     const reader = { text, at: 0 };
     layout.root = layout.read(reader);
-    if (reader.at < text.length) throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected in a layout`);
+    if (reader.at < text.length)
+      throw new Error(`"${text.slice(reader.at, reader.at + 20)}" is not expected in a layout`);
     layout.tidy();
     return layout;
   }
@@ -30,7 +34,8 @@ export class Layout {
     reader.at += match[0].length;
     const weight = Math.min(1000, Math.max(0.01, Number(match[1] ?? 1)));
     if (reader.text[reader.at] === "(") {
-      if (match[2] !== "row" && match[2] !== "column") throw new Error(`"${match[2]}(" in a layout is neither row( nor column(`);
+      if (match[2] !== "row" && match[2] !== "column")
+        throw new Error(`"${match[2]}(" in a layout is neither row( nor column(`);
       const parts = [];
       do {
         reader.at += 1; // "(" or ","
@@ -57,7 +62,10 @@ export class Layout {
   /** Return all panes, in reading order. */
   panes() {
     const found = [];
-    const visit = (node) => { if (node.kind === "pane") found.push(node); else node.parts.forEach(visit); };
+    const visit = (node) => {
+      if (node.kind === "pane") found.push(node);
+      else node.parts.forEach(visit);
+    };
     if (this.root) visit(this.root);
     return found;
   }
@@ -76,7 +84,10 @@ export class Layout {
     return null;
   }
 
-  /** Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are too many. */
+  /**
+   * Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are
+   * too many.
+   */
   add(view, words, side = "right", target = null) {
     if (this.panes().length >= MAX_PANES) return null;
     const pane = this.pane(view, words);
@@ -160,7 +171,9 @@ function text(node, share) {
   if (node.kind === "pane") return `${share}${node.view}${node.words ? `?${node.words}` : ""}`;
   const total = node.parts.reduce((sum, each) => sum + each.weight, 0);
   const isEven = node.parts.every((each) => Math.abs(each.weight / total - 1 / node.parts.length) < 0.001);
-  const parts = node.parts.map((each) => text(each, isEven ? "" : `${Math.max(1, Math.round((each.weight / total) * 100))}:`));
+  const parts = node.parts.map((each) =>
+    text(each, isEven ? "" : `${Math.max(1, Math.round((each.weight / total) * 100))}:`),
+  );
   return `${share}${node.kind}(${parts.join(",")})`;
 }
 

@@ -120,10 +120,15 @@ export class Link extends EventTarget {
     const listener = () => react();
     for (const name of names) this.addEventListener(name, listener);
     react();
-    return () => { for (const name of names) this.removeEventListener(name, listener); };
+    return () => {
+      for (const name of names) this.removeEventListener(name, listener);
+    };
   }
 
-  /** Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends it. */
+  /**
+   * Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends
+   * it.
+   */
   subscribe(entry, received) {
     const key = this.nextKey++;
     this.entries.set(key, received);

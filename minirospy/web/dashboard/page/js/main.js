@@ -66,10 +66,15 @@ const link = new Link(token);
 const tabs = document.getElementById("tabs");
 const main = document.getElementById("view");
 const notices = document.getElementById("notices");
+const viewOf = (/** @type {any} */ tab) => tab.dataset.view;
+const keyOf = (/** @type {any} */ notice) => notice.dataset.key;
 let current = null;
 let shown = null; // the place of the current view
 
-/** Return the token of the address, or of its code, which is kept for this tab, and removed from the address and the history. */
+/**
+ * Return the token of the address, or of its code, which is kept for this tab, and removed from the address and the
+ * history.
+ */
 async function takeToken() {
   const { view, words } = addressOf(location.hash);
   const code = words.get("code");
@@ -86,15 +91,22 @@ async function takeToken() {
   return sessionStorage.getItem("token") ?? "";
 }
 
-/** Return what a view may use of the page: where its settings are kept, other views, whether keys are for it. In a layout a pane gives its own. */
+/**
+ * Return what a view may use of the page: where its settings are kept, other views, whether keys are for it. In a
+ * layout a pane gives its own.
+ */
 function placeOf(name) {
   const place = {
     views: VIEWS,
     isActive: () => true,
     /** Keep the view's settings in the address; as an object, or URLSearchParams. */
-    remember: (words) => { if (place === shown) history.replaceState(null, "", fragmentOf(name, words)); },
+    remember: (words) => {
+      if (place === shown) history.replaceState(null, "", fragmentOf(name, words));
+    },
     /** Show a view with these settings. */
-    open: (view, words) => { location.hash = fragmentOf(view, words); },
+    open: (view, words) => {
+      location.hash = fragmentOf(view, words);
+    },
   };
   return place;
 }
@@ -118,7 +130,7 @@ function route() {
   document.title = `${t(title)} · minirospy`;
   setText(document.getElementById("title"), t(title));
   for (const tab of tabs.children) {
-    if (tab.dataset.view === chosen) {
+    if (viewOf(tab) === chosen) {
       tab.setAttribute("aria-current", "page");
       tab.scrollIntoView({ block: "nearest", inline: "center" });
     } else tab.removeAttribute("aria-current");
@@ -133,10 +145,13 @@ function showState() {
 
 function showNotice({ message, level = 1, id = null }) {
   const key = id ?? message;
-  const known = [...notices.children].find((each) => each.dataset.key === key);
-  const notice = h("div", { class: `notice level${level}` },
+  const known = [...notices.children].find((each) => keyOf(each) === key);
+  const notice = h(
+    "div",
+    { class: `notice level${level}` },
     h("span", {}, message),
-    h("button", { type: "button", title: "Dismiss", onclick: () => notice.remove() }, "×"));
+    h("button", { type: "button", title: "Dismiss", onclick: () => notice.remove() }, "×"),
+  );
   notice.dataset.key = key;
   if (known) known.replaceWith(notice);
   else notices.append(notice);
@@ -162,18 +177,24 @@ function showLanguage() {
   button.lang = others[0];
   button.title = LANGUAGES[others[0]];
   button.setAttribute("aria-label", LANGUAGES[others[0]]);
-  for (const [id, title] of [["theme", "Dark or light"], ["help", "Keys"]]) {
+  for (const [id, title] of [
+    ["theme", "Dark or light"],
+    ["help", "Keys"],
+  ]) {
     const element = document.getElementById(id);
     element.title = t(title);
     element.setAttribute("aria-label", t(title));
   }
   setText(document.getElementById("skip"), t("To the view"));
   tabs.setAttribute("aria-label", t("Views"));
-  for (const tab of tabs.children) setText(tab, t(VIEWS[tab.dataset.view][0]));
+  for (const tab of tabs.children) setText(tab, t(VIEWS[viewOf(tab)][0]));
 }
 
 function switchLanguage() {
-  localStorage.setItem("language", Object.keys(LANGUAGES).find((each) => each !== language));
+  localStorage.setItem(
+    "language",
+    Object.keys(LANGUAGES).find((each) => each !== language),
+  );
   showLanguage();
   showState();
   route();
@@ -199,9 +220,9 @@ for (const [name, [title]] of Object.entries(VIEWS)) {
 }
 showLanguage();
 link.watch(["state"], showState);
-link.addEventListener("notice", ({ detail }) => showNotice(detail));
-link.addEventListener("withdrawn", ({ detail }) => {
-  for (const notice of [...notices.children]) if (detail.includes(notice.dataset.key)) notice.remove();
+link.addEventListener("notice", (/** @type {any} */ { detail }) => showNotice(detail));
+link.addEventListener("withdrawn", (/** @type {any} */ { detail }) => {
+  for (const notice of [...notices.children]) if (detail.includes(keyOf(notice))) notice.remove();
 });
 addEventListener("hashchange", route);
 route();

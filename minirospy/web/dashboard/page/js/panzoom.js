@@ -14,7 +14,9 @@ export class PanZoom {
     this.pressedAt = null;
     this.isDragged = false;
     this.listen();
-    this.observer = new ResizeObserver(() => { if (this.isFitted) this.fit(); });
+    this.observer = new ResizeObserver(() => {
+      if (this.isFitted) this.fit();
+    });
     this.observer.observe(picture);
   }
 
@@ -33,7 +35,11 @@ export class PanZoom {
     const { clientWidth, clientHeight } = this.picture;
     if (!this.size || !clientWidth) return;
     const scale = Math.min(1.4, clientWidth / this.size.width, clientHeight / this.size.height);
-    this.view = { scale, x: (clientWidth - this.size.width * scale) / 2, y: (clientHeight - this.size.height * scale) / 2 };
+    this.view = {
+      scale,
+      x: (clientWidth - this.size.width * scale) / 2,
+      y: (clientHeight - this.size.height * scale) / 2,
+    };
     this.move();
   }
 
@@ -51,23 +57,32 @@ export class PanZoom {
   }
 
   listen() {
-    this.picture.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      const box = this.picture.getBoundingClientRect();
-      this.zoom(Math.exp(-event.deltaY * 0.0015), event.clientX - box.left, event.clientY - box.top);
-    }, { passive: false });
+    this.picture.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        const box = this.picture.getBoundingClientRect();
+        this.zoom(Math.exp(-event.deltaY * 0.0015), event.clientX - box.left, event.clientY - box.top);
+      },
+      { passive: false },
+    );
     this.picture.addEventListener("pointerdown", (event) => {
       this.pointers.set(event.pointerId, event);
       this.pressedAt = event;
       this.isDragged = this.pointers.size > 1;
     });
     // What the drawing was dragged by is not clicked.
-    this.picture.addEventListener("click", (event) => {
-      if (this.isDragged && event.isTrusted && event.detail) event.stopPropagation();
-      this.isDragged = false;
-    }, true);
+    this.picture.addEventListener(
+      "click",
+      (event) => {
+        if (this.isDragged && event.isTrusted && event.detail) event.stopPropagation();
+        this.isDragged = false;
+      },
+      true,
+    );
     this.picture.addEventListener("pointermove", (event) => this.moved(event));
-    for (const name of ["pointerup", "pointercancel", "pointerleave"]) this.picture.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
+    for (const name of ["pointerup", "pointercancel", "pointerleave"])
+      this.picture.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
   }
 
   moved(event) {
@@ -77,10 +92,15 @@ export class PanZoom {
       const other = [...this.pointers.values()].find((each) => each.pointerId !== event.pointerId);
       const distance = (each) => Math.hypot(each.clientX - other.clientX, each.clientY - other.clientY);
       const box = this.picture.getBoundingClientRect();
-      this.zoom(distance(event) / Math.max(1, distance(before)), (event.clientX + other.clientX) / 2 - box.left, (event.clientY + other.clientY) / 2 - box.top);
+      this.zoom(
+        distance(event) / Math.max(1, distance(before)),
+        (event.clientX + other.clientX) / 2 - box.left,
+        (event.clientY + other.clientY) / 2 - box.top,
+      );
     } else if (this.pointers.size === 1) {
       // The hand moves a little in a click, too.
-      this.isDragged ||= Math.hypot(event.clientX - this.pressedAt.clientX, event.clientY - this.pressedAt.clientY) > SLOP;
+      this.isDragged ||=
+        Math.hypot(event.clientX - this.pressedAt.clientX, event.clientY - this.pressedAt.clientY) > SLOP;
       if (!this.isDragged) return;
       this.view.x += event.clientX - before.clientX;
       this.view.y += event.clientY - before.clientY;

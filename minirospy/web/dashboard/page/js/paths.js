@@ -1,4 +1,5 @@
-// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the elements with
+// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]", and of the
+// elements with
 // a value: "/markers/markers[:]{ns=='goal'}{id>=2}/pose/position/x". Pure.
 
 import { TextError, isList, isNumeric } from "./ros1.js";
@@ -9,8 +10,13 @@ const MAX_TESTED = 10_000; // elements
 const TIME_PARTS = ["secs", "nsecs"].map((name) => ({ name, type: "int32", isArray: false }));
 
 const TESTS = {
-  "==": (one, other) => one === other, "!=": (one, other) => one !== other, "<": (one, other) => one < other,
-  "<=": (one, other) => one <= other, ">": (one, other) => one > other, ">=": (one, other) => one >= other };
+  "==": (one, other) => one === other,
+  "!=": (one, other) => one !== other,
+  "<": (one, other) => one < other,
+  "<=": (one, other) => one <= other,
+  ">": (one, other) => one > other,
+  ">=": (one, other) => one >= other,
+};
 
 /** Return the topic of a path among those that are known, the longest that fits; null where none does. */
 export function topicOf(path, topics) {
@@ -26,13 +32,19 @@ export function topicOf(path, topics) {
 /** A path that leads to no number. */
 export class PathError extends TextError {}
 
-/** Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws PathError. */
+/**
+ * Return the steps of a path behind its topic: names, numbers, {from, to}, {test, text}: a function of a value. Throws
+ * PathError.
+ */
 export function parseSteps(text) {
   const steps = [];
   let rest = text;
   while (rest) {
-    const match = /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(rest);
-    if (!match) throw new PathError("\"{rest}\" is not a field, nor an index, nor a filter as {id==1}", { rest });
+    const match =
+      /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(
+        rest,
+      );
+    if (!match) throw new PathError('"{rest}" is not a field, nor an index, nor a filter as {id==1}', { rest });
     if (match[1] !== undefined) steps.push(match[1]);
     else if (match[2] !== undefined) steps.push(Number(match[2]));
     else if (match[5] !== undefined) steps.push({ test: testOf(match), text: match[0] });
@@ -42,12 +54,19 @@ export function parseSteps(text) {
   return steps;
 }
 
+/** @param {string[]} match */
 function testOf([, , , , , path, operator, ...texts]) {
   const names = path.split(/[./]/);
   const text = texts.find((each) => each !== undefined).trim();
-  const wanted = texts[2] === undefined ? text : { true: 1, false: 0 }[text] ?? (text !== "" && Number.isFinite(Number(text)) ? Number(text) : text);
+  const wanted =
+    texts[2] === undefined
+      ? text
+      : ({ true: 1, false: 0 }[text] ?? (text !== "" && Number.isFinite(Number(text)) ? Number(text) : text));
   return (value) => {
-    const found = names.reduce((each, name) => (each !== null && typeof each === "object" && Object.hasOwn(each, name) ? each[name] : undefined), value);
+    const found = names.reduce(
+      (each, name) => (each !== null && typeof each === "object" && Object.hasOwn(each, name) ? each[name] : undefined),
+      value,
+    );
     if (found === undefined) return false;
     if (typeof wanted !== "number") return TESTS[operator](String(found), wanted);
     const number = numberOf(found);
@@ -77,7 +96,8 @@ export function select(value, steps, found, label = "", depth = 0) {
     // What a filter finds is one series, wherever it is in the array.
     const isFiltered = Boolean(steps[depth + 1]?.test);
     const end = Math.min(step.to, value.length, step.from + (isFiltered ? MAX_TESTED : MAX_VALUES));
-    for (let index = step.from; index < end; index++) select(value[index], steps, found, `${label}[${isFiltered ? ":" : index}]`, depth + 1);
+    for (let index = step.from; index < end; index++)
+      select(value[index], steps, found, `${label}[${isFiltered ? ":" : index}]`, depth + 1);
   }
 }
 
@@ -98,7 +118,7 @@ export function canLead(definition, steps) {
   for (const step of steps) {
     if (step.test) continue;
     if (typeof step === "string") {
-      const parts = at.type === "time" || at.type === "duration" ? TIME_PARTS : at.message?.fields ?? [];
+      const parts = at.type === "time" || at.type === "duration" ? TIME_PARTS : (at.message?.fields ?? []);
       const field = at.isArray ? null : parts.find(({ name }) => name === step);
       if (!field) return false;
       at = field;

@@ -15,7 +15,8 @@ export function parseLiteral(text) {
   const reader = { text, at: 0 };
   const value = literal(reader);
   blank(reader);
-  if (reader.at < text.length) throw new TextError("\"{text}\" is not expected", { text: text.slice(reader.at, reader.at + 20) });
+  if (reader.at < text.length)
+    throw new TextError('"{text}" is not expected', { text: text.slice(reader.at, reader.at + 20) });
   return value;
 }
 
@@ -27,12 +28,14 @@ function blank(reader) {
 function literal(reader) {
   const first = blank(reader);
   if (first === "{") {
-    return Object.fromEntries(items(reader, "}", () => {
-      const key = literal(reader);
-      if (blank(reader) !== ":") throw new TextError("a colon is missing");
-      reader.at += 1;
-      return [key, literal(reader)];
-    }));
+    return Object.fromEntries(
+      items(reader, "}", () => {
+        const key = literal(reader);
+        if (blank(reader) !== ":") throw new TextError("a colon is missing");
+        reader.at += 1;
+        return [key, literal(reader)];
+      }),
+    );
   }
   if (first === "[") return items(reader, "]", () => literal(reader));
   if (first === "(") return items(reader, ")", () => literal(reader));
@@ -41,7 +44,8 @@ function literal(reader) {
   const word = /^[-+\w.]+/.exec(reader.text.slice(reader.at))?.[0] ?? "";
   reader.at += word.length;
   if (Object.hasOwn(WORDS, word)) return WORDS[word];
-  if (!word || Number.isNaN(Number(word))) throw new TextError("\"{text}\" is not a value", { text: word || first || "" });
+  if (!word || Number.isNaN(Number(word)))
+    throw new TextError('"{text}" is not a value', { text: word || first || "" });
   return Number(word);
 }
 
@@ -57,6 +61,11 @@ function items(reader, end, read) {
   return found;
 }
 
+/**
+ * Return the string that starts at the reader's place.
+ * @param {any} reader
+ * @param {string[]} opening the match of its prefix and quote
+ */
 function string(reader, [start, quote]) {
   reader.at += start.length;
   let found = "";
@@ -82,7 +91,11 @@ export function constantsOf(editMethod) {
   if (!editMethod) return [];
   try {
     const found = parseLiteral(editMethod).enum;
-    return found.map(({ name, value, description }) => ({ name: String(name), value, description: String(description ?? "") }));
+    return found.map(({ name, value, description }) => ({
+      name: String(name),
+      value,
+      description: String(description ?? ""),
+    }));
   } catch {
     return [];
   }
@@ -97,8 +110,15 @@ export function describe(message) {
     if (groups.has(id)) continue;
     const group = { id, parent, name, type: type.toLowerCase(), parameters: [], groups: [] };
     for (const each of described) {
-      const parameter = { name: each.name, type: each.type, description: each.description, min: least.get(each.name),
-        max: greatest.get(each.name), usual: usual.get(each.name), constants: constantsOf(each.edit_method) };
+      const parameter = {
+        name: each.name,
+        type: each.type,
+        description: each.description,
+        min: least.get(each.name),
+        max: greatest.get(each.name),
+        usual: usual.get(each.name),
+        constants: constantsOf(each.edit_method),
+      };
       group.parameters.push(parameter);
       parameters.set(each.name, parameter);
     }
@@ -135,18 +155,24 @@ export function requestOf(parameters, values, root = null, states = new Map()) {
 /** Return a value of the parameter's type, of what was typed, or of a file's value. Throws Error. */
 export function converted({ name, type, constants }, given) {
   const text = String(given).trim();
-  const constant = constants.find((each) => typeof given === "string" && each.name.toLowerCase() === text.toLowerCase());
+  const constant = constants.find(
+    (each) => typeof given === "string" && each.name.toLowerCase() === text.toLowerCase(),
+  );
   if (constant) return constant.value;
   if (type === "str") return String(given);
   if (type === "bool") {
     if (TRUE.includes(text.toLowerCase())) return true;
     if (FALSE.includes(text.toLowerCase())) return false;
-    throw new TextError("{name}: \"{text}\" is not true or false", { name, text });
+    throw new TextError('{name}: "{text}" is not true or false', { name, text });
   }
-  const number = { inf: Infinity, "+inf": Infinity, "-inf": -Infinity, nan: NaN }[text.toLowerCase()] ?? (text === "" ? NaN : Number(text));
-  if (Number.isNaN(number) && text.toLowerCase() !== "nan") throw new TextError("{name}: \"{text}\" is not a number", { name, text });
+  const number =
+    { inf: Infinity, "+inf": Infinity, "-inf": -Infinity, nan: NaN }[text.toLowerCase()] ??
+    (text === "" ? NaN : Number(text));
+  if (Number.isNaN(number) && text.toLowerCase() !== "nan")
+    throw new TextError('{name}: "{text}" is not a number', { name, text });
   if (type === "double") return number;
-  if (!Number.isInteger(number) || number > INT_LIMIT || number < -INT_LIMIT - 1) throw new TextError("{name}: \"{text}\" is not a whole number of 32 bits", { name, text });
+  if (!Number.isInteger(number) || number > INT_LIMIT || number < -INT_LIMIT - 1)
+    throw new TextError('{name}: "{text}" is not a whole number of 32 bits', { name, text });
   return number;
 }
 
@@ -161,13 +187,17 @@ export function sliderStep({ type, min, max }) {
 
 /** Return a number as the fields show it: without the digits that binary fractions add. */
 export function shownNumber(value) {
-  return typeof value === "number" && !Number.isInteger(value) && Number.isFinite(value) ? String(Number(value.toPrecision(12))) : String(value);
+  return typeof value === "number" && !Number.isInteger(value) && Number.isFinite(value)
+    ? String(Number(value.toPrecision(12)))
+    : String(value);
 }
 
 /** Return values as a file of YAML that rqt_reconfigure and dynparam load. */
 export function yamlOf(parameters, values) {
   const names = [...values.keys()].sort();
-  return names.map((name) => `${yamlText(name)}: ${yamlValue(parameters.get(name)?.type, values.get(name))}\n`).join("");
+  return names
+    .map((name) => `${yamlText(name)}: ${yamlValue(parameters.get(name)?.type, values.get(name))}\n`)
+    .join("");
 }
 
 function yamlValue(type, value) {
@@ -184,5 +214,8 @@ function yamlText(text) {
   const isPlain = /^[A-Za-z_/][\w/.-]*$/.test(text) && !/^(y|n|yes|no|on|off|true|false|null|nan|inf)$/i.test(text);
   if (isPlain) return text;
   // What JSON leaves as it is and YAML does not allow.
-  return JSON.stringify(text).replace(/[\x7f-\x9f\u2028\u2029\ufeff]/g, (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`);
+  return JSON.stringify(text).replace(
+    /[\x7f-\x9f\u2028\u2029\ufeff]/g,
+    (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, "0")}`,
+  );
 }

@@ -3,28 +3,88 @@
 
 const INT64 = { size: 8 };
 const PRIMITIVES = {
-  bool: { size: 1, get: (v, o) => v.getUint8(o) !== 0, set: (v, o, x) => v.setUint8(o, x ? 1 : 0), array: null, zero: false },
+  bool: {
+    size: 1,
+    get: (v, o) => v.getUint8(o) !== 0,
+    set: (v, o, x) => v.setUint8(o, x ? 1 : 0),
+    array: null,
+    zero: false,
+  },
   int8: { size: 1, get: (v, o) => v.getInt8(o), set: (v, o, x) => v.setInt8(o, x), array: Int8Array, zero: 0 },
   uint8: { size: 1, get: (v, o) => v.getUint8(o), set: (v, o, x) => v.setUint8(o, x), array: Uint8Array, zero: 0 },
-  int16: { size: 2, get: (v, o) => v.getInt16(o, true), set: (v, o, x) => v.setInt16(o, x, true), array: Int16Array, zero: 0 },
-  uint16: { size: 2, get: (v, o) => v.getUint16(o, true), set: (v, o, x) => v.setUint16(o, x, true), array: Uint16Array, zero: 0 },
-  int32: { size: 4, get: (v, o) => v.getInt32(o, true), set: (v, o, x) => v.setInt32(o, x, true), array: Int32Array, zero: 0 },
-  uint32: { size: 4, get: (v, o) => v.getUint32(o, true), set: (v, o, x) => v.setUint32(o, x, true), array: Uint32Array, zero: 0 },
-  int64: { ...INT64, get: (v, o) => exact(v.getBigInt64(o, true)), set: (v, o, x) => v.setBigInt64(o, BigInt(x), true), array: null, zero: 0 },
-  uint64: { ...INT64, get: (v, o) => exact(v.getBigUint64(o, true)), set: (v, o, x) => v.setBigUint64(o, BigInt(x), true), array: null, zero: 0 },
-  float32: { size: 4, get: (v, o) => v.getFloat32(o, true), set: (v, o, x) => v.setFloat32(o, x, true), array: Float32Array, zero: 0 },
-  float64: { size: 8, get: (v, o) => v.getFloat64(o, true), set: (v, o, x) => v.setFloat64(o, x, true), array: Float64Array, zero: 0 },
+  int16: {
+    size: 2,
+    get: (v, o) => v.getInt16(o, true),
+    set: (v, o, x) => v.setInt16(o, x, true),
+    array: Int16Array,
+    zero: 0,
+  },
+  uint16: {
+    size: 2,
+    get: (v, o) => v.getUint16(o, true),
+    set: (v, o, x) => v.setUint16(o, x, true),
+    array: Uint16Array,
+    zero: 0,
+  },
+  int32: {
+    size: 4,
+    get: (v, o) => v.getInt32(o, true),
+    set: (v, o, x) => v.setInt32(o, x, true),
+    array: Int32Array,
+    zero: 0,
+  },
+  uint32: {
+    size: 4,
+    get: (v, o) => v.getUint32(o, true),
+    set: (v, o, x) => v.setUint32(o, x, true),
+    array: Uint32Array,
+    zero: 0,
+  },
+  int64: {
+    ...INT64,
+    get: (v, o) => exact(v.getBigInt64(o, true)),
+    set: (v, o, x) => v.setBigInt64(o, BigInt(x), true),
+    array: null,
+    zero: 0,
+  },
+  uint64: {
+    ...INT64,
+    get: (v, o) => exact(v.getBigUint64(o, true)),
+    set: (v, o, x) => v.setBigUint64(o, BigInt(x), true),
+    array: null,
+    zero: 0,
+  },
+  float32: {
+    size: 4,
+    get: (v, o) => v.getFloat32(o, true),
+    set: (v, o, x) => v.setFloat32(o, x, true),
+    array: Float32Array,
+    zero: 0,
+  },
+  float64: {
+    size: 8,
+    get: (v, o) => v.getFloat64(o, true),
+    set: (v, o, x) => v.setFloat64(o, x, true),
+    array: Float64Array,
+    zero: 0,
+  },
   time: {
     size: 8,
     get: (v, o) => ({ secs: v.getUint32(o, true), nsecs: v.getUint32(o + 4, true) }),
-    set: (v, o, x) => { v.setUint32(o, x.secs, true); v.setUint32(o + 4, x.nsecs, true); },
+    set: (v, o, x) => {
+      v.setUint32(o, x.secs, true);
+      v.setUint32(o + 4, x.nsecs, true);
+    },
     array: null,
     zero: { secs: 0, nsecs: 0 },
   },
   duration: {
     size: 8,
     get: (v, o) => ({ secs: v.getInt32(o, true), nsecs: v.getInt32(o + 4, true) }),
-    set: (v, o, x) => { v.setInt32(o, x.secs, true); v.setInt32(o + 4, x.nsecs, true); },
+    set: (v, o, x) => {
+      v.setInt32(o, x.secs, true);
+      v.setInt32(o + 4, x.nsecs, true);
+    },
     array: null,
     zero: { secs: 0, nsecs: 0 },
   },
@@ -53,7 +113,10 @@ function exact(value) {
   return Number.isSafeInteger(number) ? number : value;
 }
 
-/** Return the description of a type: {name, fields: [{name, type, isArray, length, message}], constants}. Throws MessageError. */
+/**
+ * Return the description of a type: {name, fields: [{name, type, isArray, length, message}], constants}. Throws
+ * MessageError.
+ */
 export function parseDefinition(name, text) {
   const sections = new Map();
   let current = { name, lines: [] };
@@ -93,7 +156,7 @@ function build(name, sections, done, open) {
       continue;
     }
     const field = /^([A-Za-z][\w/]*)(\[(\d*)\])?\s+([A-Za-z]\w*)$/.exec(line);
-    if (!field) throw new MessageError("{name}: \"{line}\" is not a field", { name, line });
+    if (!field) throw new MessageError('{name}: "{line}" is not a field', { name, line });
     const [, type, brackets, length, fieldName] = field;
     const isMessage = type !== "string" && !Object.hasOwn(PRIMITIVES, type);
     found.fields.push({
@@ -146,8 +209,11 @@ class Reader {
 /** Return the fewest bytes of a value. */
 function leastSize(field) {
   if (field.isArray && field.length === null) return 4;
-  const one = field.message ? field.message.fields.reduce((sum, each) => sum + leastSize(each), 0)
-    : field.type === "string" ? 4 : PRIMITIVES[field.type].size;
+  const one = field.message
+    ? field.message.fields.reduce((sum, each) => sum + leastSize(each), 0)
+    : field.type === "string"
+      ? 4
+      : PRIMITIVES[field.type].size;
   return field.isArray ? one * field.length : one;
 }
 
@@ -186,7 +252,10 @@ const READERS = new WeakMap();
 function readerOfMessage(definition) {
   let read = READERS.get(definition);
   if (!read) {
-    const fields = definition.fields.map((field) => [field.name, field.isArray ? readerOfArray(field) : readerOfOne(field)]);
+    const fields = definition.fields.map((field) => [
+      field.name,
+      field.isArray ? readerOfArray(field) : readerOfOne(field),
+    ]);
     read = (reader) => {
       const found = {};
       for (const [name, readField] of fields) found[name] = readField(reader);
@@ -243,23 +312,30 @@ const INTEGER = /^(u?)int(\d+)$/;
 function checkNumber(name, type, value) {
   const text = String(value);
   const integer = INTEGER.exec({ byte: "int8", char: "uint8" }[type] ?? type);
-  if (integer && typeof value === "number" && !Number.isInteger(value)) throw new MessageError("{name}: {text} is not a whole number", { name, text });
-  const fits = integer ? BigInt(value) === (integer[1] ? BigInt.asUintN : BigInt.asIntN)(Number(integer[2]), BigInt(value))
+  if (integer && typeof value === "number" && !Number.isInteger(value))
+    throw new MessageError("{name}: {text} is not a whole number", { name, text });
+  const fits = integer
+    ? BigInt(value) === (integer[1] ? BigInt.asUintN : BigInt.asIntN)(Number(integer[2]), BigInt(value))
     : type !== "float32" || !Number.isFinite(value) || Number.isFinite(Math.fround(value));
   if (!fits) throw new MessageError("{name}: {text} does not fit into {type}", { name, text, type });
 }
 
 function checkTime(name, type, { secs, nsecs }) {
-  if (typeof secs !== "number" || typeof nsecs !== "number") throw new MessageError("{name}: not {secs, nsecs}", { name });
+  if (typeof secs !== "number" || typeof nsecs !== "number")
+    throw new MessageError("{name}: not {secs, nsecs}", { name });
   for (const each of [secs, nsecs]) checkNumber(name, type === "time" ? "uint32" : "int32", each);
 }
 
 function writeMessage(writer, definition, value, path) {
-  if (typeof value !== "object" || value === null || isList(value)) throw new MessageError("{name}: not an object", { name: path || definition.name });
+  if (typeof value !== "object" || value === null || isList(value))
+    throw new MessageError("{name}: not an object", { name: path || definition.name });
   for (const name of Object.keys(value)) {
     if (!definition.fields.some((field) => field.name === name)) {
       const fields = definition.fields.map((field) => field.name).join(", ");
-      throw new MessageError(fields ? "{name}: there is no such field; there is {fields}" : "{name}: there is no such field; there is none", { name: path ? `${path}.${name}` : name, fields });
+      throw new MessageError(
+        fields ? "{name}: there is no such field; there is {fields}" : "{name}: there is no such field; there is none",
+        { name: path ? `${path}.${name}` : name, fields },
+      );
     }
   }
   for (const field of definition.fields) {
@@ -272,7 +348,11 @@ function writeMessage(writer, definition, value, path) {
     const items = given ?? new Array(field.length ?? 0).fill(undefined);
     if (!isList(items)) throw new MessageError("{name}: not an array", { name: where });
     if (field.length !== null && items.length !== field.length) {
-      throw new MessageError("{name}: {count} values, where {wanted} are wanted", { name: where, count: items.length, wanted: field.length });
+      throw new MessageError("{name}: {count} values, where {wanted} are wanted", {
+        name: where,
+        count: items.length,
+        wanted: field.length,
+      });
     }
     if (field.length === null) writer.length(items.length);
     for (let index = 0; index < items.length; index++) writeOne(writer, field, items[index], `${where}[${index}]`);
@@ -292,10 +372,16 @@ function writeOne(writer, field, value, name) {
   } else {
     const { size, set, zero } = PRIMITIVES[field.type];
     const checked = value ?? zero;
-    if (typeof zero === "number" && typeof checked !== "number" && typeof checked !== "bigint" && typeof checked !== "boolean") {
+    if (
+      typeof zero === "number" &&
+      typeof checked !== "number" &&
+      typeof checked !== "bigint" &&
+      typeof checked !== "boolean"
+    ) {
       throw new MessageError("{name}: not a number", { name });
     }
-    if (typeof zero === "boolean" && typeof checked !== "boolean" && checked !== 0 && checked !== 1) throw new MessageError("{name}: neither true nor false", { name });
+    if (typeof zero === "boolean" && typeof checked !== "boolean" && checked !== 0 && checked !== 1)
+      throw new MessageError("{name}: neither true nor false", { name });
     if (typeof zero === "object") checkTime(name, field.type, checked);
     else checkNumber(name, field.type, checked);
     const start = writer.room(size);
@@ -311,13 +397,21 @@ function writeOne(writer, field, value, name) {
 export function zeroOf(definition) {
   const found = {};
   for (const field of definition.fields) {
-    const one = () => (field.message ? zeroOf(field.message) : field.type === "string" ? "" : structuredClone(PRIMITIVES[field.type].zero));
+    const one = () =>
+      field.message
+        ? zeroOf(field.message)
+        : field.type === "string"
+          ? ""
+          : structuredClone(PRIMITIVES[field.type].zero);
     found[field.name] = field.isArray ? Array.from({ length: field.length ?? 0 }, one) : one();
   }
   return found;
 }
 
-/** Return whether a value of a message is an array: a message may have a field called "length", too. */
+/**
+ * Return whether a value of a message is an array: a message may have a field called "length", too.
+ * @returns {value is any[]}
+ */
 export function isList(value) {
   return Array.isArray(value) || ArrayBuffer.isView(value);
 }

@@ -1,4 +1,5 @@
-// The points of one plotted series, and what is drawn of many: exact points, or the extremes of each column of pixels. Pure.
+// The points of one plotted series, and what is drawn of many: exact points, or the extremes of each column of pixels.
+// Pure.
 
 const FIRST = 1024;
 export const MAX_POINTS = 4_000_000; // of one series; then the oldest quarter goes
@@ -15,7 +16,8 @@ export class Samples {
 
   append(times, values, stamps = null) {
     this.total += times.length;
-    if (this.count + times.length > MAX_POINTS) this.drop(Math.max(MAX_POINTS / 4, this.count + times.length - MAX_POINTS));
+    if (this.count + times.length > MAX_POINTS)
+      this.drop(Math.max(MAX_POINTS / 4, this.count + times.length - MAX_POINTS));
     if (stamps) this.stamps ??= this.times.slice();
     if (this.count + times.length > this.times.length) {
       const size = Math.max(this.times.length * 2, this.count + times.length);
@@ -70,9 +72,14 @@ const finite = (value) => (Number.isFinite(value) ? value : null);
 
 /** Return [xs, ys of each series] for a range of time, by at most two points a column; x is relative to ``origin``. */
 export function drawn(all, from, to, columns, origin) {
-  const ranges = all.map((samples) => [Math.max(0, samples.indexOf(from) - 1), Math.min(samples.count, samples.indexOf(to) + 1)]);
+  const ranges = all.map((samples) => [
+    Math.max(0, samples.indexOf(from) - 1),
+    Math.min(samples.count, samples.indexOf(to) + 1),
+  ]);
   const total = ranges.reduce((sum, [first, last]) => sum + last - first, 0);
-  return total <= MAX_EXACT ? exact(all, ranges, total, origin) : extremes(all, ranges, from, to, Math.max(1, Math.floor(columns)), origin);
+  return total <= MAX_EXACT
+    ? exact(all, ranges, total, origin)
+    : extremes(all, ranges, from, to, Math.max(1, Math.floor(columns)), origin);
 }
 
 function exact(all, ranges, total, origin) {
@@ -139,6 +146,7 @@ export function csv(labels, all) {
   const total = all.reduce((sum, samples) => sum + samples.count, 0);
   const [xs, ...columns] = exact(all, ranges, total, 0);
   const rows = [["time", ...labels].map((label) => `"${label.replaceAll('"', '""')}"`).join(",")];
-  for (let row = 0; row < xs.length; row++) rows.push([xs[row].toFixed(9), ...columns.map((ys) => ys[row] ?? "")].join(","));
+  for (let row = 0; row < xs.length; row++)
+    rows.push([xs[row].toFixed(9), ...columns.map((ys) => ys[row] ?? "")].join(","));
   return rows.join("\r\n") + "\r\n";
 }

@@ -1,4 +1,5 @@
-// The texts of the page in the person's language. The English text is its own key: t("Pause"), t("{count} lines", { count }).
+// The texts of the page in the person's language. The English text is its own key: t("Pause"), t("{count} lines", {
+// count }).
 
 import { GERMAN } from "./german.js";
 
@@ -8,9 +9,17 @@ export const LANGUAGES = { en: "English", de: "Deutsch" };
 let table = TABLES.en;
 export let language = "en";
 
-/** Use the language that was chosen, else the first of the browser's that there is. */
+/**
+ * Use the language that was chosen, else the first of the browser's that there is.
+ * @param {string | null} wanted
+ * @param {readonly string[]} offered
+ */
 export function chooseLanguage(wanted, offered = []) {
-  const known = [wanted, ...offered].map((each) => String(each ?? "").slice(0, 2).toLowerCase());
+  const known = [wanted, ...offered].map((each) =>
+    String(each ?? "")
+      .slice(0, 2)
+      .toLowerCase(),
+  );
   language = known.find((each) => Object.hasOwn(TABLES, each)) ?? "en";
   table = TABLES[language];
 }
@@ -28,11 +37,15 @@ export function watchMissing() {
   return missing;
 }
 
-/** Return a text in the chosen language; {name} in it becomes values.name. A text without a translation stays as it is. */
+/**
+ * Return a text in the chosen language; {name} in it becomes values.name. A text without a translation stays as it is.
+ */
 export function t(text, values = null) {
   const isKnown = Object.hasOwn(table, text);
   const found = isKnown ? table[text] : text;
-  const result = values ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all)) : found;
+  const result = values
+    ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all))
+    : found;
   if (isWatched) {
     if (!isKnown && !made.has(text)) missing.add(text);
     made.add(result);

@@ -53,7 +53,8 @@ export class Axis {
   ticks(apart = 90) {
     const step = roundStep((this.span * apart) / Math.max(1, this.width));
     const found = [];
-    for (let number = Math.ceil(this.start / step - 1e-9); number * step <= this.end + step * 1e-9; number++) found.push(Math.max(0, number * step));
+    for (let number = Math.ceil(this.start / step - 1e-9); number * step <= this.end + step * 1e-9; number++)
+      found.push(Math.max(0, number * step));
     return { step, times: found };
   }
 }
@@ -80,12 +81,14 @@ export function clockText(seconds, step = 0.001) {
 /** Return bytes for people. */
 export function sizeText(bytes) {
   if (bytes < 1000) return `${bytes} B`;
-  const unit = bytes < 1e6 ? ["kB", 1e3] : bytes < 1e9 ? ["MB", 1e6] : ["GB", 1e9];
-  return `${(bytes / unit[1]).toFixed(1)} ${unit[0]}`;
+  const [unit, size] = bytes < 1e6 ? ["kB", 1e3] : bytes < 1e9 ? ["MB", 1e6] : ["GB", 1e9];
+  return `${(bytes / Number(size)).toFixed(1)} ${unit}`;
 }
 
 /** Return heights from 0 to 1 for counts of messages: one message is seen next to thousands. */
 export function heights(counts) {
   const most = Math.max(1, ...counts);
-  return counts.map((count) => (count ? 0.55 + 0.45 * (most > 1 ? Math.log1p(count - 1) / Math.log1p(most - 1) : 1) : 0));
+  return counts.map((count) =>
+    count ? 0.55 + 0.45 * (most > 1 ? Math.log1p(count - 1) / Math.log1p(most - 1) : 1) : 0,
+  );
 }

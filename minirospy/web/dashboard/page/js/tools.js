@@ -1,4 +1,5 @@
-// The page's side of the tools' endpoint: requests that the Foxglove protocol has no message for, and reports that come by themselves.
+// The page's side of the tools' endpoint: requests that the Foxglove protocol has no message for, and reports that come
+// by themselves.
 
 import { t } from "./texts.js";
 
@@ -69,7 +70,8 @@ export class Tools {
     if (this.watchers.size === 1) this.watchAgain();
     return () => {
       this.watchers.delete(received);
-      if (!this.watchers.size && this.socket?.readyState === WebSocket.OPEN) this.request({ do: "unwatch" }).catch(() => {});
+      if (!this.watchers.size && this.socket?.readyState === WebSocket.OPEN)
+        this.request({ do: "unwatch" }).catch(() => {});
     };
   }
 

@@ -6,7 +6,10 @@ const EXTRA = 6; // rows above and below what is seen
 const USUAL_HEIGHT = 26; // pixels, until a row is there
 
 export class VirtualList {
-  /** make() returns an element for a row, show(element, index) fills it. The style sets the height of rows, by the width of the view. */
+  /**
+   * make() returns an element for a row, show(element, index) fills it. The style sets the height of rows, by the width
+   * of the view.
+   */
   constructor(make, show) {
     this.rowHeight = USUAL_HEIGHT;
     this.make = make;

@@ -17,8 +17,13 @@ export const MAX_PANELS = 60;
 
 /** The texts of types that a topic may get which nobody publishes yet. */
 export const TYPES = {
-  "std_msgs/Bool": "bool data", "std_msgs/Float64": "float64 data", "std_msgs/Float32": "float32 data", "std_msgs/Int32": "int32 data",
-  "std_msgs/UInt8": "uint8 data", "std_msgs/String": "string data", "std_msgs/Empty": "",
+  "std_msgs/Bool": "bool data",
+  "std_msgs/Float64": "float64 data",
+  "std_msgs/Float32": "float32 data",
+  "std_msgs/Int32": "int32 data",
+  "std_msgs/UInt8": "uint8 data",
+  "std_msgs/String": "string data",
+  "std_msgs/Empty": "",
 };
 
 /** Return the settings of a panel's text, with the usual ones; null where it has no kind or no path. */
@@ -27,7 +32,9 @@ export function parsePanel(text) {
   const kind = words.get("kind");
   const path = words.get("path") ?? "";
   if (!Object.hasOwn(KINDS, kind) || !path.startsWith("/")) return null;
-  const settings = Object.fromEntries(Object.entries(KINDS[kind].settings).map(([name, usual]) => [name, words.get(name) ?? usual]));
+  const settings = Object.fromEntries(
+    Object.entries(KINDS[kind].settings).map(([name, usual]) => [name, words.get(name) ?? usual]),
+  );
   return { kind, path, label: words.get("label") ?? "", isService: words.get("service") === "1", ...settings };
 }
 
@@ -35,7 +42,13 @@ export function parsePanel(text) {
 export function panelText({ kind, path, label, isService, ...settings }) {
   const usual = KINDS[kind].settings;
   const given = Object.entries(settings).filter(([name, value]) => Object.hasOwn(usual, name) && value !== usual[name]);
-  return new URLSearchParams([["kind", kind], ["path", path], ...(label ? [["label", label]] : []), ...(isService ? [["service", "1"]] : []), ...given]).toString();
+  return new URLSearchParams([
+    ["kind", kind],
+    ["path", path],
+    ...(label ? [["label", label]] : []),
+    ...(isService ? [["service", "1"]] : []),
+    ...given,
+  ]).toString();
 }
 
 /** Return the value that steps lead to; of a message with one field that field's. undefined where there is none. */
@@ -71,14 +84,15 @@ export function messageWith(definition, steps, text) {
   while (rest.length) {
     const name = rest.shift();
     const field = inside.fields.find((each) => each.name === name);
-    if (!field) throw new TextError("there is no field \"{name}\": there is {fields}", { name, fields: namesOf(inside) });
-    if (field.isArray) throw new TextError("\"{name}\" is an array: a panel sets one value", { name });
+    if (!field) throw new TextError('there is no field "{name}": there is {fields}', { name, fields: namesOf(inside) });
+    if (field.isArray) throw new TextError('"{name}" is an array: a panel sets one value', { name });
     if (!field.message) {
-      if (rest.length) throw new TextError("\"{name}\" has no fields", { name });
+      if (rest.length) throw new TextError('"{name}" has no fields', { name });
       at[name] = valueOf(field.type, text);
     } else {
       if (!rest.length) rest = field.message.fields.length === 1 ? [field.message.fields[0].name] : rest;
-      if (!rest.length) throw new TextError("name a field of \"{name}\": {fields}", { name, fields: namesOf(field.message) });
+      if (!rest.length)
+        throw new TextError('name a field of "{name}": {fields}', { name, fields: namesOf(field.message) });
       at[name] = {};
       at = at[name];
       inside = field.message;
@@ -99,19 +113,28 @@ export function isSame(value, text) {
 function valueOf(type, text) {
   if (type === "string") return String(text);
   const number = { true: 1, false: 0 }[String(text).trim().toLowerCase()] ?? Number(text);
-  if (!Number.isFinite(number) || String(text).trim() === "") throw new TextError("\"{text}\" is not a number", { text });
+  if (!Number.isFinite(number) || String(text).trim() === "") throw new TextError('"{text}" is not a number', { text });
   if (type === "bool") return number !== 0;
-  if (type === "time" || type === "duration") return { secs: Math.floor(number), nsecs: Math.round((number - Math.floor(number)) * 1e9) };
+  if (type === "time" || type === "duration")
+    return { secs: Math.floor(number), nsecs: Math.round((number - Math.floor(number)) * 1e9) };
   if (type.endsWith("64") && type !== "float64") return BigInt(Math.round(number));
   return type.startsWith("float") ? number : Math.round(number);
 }
 
-/** Return the path split at a topic or service that is known: [name, steps]; null where none fits. Throws Error on a bad path. */
+/**
+ * Return the path split at a topic or service that is known: [name, steps]; null where none fits. Throws Error on a bad
+ * path.
+ */
 export function splitPath(path, names) {
   let found = null;
   for (const name of names) {
     const next = path[name.length];
-    if (path.startsWith(name) && (next === undefined || "/.[".includes(next)) && (found === null || name.length > found.length)) found = name;
+    if (
+      path.startsWith(name) &&
+      (next === undefined || "/.[".includes(next)) &&
+      (found === null || name.length > found.length)
+    )
+      found = name;
   }
   return found === null ? null : [found, parseSteps(path.slice(found.length))];
 }

@@ -31,11 +31,14 @@ let nextId = 1;
 let isScheduled = false;
 let isAwaited = false; // a batch that the page has not handled yet
 
-const post = (message, transfer = []) => self.postMessage(message, transfer);
+const post = (message, transfer = []) => /** @type {any} */ (self).postMessage(message, transfer);
 /** Return the fields by which the page is notified of an error, in its language. */
 const faultOf = ({ message, text = message, values = null }) => ({ error: text, errorValues: values });
-const failing = (id) => (error) => post({ kind: "answer", id, ...faultOf(typeof error === "string" ? { message: error } : error) });
-const send = (fields) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(fields)); };
+const failing = (id) => (error) =>
+  post({ kind: "answer", id, ...faultOf(typeof error === "string" ? { message: error } : error) });
+const send = (fields) => {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(fields));
+};
 
 // --- the connection
 
@@ -105,11 +108,21 @@ const TEXT_HANDLERS = {
     for (const [name, service] of services) if (gone.has(service.id)) services.delete(name);
     postServices();
   },
-  connectionGraphUpdate(fields) { post({ kind: "graph", ...fields }); },
-  parameterValues(fields) { post({ kind: "parameters", parameters: fields.parameters, isAll: fields.id === "all" }); },
-  status(fields) { post({ kind: "status", level: fields.level, message: fields.message, id: fields.id ?? null }); },
-  removeStatus(fields) { post({ kind: "removeStatus", ids: fields.statusIds }); },
-  serviceCallFailure(fields) { finishCall(fields.callId, (call) => call.reject(fields.message)); },
+  connectionGraphUpdate(fields) {
+    post({ kind: "graph", ...fields });
+  },
+  parameterValues(fields) {
+    post({ kind: "parameters", parameters: fields.parameters, isAll: fields.id === "all" });
+  },
+  status(fields) {
+    post({ kind: "status", level: fields.level, message: fields.message, id: fields.id ?? null });
+  },
+  removeStatus(fields) {
+    post({ kind: "removeStatus", ids: fields.statusIds });
+  },
+  serviceCallFailure(fields) {
+    finishCall(fields.callId, (call) => call.reject(fields.message));
+  },
 };
 
 function receivedText(fields) {
@@ -153,7 +166,11 @@ function postChannels() {
 function postServices() {
   post({
     kind: "services",
-    services: [...services.values()].map((each) => ({ name: each.name, type: each.type, request: each.request.schema })),
+    services: [...services.values()].map((each) => ({
+      name: each.name,
+      type: each.type,
+      request: each.request.schema,
+    })),
   });
 }
 
@@ -210,8 +227,12 @@ function resolvePath(entry) {
 }
 
 function noNumber(topic, definition) {
-  const paths = numericPaths(definition, 3).map((path) => topic + path).join(", ");
-  return new PathError(paths ? "no number there; there is {paths}" : "no number there; there is none in this topic", { paths });
+  const paths = numericPaths(definition, 3)
+    .map((path) => topic + path)
+    .join(", ");
+  return new PathError(paths ? "no number there; there is {paths}" : "no number there; there is none in this topic", {
+    paths,
+  });
 }
 
 function use(entry) {
@@ -219,7 +240,15 @@ function use(entry) {
   entry.place = entry.isOwn ? `${entry.topic} ${entry.key}` : entry.topic;
   let topic = topics.get(entry.place);
   if (!topic) {
-    topic = { name: entry.topic, place: entry.place, subscription: null, channelId: null, users: new Set(), last: null, definition: null };
+    topic = {
+      name: entry.topic,
+      place: entry.place,
+      subscription: null,
+      channelId: null,
+      users: new Set(),
+      last: null,
+      definition: null,
+    };
     topics.set(entry.place, topic);
   }
   topic.users.add(entry);
@@ -306,7 +335,13 @@ function give(topic, entry, seconds, bytes, decoded) {
 function addPoint(entry, label, seconds, stamp, number) {
   let series = entry.series.get(label);
   if (!series) {
-    series = { times: new Float64Array(256), stamps: new Float64Array(256), values: new Float64Array(256), count: 0, isStamped: false };
+    series = {
+      times: new Float64Array(256),
+      stamps: new Float64Array(256),
+      values: new Float64Array(256),
+      count: 0,
+      isStamped: false,
+    };
     entry.series.set(label, series);
   }
   if (series.count === series.times.length) {
@@ -370,7 +405,12 @@ function itemOf(entry, transfer) {
   if (entry.mode === "series" && entry.series.size) {
     item.series = [];
     for (const [label, { times, stamps, values, count, isStamped }] of entry.series) {
-      const part = { label: entry.topic + label, times: times.slice(0, count), values: values.slice(0, count), stamps: isStamped ? stamps.slice(0, count) : null };
+      const part = {
+        label: entry.topic + label,
+        times: times.slice(0, count),
+        values: values.slice(0, count),
+        stamps: isStamped ? stamps.slice(0, count) : null,
+      };
       transfer.push(part.times.buffer, part.values.buffer);
       item.series.push(part);
     }
@@ -402,7 +442,11 @@ function call({ id, service: name, request }) {
     reject: fail,
     resolve(bytes) {
       try {
-        post({ kind: "answer", id, response: decode(definitionOf(`${service.type}Response`, service.response.schema), bytes) });
+        post({
+          kind: "answer",
+          id,
+          response: decode(definitionOf(`${service.type}Response`, service.response.schema), bytes),
+        });
       } catch (error) {
         fail(error);
       }
@@ -424,7 +468,10 @@ function asset({ id, uri }) {
   const fail = failing(id);
   if (socket?.readyState !== WebSocket.OPEN) return fail("the connection is lost");
   const requestId = nextId++;
-  calls.set(requestId, { reject: fail, resolve: (bytes) => post({ kind: "answer", id, response: bytes }, [bytes.buffer]) });
+  calls.set(requestId, {
+    reject: fail,
+    resolve: (bytes) => post({ kind: "answer", id, response: bytes }, [bytes.buffer]),
+  });
   return send({ op: "fetchAsset", uri, requestId });
 }
 
@@ -438,7 +485,10 @@ function publication({ topic, type, schema }) {
   if (!channel) {
     channel = { id: nextId++, type };
     published.set(topic, channel);
-    send({ op: "advertise", channels: [{ id: channel.id, topic, encoding: "ros1", schemaName: type, schema, schemaEncoding: "ros1msg" }] });
+    send({
+      op: "advertise",
+      channels: [{ id: channel.id, topic, encoding: "ros1", schemaName: type, schema, schemaEncoding: "ros1msg" }],
+    });
   }
   return channel;
 }
@@ -477,13 +527,16 @@ const COMMANDS = {
   call,
   asset,
   publish,
-  advertise: (command) => { if (socket?.readyState === WebSocket.OPEN && capabilities.has("clientPublish")) publication(command); },
+  advertise: (command) => {
+    if (socket?.readyState === WebSocket.OPEN && capabilities.has("clientPublish")) publication(command);
+  },
   unpublish({ topic }) {
     const channel = published.get(topic);
     if (channel) send({ op: "unadvertise", channelIds: [channel.id] });
     published.delete(topic);
   },
-  setParameter: ({ name, value }) => send({ op: "setParameters", parameters: [value === undefined ? { name } : { name, value }], id: `set ${name}` }),
+  setParameter: ({ name, value }) =>
+    send({ op: "setParameters", parameters: [value === undefined ? { name } : { name, value }], id: `set ${name}` }),
 };
 
 self.onmessage = ({ data }) => COMMANDS[data.command](data);

@@ -2,12 +2,17 @@
 
 /** Return [r, g, b] from 0 to 255 of "r; g; b"; white where it is none. */
 export function rgbOf(text) {
-  const found = String(text ?? "").split(";").map((part) => Number(part.trim()));
+  const found = String(text ?? "")
+    .split(";")
+    .map((part) => Number(part.trim()));
   return found.length === 3 && found.every((part) => part >= 0 && part <= 255) ? found : [255, 255, 255];
 }
 
 export const textOf = (rgb) => rgb.map(Math.round).join("; ");
-export const hexOf = (text) => `#${rgbOf(text).map((part) => Math.round(part).toString(16).padStart(2, "0")).join("")}`;
+export const hexOf = (text) =>
+  `#${rgbOf(text)
+    .map((part) => Math.round(part).toString(16).padStart(2, "0"))
+    .join("")}`;
 export const fromHex = (hex) => textOf([1, 3, 5].map((start) => parseInt(hex.slice(start, start + 2), 16)));
 
 /** Write RViz's rainbow color of a value from 0 to 1 into three bytes. */
@@ -18,7 +23,16 @@ export function rainbow(value, into, at) {
   let rest = height - index;
   if (!(index & 1)) rest = 1 - rest;
   const n = Math.round((1 - rest) * 255);
-  const [r, g, b] = index <= 1 ? [n, 0, 255] : index === 2 ? [0, n, 255] : index === 3 ? [0, 255, n] : index === 4 ? [n, 255, 0] : [255, n, 0];
+  const [r, g, b] =
+    index <= 1
+      ? [n, 0, 255]
+      : index === 2
+        ? [0, n, 255]
+        : index === 3
+          ? [0, 255, n]
+          : index === 4
+            ? [n, 255, 0]
+            : [255, n, 0];
   into[at] = r;
   into[at + 1] = g;
   into[at + 2] = b;

@@ -1,4 +1,5 @@
-// The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is kept as it is. Pure.
+// The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is
+// kept as it is. Pure.
 // Source: files that RViz of ROS Noetic saves.
 
 import { t } from "../texts.js";
@@ -6,13 +7,24 @@ import { CLASSES, classOf, complete, newSettings } from "./classes.js";
 
 const MANAGER = "Visualization Manager";
 export const BACKGROUND = "48; 48; 48";
-export const USUAL_VIEW = { Class: "rviz/Orbit", Name: "Current View", Distance: 10, "Focal Point": { X: 0, Y: 0, Z: 0 }, Pitch: 0.785398, Yaw: 0.785398, "Target Frame": "<Fixed Frame>" };
+export const USUAL_VIEW = {
+  Class: "rviz/Orbit",
+  Name: "Current View",
+  Distance: 10,
+  "Focal Point": { X: 0, Y: 0, Z: 0 },
+  Pitch: 0.785398,
+  Yaw: 0.785398,
+  "Target Frame": "<Fixed Frame>",
+};
 const KNOWN_VIEWS = ["rviz/Orbit", "rviz/XYOrbit", "rviz/TopDownOrtho", "rviz/ThirdPersonFollower"];
 
 /** Return the contents that RViz starts with, and TF. */
 export function newConfig() {
   return {
-    Panels: [{ Class: "rviz/Displays", Name: "Displays" }, { Class: "rviz/Views", Name: "Views" }],
+    Panels: [
+      { Class: "rviz/Displays", Name: "Displays" },
+      { Class: "rviz/Views", Name: "Views" },
+    ],
     [MANAGER]: {
       Class: "",
       Displays: [newSettings("Grid"), newSettings("TF")],
@@ -20,9 +32,14 @@ export function newConfig() {
       "Global Options": { "Background Color": BACKGROUND, "Default Light": true, "Fixed Frame": "", "Frame Rate": 30 },
       Name: "root",
       Tools: [
-        { Class: "rviz/Interact", "Hide Inactive Objects": true }, { Class: "rviz/MoveCamera" }, { Class: "rviz/FocusCamera" }, { Class: "rviz/Measure" },
-        { Class: "rviz/SetInitialPose", Topic: "/initialpose" }, { Class: "rviz/SetGoal", Topic: "/move_base_simple/goal" },
-        { Class: "rviz/PublishPoint", "Single click": true, Topic: "/clicked_point" }],
+        { Class: "rviz/Interact", "Hide Inactive Objects": true },
+        { Class: "rviz/MoveCamera" },
+        { Class: "rviz/FocusCamera" },
+        { Class: "rviz/Measure" },
+        { Class: "rviz/SetInitialPose", Topic: "/initialpose" },
+        { Class: "rviz/SetGoal", Topic: "/move_base_simple/goal" },
+        { Class: "rviz/PublishPoint", "Single click": true, Topic: "/clicked_point" },
+      ],
       Value: true,
       Views: { Current: structuredClone(USUAL_VIEW), Saved: null },
     },
@@ -34,8 +51,10 @@ const isObject = (value) => value !== null && typeof value === "object" && !Arra
 /** A configuration: what is shown of it can be read and changed, `raw` is the whole for saving. */
 export class Config {
   constructor(raw = newConfig()) {
-    if (!isObject(raw) || !isObject(raw[MANAGER])) throw new Error(t('not a file of RViz: it has no "{name}"', { name: MANAGER }));
+    if (!isObject(raw) || !isObject(raw[MANAGER]))
+      throw new Error(t('not a file of RViz: it has no "{name}"', { name: MANAGER }));
     this.raw = raw;
+    /** @type {any} */
     this.manager = raw[MANAGER];
     if (!Array.isArray(this.manager.Displays)) this.manager.Displays = [];
     if (!isObject(this.manager["Global Options"])) this.manager["Global Options"] = {};
@@ -78,7 +97,8 @@ export class Config {
 
   /** Return the names and classes of what cannot be shown: displays, and the view where it is of another kind. */
   unknown() {
-    const found = this.displays().filter(({ settings }) => !CLASSES[classOf(settings)] && classOf(settings) !== "Group")
+    const found = this.displays()
+      .filter(({ settings }) => !CLASSES[classOf(settings)] && classOf(settings) !== "Group")
       .map(({ settings }) => `${settings.Name ?? "?"} (${settings.Class ?? "no class"})`);
     if (this.view.Class && !KNOWN_VIEWS.includes(this.view.Class)) found.push(`view ${this.view.Class}`);
     return found;
@@ -108,13 +128,16 @@ export class Config {
 
 /** Return {distance, focus, pitch, yaw, isFlat, scale, angle, target} of a view's settings. */
 export function readView(view) {
-  const numeric = (value, usual) => (Number.isFinite(Number(value)) && value !== null && value !== "" ? Number(value) : usual);
+  const numeric = (value, usual) =>
+    Number.isFinite(Number(value)) && value !== null && value !== "" ? Number(value) : usual;
   const focus = view["Focal Point"] ?? {};
   const isFlat = view.Class === "rviz/TopDownOrtho";
   return {
     kind: isFlat ? "top" : view.Class === "rviz/ThirdPersonFollower" ? "follow" : "orbit",
     distance: Math.max(0.01, numeric(view.Distance, 10)),
-    focus: isFlat ? [numeric(view.X, 0), numeric(view.Y, 0), 0] : [numeric(focus.X, 0), numeric(focus.Y, 0), numeric(focus.Z, 0)],
+    focus: isFlat
+      ? [numeric(view.X, 0), numeric(view.Y, 0), 0]
+      : [numeric(focus.X, 0), numeric(focus.Y, 0), numeric(focus.Z, 0)],
     pitch: numeric(view.Pitch, 0.785398),
     yaw: numeric(view.Yaw, 0.785398),
     scale: Math.max(0.01, numeric(view.Scale, 50)), // pixels of a metre
@@ -128,7 +151,8 @@ export function writeView(view, { kind, distance, focus, pitch, yaw, scale, angl
   const rounded = (value) => Number(value.toPrecision(7));
   view.Class = { top: "rviz/TopDownOrtho", follow: "rviz/ThirdPersonFollower", orbit: "rviz/Orbit" }[kind];
   view["Target Frame"] = target;
-  if (kind === "top") Object.assign(view, { X: rounded(focus[0]), Y: rounded(focus[1]), Scale: rounded(scale), Angle: rounded(angle) });
+  if (kind === "top")
+    Object.assign(view, { X: rounded(focus[0]), Y: rounded(focus[1]), Scale: rounded(scale), Angle: rounded(angle) });
   else {
     Object.assign(view, { Distance: rounded(distance), Pitch: rounded(pitch), Yaw: rounded(yaw) });
     view["Focal Point"] = { X: rounded(focus[0]), Y: rounded(focus[1]), Z: rounded(focus[2]) };

@@ -22,11 +22,13 @@ export class Context {
     this.isInteracting = true; // with interactive markers
     this.lastLook = 0;
     this.lastTime = null;
-    const listen = (topic, isStatic) => link.subscribe({ topic, mode: "all", isOwn: true }, ({ lines = [], error }) => {
-      if (error) this.refused = `${topic}: ${error}`;
-      const now = performance.now();
-      for (const { message } of lines) this.refused = this.frames.insertMessage(message, isStatic, now)[0] ?? this.refused;
-    });
+    const listen = (topic, isStatic) =>
+      link.subscribe({ topic, mode: "all", isOwn: true }, ({ lines = [], error }) => {
+        if (error) this.refused = `${topic}: ${error}`;
+        const now = performance.now();
+        for (const { message } of lines)
+          this.refused = this.frames.insertMessage(message, isStatic, now)[0] ?? this.refused;
+      });
     this.ends = [listen("/tf", false), listen("/tf_static", true), link.watch(["time"], () => this.timed())];
   }
 
@@ -65,7 +67,8 @@ export class Context {
 
   resolveFixed() {
     const { frames } = this;
-    const automatic = () => USUAL_FIXED.find((name) => frames.has(name)) ?? (frames.mainRoot() || this.messageFrame || "map");
+    const automatic = () =>
+      USUAL_FIXED.find((name) => frames.has(name)) ?? (frames.mainRoot() || this.messageFrame || "map");
     const found = this.chosenFrame || automatic();
     if (found === this.fixedFrame) return;
     this.fixedFrame = found;
@@ -77,7 +80,8 @@ export class Context {
   /** Return [level, text] of the fixed frame. */
   fixedStatus() {
     if (this.frames.has(this.fixedFrame)) return this.refused ? [1, this.refused] : [0, "OK"];
-    if (!this.frames.known.size) return [1, t("No tf data.  Actual error: Fixed Frame [{frame}] does not exist", { frame: this.fixedFrame })];
+    if (!this.frames.known.size)
+      return [1, t("No tf data.  Actual error: Fixed Frame [{frame}] does not exist", { frame: this.fixedFrame })];
     return [2, t("Fixed Frame [{frame}] does not exist", { frame: this.fixedFrame })];
   }
 
@@ -126,8 +130,10 @@ export class Context {
   put(item, { p, q }) {
     const { object } = item;
     const { position, quaternion } = object;
-    const isSame = object.visible && Math.abs(position.x - p[0]) + Math.abs(position.y - p[1]) + Math.abs(position.z - p[2]) < 1e-7
-      && Math.abs(quaternion.x * q[0] + quaternion.y * q[1] + quaternion.z * q[2] + quaternion.w * q[3]) > 1 - 1e-12;
+    const isSame =
+      object.visible &&
+      Math.abs(position.x - p[0]) + Math.abs(position.y - p[1]) + Math.abs(position.z - p[2]) < 1e-7 &&
+      Math.abs(quaternion.x * q[0] + quaternion.y * q[1] + quaternion.z * q[2] + quaternion.w * q[3]) > 1 - 1e-12;
     if (isSame && !item.follow) return;
     object.visible = true;
     position.set(...p);

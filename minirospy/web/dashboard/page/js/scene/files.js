@@ -1,4 +1,5 @@
-// .rviz files: the server reads and writes their YAML; the file of the command (`rviz -d FILE`) is saved there, others by the browser.
+// .rviz files: the server reads and writes their YAML; the file of the command (`rviz -d FILE`) is saved there, others
+// by the browser.
 
 import { download, h } from "../dom.js";
 import { t } from "../texts.js";
@@ -28,10 +29,27 @@ export class Files {
     this.name = "";
     this.mayWrite = false;
     this.field = h("input", { type: "file", accept: ".rviz,.yaml,.yml", hidden: true, onchange: () => this.chosen() });
-    this.saveButton = h("button", { type: "button", class: "small", hidden: true, onclick: () => this.run(() => this.save()) }, "Save");
-    this.element = h("span", { class: "files" }, this.field,
-      h("button", { type: "button", class: "small", title: "Open a .rviz file", onclick: () => this.field.click() }, "Open"), this.saveButton,
-      h("button", { type: "button", class: "small", title: "Save as a .rviz file", onclick: () => this.run(() => this.saveAs()) }, "Save as"));
+    this.saveButton = h(
+      "button",
+      { type: "button", class: "small", hidden: true, onclick: () => this.run(() => this.save()) },
+      "Save",
+    );
+    this.element = h(
+      "span",
+      { class: "files" },
+      this.field,
+      h(
+        "button",
+        { type: "button", class: "small", title: "Open a .rviz file", onclick: () => this.field.click() },
+        "Open",
+      ),
+      this.saveButton,
+      h(
+        "button",
+        { type: "button", class: "small", title: "Save as a .rviz file", onclick: () => this.run(() => this.saveAs()) },
+        "Save as",
+      ),
+    );
   }
 
   async run(work) {
@@ -60,7 +78,10 @@ export class Files {
     this.field.value = "";
     if (!file) return undefined;
     return this.run(async () => {
-      if (file.size > MAX_BYTES) throw new Error(t("{name}: {size} bytes, {most} are allowed", { name: file.name, size: file.size, most: MAX_BYTES }));
+      if (file.size > MAX_BYTES)
+        throw new Error(
+          t("{name}: {size} bytes, {most} are allowed", { name: file.name, size: file.size, most: MAX_BYTES }),
+        );
       const { config } = await requested(this.view.link, { parse: await file.text() });
       this.view.open(config);
       this.name ||= file.name;

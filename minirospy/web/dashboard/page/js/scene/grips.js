@@ -32,13 +32,20 @@ export class Grips {
     if (!displays.length) return null;
     const box = stage.canvas.getBoundingClientRect();
     for (const shown of displays.flatMap(({ markers }) => [...markers.values()])) {
-      for (const { label: { span }, control } of shown.labels) {
+      for (const {
+        label: { span },
+        control,
+      } of shown.labels) {
         const { left, right, top, bottom } = span.getBoundingClientRect();
         const isIn = x + box.left >= left && x + box.left <= right && y + box.top >= top && y + box.top <= bottom;
         if (control && isIn && !span.hidden) return control.mode === NONE ? null : { control, point: null };
       }
     }
-    const hit = stage.hits(x, y, displays.flatMap((display) => display.groups()))[0];
+    const hit = stage.hits(
+      x,
+      y,
+      displays.flatMap((display) => display.groups()),
+    )[0];
     let object = hit?.object;
     while (object && !object.userData.control) object = object.parent;
     const control = object?.userData.control;
@@ -59,7 +66,13 @@ export class Grips {
 
   hintOf({ mode, description, shown }) {
     const words = mode === BUTTON ? t("click: press") : mode === MENU ? t("click: menu") : t("drag: move the marker");
-    return [description || shown.description || shown.name, words, mode !== MENU && shown.menu.length ? t("right click, or hold: menu") : ""].filter(Boolean).join(" · ");
+    return [
+      description || shown.description || shown.name,
+      words,
+      mode !== MENU && shown.menu.length ? t("right click, or hold: menu") : "",
+    ]
+      .filter(Boolean)
+      .join(" · ");
   }
 
   leave() {
@@ -79,12 +92,21 @@ export class Grips {
       return false;
     }
     event.preventDefault();
-    this.held = { control, point, button: event.button, at: [x, y], drag: null, isChanged: false, reported: performance.now() };
+    this.held = {
+      control,
+      point,
+      button: event.button,
+      at: [x, y],
+      drag: null,
+      isChanged: false,
+      reported: performance.now(),
+    };
     if (event.button === 2) return true;
     // As RViz: a pose comes before each press and release.
     for (const each of [POSE_UPDATE, MOUSE_DOWN]) this.report(each, { point });
     if (isDragged(control.mode) && point) this.startDrag(x, y);
-    if (event.pointerType === "touch" && control.shown.menu.length) this.held.long = setTimeout(() => this.openMenu(this.end()), LONG_MS);
+    if (event.pointerType === "touch" && control.shown.menu.length)
+      this.held.long = setTimeout(() => this.openMenu(this.end()), LONG_MS);
     return true;
   }
 
@@ -95,7 +117,13 @@ export class Grips {
     const ray = this.ray(x, y);
     shown.hold();
     held.rotation = control.rotation;
-    held.drag = new Drag({ mode: control.mode, pose: shown.pose, axis: shown.axisOf(control), grabbed: apply(invert(shown.outer), held.point), ray });
+    held.drag = new Drag({
+      mode: control.mode,
+      pose: shown.pose,
+      axis: shown.axisOf(control),
+      grabbed: apply(invert(shown.outer), held.point),
+      ray,
+    });
     held.timer = setInterval(() => this.reportPose(), REPORT_MS);
     this.light(control, 0.5);
   }
@@ -111,7 +139,13 @@ export class Grips {
     held.long = null;
     held.at = [x, y];
     const control = this.current();
-    const pose = held.drag.move(this.ray(x, y), { ...this.directions(), dx, dy, isFar: event.shiftKey, isTurn: event.ctrlKey });
+    const pose = held.drag.move(this.ray(x, y), {
+      ...this.directions(),
+      dx,
+      dy,
+      isFar: event.shiftKey,
+      isTurn: event.ctrlKey,
+    });
     if (!pose || !control) return true;
     control.shown.pose = pose;
     control.rotation = held.rotation + held.drag.angle;
@@ -183,13 +217,16 @@ export class Grips {
 
   openMenu(held) {
     const { menu } = held.control.shown;
-    if (menu.length) this.menu.open(...held.at, menu, ({ id }) => this.report(MENU_SELECT, { point: held.point, entry: id }, held));
+    if (menu.length)
+      this.menu.open(...held.at, menu, ({ id }) => this.report(MENU_SELECT, { point: held.point, entry: id }, held));
   }
 
   // --- the picture
 
   light(control, level) {
-    control?.group.traverse(({ material }) => { for (const each of [material ?? []].flat()) each.emissive?.setScalar(level); });
+    control?.group.traverse(({ material }) => {
+      for (const each of [material ?? []].flat()) each.emissive?.setScalar(level);
+    });
     this.view.stage.invalidate();
   }
 
@@ -205,7 +242,11 @@ export class Grips {
     const { stage } = this.view;
     const { elements: m } = stage.camera.matrixWorld;
     const { q } = invert(this.held.control.shown.outer);
-    const [right, up, forward] = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [-m[8], -m[9], -m[10]]];
+    const [right, up, forward] = [
+      [m[0], m[1], m[2]],
+      [m[4], m[5], m[6]],
+      [-m[8], -m[9], -m[10]],
+    ];
     const depth = this.held.point.reduce((sum, part, index) => sum + (part - m[12 + index]) * forward[index], 0);
     const metres = (stage.view.kind === "top" ? 1 : depth) / stage.pixelsPerMetre;
     return { right: rotate(q, right), up: rotate(q, up), forward: rotate(q, forward), metres };

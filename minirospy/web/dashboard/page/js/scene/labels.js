@@ -1,4 +1,5 @@
-// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names that would cover
+// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names
+// that would cover
 // each other are stacked.
 
 import { Vector3 } from "../../vendor/three/three.min.js";
@@ -12,7 +13,8 @@ const TEXT_SIZE = 0.91; // of RViz's letters: a marker's scale.z is more than th
 function stacked(taken, x, y, width, line) {
   let top = y;
   const covers = (other) => Math.abs(other.top - top) < line && x < other.x + other.width && other.x < x + width;
-  for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++) top = other.top + line;
+  for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++)
+    top = other.top + line;
   taken.push({ x, top, width });
   return top;
 }
@@ -23,9 +25,19 @@ export class Labels {
     this.all = new Set();
   }
 
-  /** Return a new label: its place is a Vector3 in the fixed frame; set isShown. Text has a height in metres, or none for names. */
+  /**
+   * Return a new label: its place is a Vector3 in the fixed frame; set isShown. Text has a height in metres, or none
+   * for names.
+   */
   add({ text, kind = "name", metres = null, color = null }) {
-    const label = { text, metres, place: new Vector3(), isShown: false, span: h("span", { class: `label ${kind}` }, text), width: 0 };
+    const label = {
+      text,
+      metres,
+      place: new Vector3(),
+      isShown: false,
+      span: h("span", { class: `label ${kind}` }, text),
+      width: 0,
+    };
     label.span.hidden = true;
     if (color) label.span.style.color = color;
     this.all.add(label);
@@ -49,7 +61,13 @@ export class Labels {
     const place = new Vector3();
     const taken = [];
     const line = LINE * devicePixelRatio;
-    Object.assign(context, { globalAlpha: 1, textBaseline: "top", strokeStyle: "#000", lineWidth: 3 * devicePixelRatio, lineJoin: "round" });
+    Object.assign(context, {
+      globalAlpha: 1,
+      textBaseline: "top",
+      strokeStyle: "#000",
+      lineWidth: 3 * devicePixelRatio,
+      lineJoin: "round",
+    });
     for (const label of this.all) {
       place.copy(label.place).project(camera);
       if (!label.isShown || !(Math.max(...place.toArray().map(Math.abs)) < 1)) continue;
@@ -63,7 +81,10 @@ export class Labels {
         context.strokeText(text, x, top);
         context.fillText(text, x, top);
       } else {
-        const size = (TEXT_SIZE * label.metres * camera.projectionMatrix.elements[5] * height) / 2 / camera.position.distanceTo(label.place);
+        const size =
+          (TEXT_SIZE * label.metres * camera.projectionMatrix.elements[5] * height) /
+          2 /
+          camera.position.distanceTo(label.place);
         context.font = `${Math.min(300, Math.max(3, size))}px "Liberation Sans", Arial, sans-serif`;
         context.textAlign = "center";
         context.fillText(text, x, y - size / 2);
@@ -78,7 +99,8 @@ export class Labels {
     const found = [];
     for (const label of this.all) {
       place.copy(label.place).project(stage.camera);
-      const isSeen = label.isShown && Math.abs(place.z) <= 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2 && count < MOST;
+      const isSeen =
+        label.isShown && Math.abs(place.z) <= 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2 && count < MOST;
       if (label.span.hidden === isSeen) label.span.hidden = !isSeen;
       if (!isSeen) continue;
       count += 1;

@@ -1,5 +1,7 @@
-// Which interactive markers a server has, by the numbers of its updates: a lost update is noticed, and all markers are fetched again. Pure.
-// Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Getting%20Started, visualization_msgs/InteractiveMarkerUpdate.
+// Which interactive markers a server has, by the numbers of its updates: a lost update is noticed, and all markers are
+// fetched again. Pure.
+// Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Getting%20Started,
+// visualization_msgs/InteractiveMarkerUpdate.
 
 import { t } from "../texts.js";
 
@@ -10,7 +12,9 @@ const QUIET_MS = 2000; // servers publish every half second
 
 export class MarkerUpdates {
   constructor() {
-    this.servers = new Map(); // server_id -> {sequence: null until all its markers are known, full, waiting, updated: the time of the last update}
+    // server_id -> {sequence: null until all its markers are known, full, waiting, updated: the time of the last
+    // update}
+    this.servers = new Map();
   }
 
   /** Return whether a server's markers are not known. */
@@ -39,14 +43,18 @@ export class MarkerUpdates {
   /** Return [level, text] by server. */
   statuses(now) {
     return [...this.servers].map(([id, { sequence, lost, updated }]) => {
-      if (now - updated > QUIET_MS) return [id, [1, t("No update received for {count} seconds.", { count: Math.round((now - updated) / 1000) })]];
+      if (now - updated > QUIET_MS)
+        return [id, [1, t("No update received for {count} seconds.", { count: Math.round((now - updated) / 1000) })]];
       return [id, sequence === null ? [1, lost || t("Waiting for all markers.")] : [0, "OK"]];
     });
   }
 
   server(id) {
     if (!this.servers.has(id)) {
-      if (this.servers.size >= MAX_SERVERS) throw new Error(t('more than {count} servers: "{name}" is left out', { count: MAX_SERVERS, name: id.slice(0, 200) }));
+      if (this.servers.size >= MAX_SERVERS)
+        throw new Error(
+          t('more than {count} servers: "{name}" is left out', { count: MAX_SERVERS, name: id.slice(0, 200) }),
+        );
       this.servers.set(id, { id, sequence: null, full: null, waiting: [], updated: Infinity, lost: "" });
     }
     return this.servers.get(id);
@@ -57,12 +65,16 @@ export class MarkerUpdates {
     const expected = known.sequence + (isAlive ? 0 : 1);
     if (message.seq_num !== expected) {
       Object.assign(known, { sequence: null, full: null, waiting: [message] });
-      const text = isAlive ? "Sequence number of keep-alive is out of order. Expected: {expected} Received: {found}" : "Sequence number of update is out of order. Expected: {expected} Received: {found}";
+      const text = isAlive
+        ? "Sequence number of keep-alive is out of order. Expected: {expected} Received: {found}"
+        : "Sequence number of update is out of order. Expected: {expected} Received: {found}";
       known.lost = t(text, { expected, found: message.seq_num });
       return [];
     }
     known.sequence = expected;
-    return isAlive ? [] : [{ server: known.id, isAll: false, markers: message.markers, poses: message.poses, erases: message.erases }];
+    return isAlive
+      ? []
+      : [{ server: known.id, isAll: false, markers: message.markers, poses: message.poses, erases: message.erases }];
   }
 
   /** Start from all markers, where the updates that came before and after join them without a gap. */
@@ -73,7 +85,8 @@ export class MarkerUpdates {
     if (later.length && (later[0].type === KEEP_ALIVE || later[0].seq_num !== full.seq_num + 1)) return [];
     Object.assign(known, { sequence: full.seq_num, full: null, waiting: [], lost: "" });
     const found = [{ server: known.id, isAll: true, markers: full.markers, poses: [], erases: [] }];
-    for (const message of later) found.push(...(known.sequence === null ? this.update(message, known.updated) : this.next(known, message)));
+    for (const message of later)
+      found.push(...(known.sequence === null ? this.update(message, known.updated) : this.next(known, message)));
     return found;
   }
 }

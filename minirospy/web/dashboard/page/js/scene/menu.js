@@ -6,8 +6,15 @@ import { t } from "../texts.js";
 export class Menu {
   constructor(frame) {
     this.frame = frame;
-    this.element = h("div", { class: "marker-menu", role: "menu", hidden: true, onkeydown: (event) => this.key(event) });
-    this.outside = (event) => { if (!this.element.contains(event.target)) this.close(); };
+    this.element = h("div", {
+      class: "marker-menu",
+      role: "menu",
+      hidden: true,
+      onkeydown: (event) => this.key(event),
+    });
+    this.outside = (event) => {
+      if (!this.element.contains(event.target)) this.close();
+    };
     frame.append(this.element);
   }
 
@@ -38,11 +45,21 @@ export class Menu {
       const { title, isChecked, children, command } = entry;
       const isParent = children.length > 0;
       const below = isParent ? h("div", { class: "submenu", hidden: true }) : null;
-      const button = h("button", {
-        type: "button", role: isChecked === null ? "menuitem" : "menuitemcheckbox", "aria-checked": isChecked === null ? null : String(isChecked),
-        "aria-expanded": isParent ? "false" : null, disabled: Boolean(command) && !isParent,
-        title: command ? t("A page starts no programs: {command}", { command }) : null, onclick: () => (isParent ? this.unfold(button, below, children) : this.chosen(entry)),
-      }, h("span", {}, isChecked === null ? "" : isChecked ? "☑" : "☐"), h("span", {}, title), h("span", {}, isParent ? "▸" : ""));
+      const button = h(
+        "button",
+        {
+          type: "button",
+          role: isChecked === null ? "menuitem" : "menuitemcheckbox",
+          "aria-checked": isChecked === null ? null : String(isChecked),
+          "aria-expanded": isParent ? "false" : null,
+          disabled: Boolean(command) && !isParent,
+          title: command ? t("A page starts no programs: {command}", { command }) : null,
+          onclick: () => (isParent ? this.unfold(button, below, children) : this.chosen(entry)),
+        },
+        h("span", {}, isChecked === null ? "" : isChecked ? "☑" : "☐"),
+        h("span", {}, title),
+        h("span", {}, isParent ? "▸" : ""),
+      );
       return [button, below];
     });
   }

@@ -1,13 +1,24 @@
 // Meshes of package://: fetched through the bridge once, read by their kind, copied for each use.
 
-import { BufferAttribute, ColladaLoader, Group, LoadingManager, Mesh, MeshLambertMaterial, STLLoader } from "../../vendor/three/three.min.js";
+import {
+  BufferAttribute,
+  ColladaLoader,
+  Group,
+  LoadingManager,
+  Mesh,
+  MeshLambertMaterial,
+  STLLoader,
+} from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
 import { bodyMaterial } from "./shapes.js";
 
 const cache = new WeakMap(); // link -> Map of uri -> promise of an object
 const EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=";
 
-/** Return a promise of an object: a copy with its own materials. `paint` {rgb, alpha} is for meshes without colors, or instead of them. */
+/**
+ * Return a promise of an object: a copy with its own materials. `paint` {rgb, alpha} is for meshes without colors, or
+ * instead of them.
+ */
 export async function loadMesh(link, uri, paint) {
   if (!cache.has(link)) cache.set(link, new Map());
   const known = cache.get(link);
@@ -21,7 +32,13 @@ export async function loadMesh(link, uri, paint) {
   const copy = object.clone(true);
   copy.traverse((each) => {
     if (!each.isMesh) return;
-    const materials = [each.material].flat().map((material) => (paint && (paint.isForced || !hasColors) ? bodyMaterial(paint.rgb, paint.alpha) : faded(material, paint?.alpha ?? 1)));
+    const materials = [each.material]
+      .flat()
+      .map((material) =>
+        paint && (paint.isForced || !hasColors)
+          ? bodyMaterial(paint.rgb, paint.alpha)
+          : faded(material, paint?.alpha ?? 1),
+      );
     each.material = Array.isArray(each.material) ? materials : materials[0];
     each.geometry = each.geometry.clone();
   });
@@ -29,7 +46,11 @@ export async function loadMesh(link, uri, paint) {
 }
 
 function faded(material, alpha) {
-  const copy = new MeshLambertMaterial({ map: material.map ?? null, side: material.side, vertexColors: material.vertexColors });
+  const copy = new MeshLambertMaterial({
+    map: material.map ?? null,
+    side: material.side,
+    vertexColors: material.vertexColors,
+  });
   if (material.color) copy.color.copy(material.color);
   copy.opacity = (material.opacity ?? 1) * alpha;
   copy.transparent = copy.opacity < 0.9998;
@@ -37,7 +58,8 @@ function faded(material, alpha) {
 }
 
 async function read(link, uri) {
-  if (!uri.startsWith("package://")) throw new Error(t("{name}: only meshes of package:// can be loaded", { name: uri || "?" }));
+  if (!uri.startsWith("package://"))
+    throw new Error(t("{name}: only meshes of package:// can be loaded", { name: uri || "?" }));
   const bytes = await link.asset(uri);
   const kind = /\.(\w+)$/.exec(uri)?.[1].toLowerCase();
   if (kind === "stl") return { object: readStl(bytes), hasColors: false };
@@ -66,9 +88,12 @@ function readObj(text) {
     const [word, ...rest] = line.trim().split(/\s+/);
     if (word === "v") vertices.push(rest.slice(0, 3).map(Number));
     else if (word === "f") {
-      const corners = rest.map((part) => Number(part.split("/")[0])).map((index) => vertices[index < 0 ? vertices.length + index : index - 1]);
+      const corners = rest
+        .map((part) => Number(part.split("/")[0]))
+        .map((index) => vertices[index < 0 ? vertices.length + index : index - 1]);
       if (corners.includes(undefined)) throw new Error(t("the mesh names a vertex that it does not have"));
-      for (let corner = 2; corner < corners.length; corner++) for (const each of [corners[0], corners[corner - 1], corners[corner]]) positions.push(...each);
+      for (let corner = 2; corner < corners.length; corner++)
+        for (const each of [corners[0], corners[corner - 1], corners[corner]]) positions.push(...each);
     }
   }
   const mesh = new Mesh(new STLLoader().parse("solid x\nendsolid x"), bodyMaterial([200, 200, 200]));
@@ -92,10 +117,13 @@ async function readDae(link, uri, bytes) {
   }
   const manager = new LoadingManager();
   manager.setURLModifier((url) => pictures.get(url) ?? EMPTY_PICTURE);
-  manager.onLoad = () => { for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url); };
+  manager.onLoad = () => {
+    for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
+  };
   const parsed = new ColladaLoader(manager).parse(text, "");
   if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
-  // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and so does RViz.
+  // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
+  // so does RViz.
   parsed.scene.rotation.set(0, 0, 0);
   const group = new Group();
   group.add(parsed.scene);

@@ -21,11 +21,23 @@ export class Panel {
     this.automatic = h("input", { type: "checkbox", onchange: () => view.setAutomatic(this.automatic.checked) });
     this.choice = h("select", { class: "grow", "aria-label": "Add a display", onchange: () => this.add() });
     this.list = h("div", { class: "displays" });
-    this.element = h("div", { class: "panel side details scene-side" },
+    this.element = h(
+      "div",
+      { class: "panel side details scene-side" },
       h("div", { class: "bar" }, this.choice),
-      h("div", { class: "bar between" }, h("label", { title: "Add a display for each topic that can be shown" }, this.automatic, "show new topics"), h("label", {}, t("background"), this.background)),
-      h("div", { class: "display", "data-name": "Global Status" }, h("div", { class: "display-head" }, this.globalDot, h("strong", {}, "Fixed frame"), this.globalText)),
-      this.list);
+      h(
+        "div",
+        { class: "bar between" },
+        h("label", { title: "Add a display for each topic that can be shown" }, this.automatic, "show new topics"),
+        h("label", {}, t("background"), this.background),
+      ),
+      h(
+        "div",
+        { class: "display", "data-name": "Global Status" },
+        h("div", { class: "display-head" }, this.globalDot, h("strong", {}, "Fixed frame"), this.globalText),
+      ),
+      this.list,
+    );
     for (const name of ["pointerdown", "focus"]) this.choice.addEventListener(name, () => this.fillChoice());
     this.fillChoice();
   }
@@ -35,9 +47,26 @@ export class Panel {
     const key = topics.map(({ topic }) => topic).join(" ");
     if (key === this.choices) return;
     this.choices = key;
-    fill(this.choice, h("option", { value: "" }, "Add a display …"),
-      topics.length ? h("optgroup", { label: "By topic" }, topics.map(({ topic, type }) => h("option", { value: `${classForType(type)} ${topic}` }, `${topic} (${classForType(type)})`))) : null,
-      h("optgroup", { label: "By kind" }, Object.keys(CLASSES).filter((name) => name !== "Wrench").map((name) => h("option", { value: name }, name))));
+    fill(
+      this.choice,
+      h("option", { value: "" }, "Add a display …"),
+      topics.length
+        ? h(
+            "optgroup",
+            { label: "By topic" },
+            topics.map(({ topic, type }) =>
+              h("option", { value: `${classForType(type)} ${topic}` }, `${topic} (${classForType(type)})`),
+            ),
+          )
+        : null,
+      h(
+        "optgroup",
+        { label: "By kind" },
+        Object.keys(CLASSES)
+          .filter((name) => name !== "Wrench")
+          .map((name) => h("option", { value: name }, name)),
+      ),
+    );
   }
 
   add() {
@@ -60,7 +89,10 @@ export class Panel {
   fill() {
     this.rows.clear();
     this.background.value = hexOf(this.view.config.background);
-    refill(this.list, this.view.config.displays().map(({ settings, depth, isOn }) => this.row(settings, depth, isOn)));
+    refill(
+      this.list,
+      this.view.config.displays().map(({ settings, depth, isOn }) => this.row(settings, depth, isOn)),
+    );
     this.isStale = true;
     this.look();
   }
@@ -69,11 +101,27 @@ export class Panel {
     const name = String(settings.Name ?? classOf(settings));
     const isKnown = Boolean(CLASSES[classOf(settings)]) || classOf(settings) === "Group";
     const dot = h("span", { class: "dot" });
-    const title = h("button", { type: "button", class: "display-name", "aria-expanded": "false", title: settings.Class, onclick: () => this.toggle(settings) }, name);
-    const isEnabled = h("input", { type: "checkbox", checked: settings.Enabled !== false, disabled: !isKnown, "aria-label": t("show {name}", { name }), onchange: () => {
-      settings.Enabled = settings.Value = isEnabled.checked;
-      this.view.set(settings, "Enabled");
-    } });
+    const title = h(
+      "button",
+      {
+        type: "button",
+        class: "display-name",
+        "aria-expanded": "false",
+        title: settings.Class,
+        onclick: () => this.toggle(settings),
+      },
+      name,
+    );
+    const isEnabled = h("input", {
+      type: "checkbox",
+      checked: settings.Enabled !== false,
+      disabled: !isKnown,
+      "aria-label": t("show {name}", { name }),
+      onchange: () => {
+        settings.Enabled = settings.Value = isEnabled.checked;
+        this.view.set(settings, "Enabled");
+      },
+    });
     const body = h("div", { class: "display-body", hidden: true });
     const row = h("div", { class: "display" }, h("div", { class: "display-head" }, isEnabled, dot, title), body);
     row.dataset.name = name;
@@ -105,12 +153,31 @@ export class Panel {
     const { settings, body, isKnown } = found;
     found.status = h("ul", { class: "display-status" });
     found.parts = h("div", { class: "parts" });
-    const rows = (CLASSES[classOf(settings)]?.settings ?? []).filter(([, , , isShown]) => !isShown || isShown(settings)).map((each) => this.editor(settings, each));
+    const rows = (CLASSES[classOf(settings)]?.settings ?? [])
+      .filter(([, , , isShown]) => !isShown || isShown(settings))
+      .map((each) => this.editor(settings, each));
     const topic = CLASSES[classOf(settings)]?.isLinked ? getSetting(settings, topicKeyOf(classOf(settings))) : "";
-    fill(body, found.status, isKnown ? rows : h("p", { class: "hint" }, t("{name} cannot be shown here. It is kept when the file is saved.", { name: settings.Class ?? t("a display without a class") })),
-      topic ? h("a", { href: `#/image?topic=${encodeURIComponent(topic)}` }, t("open the view Image")) : null, found.parts,
-      h("div", { class: "bar" }, h("button", { type: "button", class: "small", onclick: () => this.rename(settings) }, "Rename"),
-        h("button", { type: "button", class: "small", onclick: () => this.view.remove(settings) }, "Remove")));
+    fill(
+      body,
+      found.status,
+      isKnown
+        ? rows
+        : h(
+            "p",
+            { class: "hint" },
+            t("{name} cannot be shown here. It is kept when the file is saved.", {
+              name: settings.Class ?? t("a display without a class"),
+            }),
+          ),
+      topic ? h("a", { href: `#/image?topic=${encodeURIComponent(topic)}` }, t("open the view Image")) : null,
+      found.parts,
+      h(
+        "div",
+        { class: "bar" },
+        h("button", { type: "button", class: "small", onclick: () => this.rename(settings) }, "Rename"),
+        h("button", { type: "button", class: "small", onclick: () => this.view.remove(settings) }, "Remove"),
+      ),
+    );
   }
 
   rename(settings) {
@@ -142,12 +209,34 @@ export class Panel {
       this.look();
     };
     const editors = {
-      bool: () => h("input", { type: "checkbox", checked: value === true, onchange: ({ target }) => set(target.checked) }),
-      number: () => h("input", { type: "number", step: "any", value: Number(Number(value).toPrecision(6)), onchange: ({ target }) => { if (target.value !== "" && target.validity.valid) set(Number(target.value)); } }),
-      color: () => h("input", { type: "color", value: hexOf(value), onchange: ({ target }) => set(fromHex(target.value)) }),
-      choice: () => h("select", { value, onchange: ({ target }) => set(target.value) }, [...new Set([...options, value].filter(Boolean))].map((each) => h("option", { value: each, selected: each === value }, each))),
+      bool: () =>
+        h("input", { type: "checkbox", checked: value === true, onchange: ({ target }) => set(target.checked) }),
+      number: () =>
+        h("input", {
+          type: "number",
+          step: "any",
+          value: Number(Number(value).toPrecision(6)),
+          onchange: ({ target }) => {
+            if (target.value !== "" && target.validity.valid) set(Number(target.value));
+          },
+        }),
+      color: () =>
+        h("input", { type: "color", value: hexOf(value), onchange: ({ target }) => set(fromHex(target.value)) }),
+      choice: () =>
+        h(
+          "select",
+          { value, onchange: ({ target }) => set(target.value) },
+          [...new Set([...options, value].filter(Boolean))].map((each) =>
+            h("option", { value: each, selected: each === value }, each),
+          ),
+        ),
       text: () => h("input", { type: "text", value: value ?? "", onchange: ({ target }) => set(target.value.trim()) }),
-      topic: () => this.listed(value, set, () => [...this.view.link.channels.values()].filter(({ type }) => (types ?? CLASSES[classOf(settings)].types).includes(type)).map(({ topic }) => topic)),
+      topic: () =>
+        this.listed(value, set, () =>
+          [...this.view.link.channels.values()]
+            .filter(({ type }) => (types ?? CLASSES[classOf(settings)].types).includes(type))
+            .map(({ topic }) => topic),
+        ),
       frame: () => this.listed(value, set, () => ["<Fixed Frame>", ...this.view.context.frames.names()]),
     };
     const control = editors[kind]();
@@ -160,9 +249,23 @@ export class Panel {
   listed(value, set, names) {
     const id = `names-${nextId++}`;
     const list = h("datalist", { id });
-    return h("span", { class: "listed" }, h("input", {
-      type: "text", value: value ?? "", list: id, autocomplete: "off", onfocus: () => fill(list, names().map((each) => h("option", { value: each }))),
-      onchange: ({ target }) => set(target.value.trim()) }), list);
+    return h(
+      "span",
+      { class: "listed" },
+      h("input", {
+        type: "text",
+        value: value ?? "",
+        list: id,
+        autocomplete: "off",
+        onfocus: () =>
+          fill(
+            list,
+            names().map((each) => h("option", { value: each })),
+          ),
+        onchange: ({ target }) => set(target.value.trim()),
+      }),
+      list,
+    );
   }
 
   // --- statuses
@@ -190,7 +293,11 @@ export class Panel {
     }
     this.mark(dot, display.level());
     row.dataset.level = LEVELS[display.level()];
-    if (status) fill(status, [...display.status].map(([name, [level, text]]) => h("li", { class: LEVELS[level] }, `${name}: ${text}`)));
+    if (status)
+      fill(
+        status,
+        [...display.status].map(([name, [level, text]]) => h("li", { class: LEVELS[level] }, `${name}: ${text}`)),
+      );
     if (parts && display.parts) this.fillParts(parts, settings, display);
   }
 
@@ -200,11 +307,24 @@ export class Panel {
     const key = found.map(({ name, isShown }) => `${name} ${isShown}`).join("\n");
     if (element.dataset.key === key) return;
     element.dataset.key = key;
-    refill(element, found.map(({ name, isShown, set }) => h("label", { class: "part" },
-      h("input", { type: "checkbox", checked: isShown, onchange: ({ target }) => {
-        set(target.checked);
-        this.view.set(settings, "Frames");
-      } }), name)));
+    refill(
+      element,
+      found.map(({ name, isShown, set }) =>
+        h(
+          "label",
+          { class: "part" },
+          h("input", {
+            type: "checkbox",
+            checked: isShown,
+            onchange: ({ target }) => {
+              set(target.checked);
+              this.view.set(settings, "Frames");
+            },
+          }),
+          name,
+        ),
+      ),
+    );
   }
 
   mark(dot, level) {

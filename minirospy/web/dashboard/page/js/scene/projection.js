@@ -11,12 +11,28 @@ export const infoTopicOf = (topic) => `${topic.slice(0, topic.lastIndexOf("/"))}
 export function projectionOf({ width, height, P }, zoom = 1) {
   const [fx, , cx, tx, , fy, cy, ty] = P;
   if (![...P].every(Number.isFinite)) throw new Error(t("Contains invalid floating point values (nans or infs)"));
-  if (!width || !height) throw new Error(t("Could not determine width/height of image due to malformed CameraInfo (either width or height is 0)"));
+  if (!width || !height)
+    throw new Error(
+      t("Could not determine width/height of image due to malformed CameraInfo (either width or height is 0)"),
+    );
   if (!fx || !fy) throw new Error(t("the camera is not calibrated: P of its CameraInfo has no focal length"));
   const matrix = [
-    ((2 * fx) / width) * zoom, 0, 0, 0,
-    0, ((2 * fy) / height) * zoom, 0, 0,
-    (1 - (2 * cx) / width) * zoom, ((2 * cy) / height - 1) * zoom, -(FAR + NEAR) / (FAR - NEAR), -1,
-    0, 0, (-2 * FAR * NEAR) / (FAR - NEAR), 0];
+    ((2 * fx) / width) * zoom,
+    0,
+    0,
+    0,
+    0,
+    ((2 * fy) / height) * zoom,
+    0,
+    0,
+    (1 - (2 * cx) / width) * zoom,
+    ((2 * cy) / height - 1) * zoom,
+    -(FAR + NEAR) / (FAR - NEAR),
+    -1,
+    0,
+    0,
+    (-2 * FAR * NEAR) / (FAR - NEAR),
+    0,
+  ];
   return { matrix, offset: [-tx / fx, -ty / fy, 0] };
 }

@@ -10,4 +10,5 @@ const DEFINITIONS = {
 };
 
 /** Return a definition with those that it uses, as a bridge wants it. */
-export const schema = (own) => [own, ...Object.entries(DEFINITIONS).map(([name, text]) => `MSG: ${name}\n${text}`)].join(`\n${LINE}\n`);
+export const schema = (own) =>
+  [own, ...Object.entries(DEFINITIONS).map(([name, text]) => `MSG: ${name}\n${text}`)].join(`\n${LINE}\n`);

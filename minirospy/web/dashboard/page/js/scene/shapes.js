@@ -1,8 +1,31 @@
-// Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are shared.
+// Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are
+// shared.
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Group, InstancedBufferAttribute, InstancedMesh, LineBasicMaterial, LineMaterial, LineSegments,
-  LineSegments2, LineSegmentsGeometry, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, Points, Quaternion, ShaderMaterial, SphereGeometry, Vector3 } from "../../vendor/three/three.min.js";
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  DoubleSide,
+  Group,
+  InstancedBufferAttribute,
+  InstancedMesh,
+  LineBasicMaterial,
+  LineMaterial,
+  LineSegments,
+  LineSegments2,
+  LineSegmentsGeometry,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Points,
+  Quaternion,
+  ShaderMaterial,
+  SphereGeometry,
+  Vector3,
+} from "../../vendor/three/three.min.js";
 
 const X_AXIS = new Vector3(1, 0, 0);
 // Cylinder and cone along x from 0 to 1, of diameter 1: an arrow's parts, scaled.
@@ -11,21 +34,41 @@ const HEAD = new ConeGeometry(0.5, 1, 20).rotateZ(-Math.PI / 2).translate(0.5, 0
 export const BOX = new BoxGeometry(1, 1, 1);
 export const BALL = new SphereGeometry(0.5, 24, 16);
 export const ROLL = new CylinderGeometry(0.5, 0.5, 1, 28).rotateX(Math.PI / 2); // along z
-// Boxes of lists and clouds have the same light from everywhere: by their sides, +x, -x, +y, -y, +z, -z, as measured in RViz.
+// Boxes of lists and clouds have the same light from everywhere: by their sides, +x, -x, +y, -y, +z, -z, as measured in
+// RViz.
 const CRATE = new BoxGeometry(1, 1, 1);
-CRATE.setAttribute("color", new BufferAttribute(Float32Array.from([0.6, 0.6, 0.4, 1, 0.9, 0.5].flatMap((light) => Array(12).fill(light))), 3));
+CRATE.setAttribute(
+  "color",
+  new BufferAttribute(Float32Array.from([0.6, 0.6, 0.4, 1, 0.9, 0.5].flatMap((light) => Array(12).fill(light))), 3),
+);
 const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL, CRATE]);
 
-/** Return the material of a body: color [r, g, b] of 0 to 255. */
+/**
+ * Return the material of a body.
+ * @param {number[]} rgb from 0 to 255
+ */
 export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
-  const material = new MeshLambertMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: alpha >= 0.9998, ...options });
+  const material = new MeshLambertMaterial({
+    transparent: alpha < 0.9998,
+    opacity: alpha,
+    depthWrite: alpha >= 0.9998,
+    ...options,
+  });
   material.color.setRGB(r / 255, g / 255, b / 255);
   return material;
 }
 
-/** Return the material of what no light changes: color [r, g, b] of 0 to 255. */
+/**
+ * Return the material of what no light changes.
+ * @param {number[]} rgb from 0 to 255
+ */
 export function plainMaterial([r, g, b], alpha = 1, options = {}) {
-  const material = new MeshBasicMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: alpha >= 0.9998, ...options });
+  const material = new MeshBasicMaterial({
+    transparent: alpha < 0.9998,
+    opacity: alpha,
+    depthWrite: alpha >= 0.9998,
+    ...options,
+  });
   material.color.setRGB(r / 255, g / 255, b / 255);
   return material;
 }
@@ -49,9 +92,16 @@ export function directed(object, from, to) {
   return object;
 }
 
-const AXES = [[255, 0, 0], [0, 255, 0], [0, 0, 255]].map((rgb) => bodyMaterial(rgb));
+const AXES = [
+  [255, 0, 0],
+  [0, 255, 0],
+  [0, 0, 255],
+].map((rgb) => bodyMaterial(rgb));
 
-/** Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is here. */
+/**
+ * Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is
+ * here.
+ */
 export function axes(length, radius) {
   const group = new Group();
   AXES.forEach((material, index) => {
@@ -64,11 +114,22 @@ export function axes(length, radius) {
   return group;
 }
 
-/** Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three numbers of 0 to 1 each. */
-export function segments(positions, { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 1.5, metres = null } = {}) {
+/**
+ * Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three
+ * numbers of 0 to 1 each.
+ */
+export function segments(
+  positions,
+  { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 1.5, metres = null } = {},
+) {
   const geometry = new LineSegmentsGeometry();
   geometry.setPositions(positions);
-  const material = new LineMaterial({ linewidth: metres ?? pixels, worldUnits: metres !== null, transparent: alpha < 0.9998, opacity: alpha });
+  const material = new LineMaterial({
+    linewidth: metres ?? pixels,
+    worldUnits: metres !== null,
+    transparent: alpha < 0.9998,
+    opacity: alpha,
+  });
   if (colors) {
     geometry.setColors(colors);
     material.vertexColors = true;
@@ -117,21 +178,46 @@ void main() {
   gl_FragColor = vec4(shade * light, opacity);
 }`;
 
-/** Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres (`grows`: times z) or pixels. */
-export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, size, isMetres, grows = false, isRound = false }) {
+/**
+ * Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres (`grows`: times z) or
+ * pixels.
+ */
+export function points(
+  positions,
+  colors,
+  { rgb = [255, 255, 255], alpha = 1, size, isMetres, grows = false, isRound = false },
+) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   geometry.setAttribute("rgb", new BufferAttribute(colors ?? new Uint8Array(positions.length), 3, true));
   const material = new ShaderMaterial({
-    vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, transparent: alpha < 0.9998, depthWrite: alpha >= 0.9998,
+    vertexShader: POINT_VERTEX,
+    fragmentShader: POINT_FRAGMENT,
+    transparent: alpha < 0.9998,
+    depthWrite: alpha >= 0.9998,
     uniforms: {
-      size: { value: size }, isMetres: { value: isMetres ? 1 : 0 }, grows: { value: grows ? 1 : 0 }, pixels: { value: 1 }, opacity: { value: alpha }, isRound: { value: isRound ? 1 : 0 },
-      isFlat: { value: colors ? 0 : 1 }, flatColor: { value: new Vector3(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255) } } });
+      size: { value: size },
+      isMetres: { value: isMetres ? 1 : 0 },
+      grows: { value: grows ? 1 : 0 },
+      pixels: { value: 1 },
+      opacity: { value: alpha },
+      isRound: { value: isRound ? 1 : 0 },
+      isFlat: { value: colors ? 0 : 1 },
+      flatColor: { value: new Vector3(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255) },
+    },
+  });
   const found = new Points(geometry, material);
-  const viewport = { copy({ w }) { this.height = w; return this; } };
+  /** @type {any} */
+  const viewport = {
+    copy({ w }) {
+      this.height = w;
+      return this;
+    },
+  };
   found.onBeforeRender = (renderer, scene, camera) => {
     // Half the height of the picture, times the projection: pixels of a metre at w = 1.
-    material.uniforms.pixels.value = renderer.getCurrentViewport(viewport).height * 0.5 * camera.projectionMatrix.elements[5];
+    material.uniforms.pixels.value =
+      renderer.getCurrentViewport(viewport).height * 0.5 * camera.projectionMatrix.elements[5];
     material.uniformsNeedUpdate = true;
   };
   return found;
@@ -143,17 +229,28 @@ export function solids(positions, colors, { rgb = [255, 255, 255], alpha = 1, si
   if (isRound) material.onBeforeCompile = shadeBalls;
   const count = positions.length / 3;
   const mesh = new InstancedMesh(isRound ? BALL : CRATE, material, count);
-  const matrix = new Matrix4().makeScale(...size);
-  for (let index = 0; index < count; index++) mesh.setMatrixAt(index, matrix.setPosition(positions[index * 3], positions[index * 3 + 1], positions[index * 3 + 2]));
+  const matrix = new Matrix4().makeScale(size[0], size[1], size[2]);
+  for (let index = 0; index < count; index++)
+    mesh.setMatrixAt(
+      index,
+      matrix.setPosition(positions[index * 3], positions[index * 3 + 1], positions[index * 3 + 2]),
+    );
   if (colors) mesh.instanceColor = new InstancedBufferAttribute(colors, 3, true);
   return mesh;
 }
 
 /** Let balls be a little darker at their edges, like the points that are drawn as spheres. */
 function shadeBalls(shader) {
-  shader.vertexShader = shader.vertexShader.replace("void main() {", "varying float facing;\nvoid main() {\n  facing = normalize(normalMatrix * mat3(instanceMatrix) * normal).z;");
-  shader.fragmentShader = shader.fragmentShader.replace("void main() {", "varying float facing;\nvoid main() {")
-    .replace("#include <opaque_fragment>", "outgoingLight *= 0.78 + 0.22 * max(facing, 0.0);\n#include <opaque_fragment>");
+  shader.vertexShader = shader.vertexShader.replace(
+    "void main() {",
+    "varying float facing;\nvoid main() {\n  facing = normalize(normalMatrix * mat3(instanceMatrix) * normal).z;",
+  );
+  shader.fragmentShader = shader.fragmentShader
+    .replace("void main() {", "varying float facing;\nvoid main() {")
+    .replace(
+      "#include <opaque_fragment>",
+      "outgoingLight *= 0.78 + 0.22 * max(facing, 0.0);\n#include <opaque_fragment>",
+    );
 }
 
 /** Return triangles: positions in a row, colors (RGB of 0 to 1) or null. */
@@ -162,12 +259,16 @@ export function triangles(positions, colors, rgb, alpha) {
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   if (colors) geometry.setAttribute("color", new BufferAttribute(colors, 3));
   // Light does not change colors of their own, as in RViz.
-  if (colors) return new Mesh(geometry, plainMaterial([255, 255, 255], alpha, { side: DoubleSide, vertexColors: true }));
+  if (colors)
+    return new Mesh(geometry, plainMaterial([255, 255, 255], alpha, { side: DoubleSide, vertexColors: true }));
   geometry.computeVertexNormals();
   return new Mesh(geometry, bodyMaterial(rgb, alpha, { side: DoubleSide }));
 }
 
-/** Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard deviation. */
+/**
+ * Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard
+ * deviation.
+ */
 export function ellipse(covariance, width = 6) {
   // In the plane, exactly: what robots on floors have; its height is that of z alone.
   const [a, b, d] = [covariance[0], covariance[1], covariance[width + 1]];

@@ -1,10 +1,21 @@
 // The picture: WebGL, cameras as RViz's views have them, labels, and drawing only what has changed. z is up, as in ROS.
-// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page; where they take
+// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page;
+// where they take
 // long, they get coarser.
 
 import {
-  Color, ColorManagement, DirectionalLight, LinearSRGBColorSpace, OrthographicCamera, PerspectiveCamera, Raycaster, Scene, Vector2,
-  Vector3, WebGLRenderer } from "../../vendor/three/three.min.js";
+  Color,
+  ColorManagement,
+  DirectionalLight,
+  LinearSRGBColorSpace,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
 import { Labels } from "./labels.js";
 import { yawOf } from "./transforms.js";
@@ -27,9 +38,13 @@ export class Stage {
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("aria-label", t("The scene: drag to turn, with shift to move, wheel to zoom"));
+    /** @type {{ antialias: boolean, alpha: boolean, powerPreference: "high-performance" }} */
     const options = { antialias: true, alpha: false, powerPreference: "high-performance" };
-    const gl = this.canvas.getContext("webgl2", options);
-    if (!gl) throw new Error(t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"));
+    const gl = /** @type {WebGL2RenderingContext} */ (this.canvas.getContext("webgl2", options));
+    if (!gl)
+      throw new Error(
+        t("this browser has no WebGL 2; for chromium without a graphics card: --enable-unsafe-swiftshader"),
+      );
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl, ...options });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     const about = gl.getExtension("WEBGL_debug_renderer_info");
@@ -46,7 +61,16 @@ export class Stage {
     // As RViz's: from where the camera is, without any other. A surface that faces the camera has its own color.
     this.light = new DirectionalLight(0xffffff, Math.PI);
     this.scene.add(this.light, this.light.target);
-    this.view = { kind: "orbit", distance: 10, focus: [0, 0, 0], pitch: 0.785, yaw: 0.785, scale: 50, angle: 0, target: "<Fixed Frame>" };
+    this.view = {
+      kind: "orbit",
+      distance: 10,
+      focus: [0, 0, 0],
+      pitch: 0.785,
+      yaw: 0.785,
+      scale: 50,
+      angle: 0,
+      target: "<Fixed Frame>",
+    };
     this.base = { p: [0, 0, 0], yaw: 0 }; // of the target frame
     this.labels = new Labels();
     this.insets = new Set(); // other cameras' views: {canvas, texture, background, aim(), show()}
@@ -61,7 +85,7 @@ export class Stage {
     this.ratio = 0;
     this.coarser = 0; // pictures that were too slow, less those that were not
     this.onTick = () => {};
-    this.onAim = () => {}; // before each picture, with its camera
+    this.onAim = (_camera) => {}; // before each picture, with its camera
     this.onView = () => {};
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(frame);
@@ -86,7 +110,10 @@ export class Stage {
     return this.view.kind === "top" ? this.flat : this.perspective;
   }
 
-  /** Return how many pixels (of the screen, not of the drawing) a metre has at a distance of 1, or everywhere in a flat view. */
+  /**
+   * Return how many pixels (of the screen, not of the drawing) a metre has at a distance of 1, or everywhere in a flat
+   * view.
+   */
   get pixelsPerMetre() {
     return this.view.kind === "top" ? this.view.scale : this.height / (2 * Math.tan(FIELD_OF_VIEW / 2));
   }
@@ -125,7 +152,7 @@ export class Stage {
     this.gl.flush();
     this.labels.draw(this);
     this.drawn += 1;
-    this.canvas.dataset.drawn = this.drawn;
+    this.canvas.dataset.drawn = String(this.drawn);
   }
 
   addInset(inset) {
@@ -146,7 +173,10 @@ export class Stage {
     const { renderer, scene } = this;
     const { width: across, height: along } = inset.texture.image;
     const isLarge = inset.canvas.classList.contains("large");
-    const width = Math.min(this.width * (isLarge ? 0.9 : 0.34), (this.height * (isLarge ? 0.85 : 0.4) * across) / along);
+    const width = Math.min(
+      this.width * (isLarge ? 0.9 : 0.34),
+      (this.height * (isLarge ? 0.85 : 0.4) * across) / along,
+    );
     const height = (width * along) / across;
     const { background } = scene;
     scene.background = inset.background ?? background;
@@ -213,7 +243,11 @@ export class Stage {
   focalPoint() {
     const { p, yaw } = this.base;
     const [x, y, z] = this.view.focus;
-    return new Vector3(p[0] + x * Math.cos(yaw) - y * Math.sin(yaw), p[1] + x * Math.sin(yaw) + y * Math.cos(yaw), p[2] + z);
+    return new Vector3(
+      p[0] + x * Math.cos(yaw) - y * Math.sin(yaw),
+      p[1] + x * Math.sin(yaw) + y * Math.cos(yaw),
+      p[2] + z,
+    );
   }
 
   aim() {
@@ -231,7 +265,7 @@ export class Stage {
       const away = new Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch));
       camera.position.copy(focus).addScaledVector(away, distance);
       camera.lookAt(focus);
-      camera.aspect = this.width / this.height;
+      this.perspective.aspect = this.width / this.height;
       camera.near = Math.max(0.005, distance / 500);
       camera.far = Math.max(1000, distance * 50);
     }
@@ -266,7 +300,8 @@ export class Stage {
     const before = x === null ? null : this.ground(x, y);
     this.setView({ scale: Math.min(20_000, Math.max(0.05, this.view.scale * factor)) });
     const after = before && this.ground(x, y);
-    if (after) this.setView({ focus: [this.view.focus[0] + before.x - after.x, this.view.focus[1] + before.y - after.y, 0] });
+    if (after)
+      this.setView({ focus: [this.view.focus[0] + before.x - after.x, this.view.focus[1] + before.y - after.y, 0] });
   }
 
   rotate(dx, dy) {
@@ -305,10 +340,15 @@ export class Stage {
     const hits = this.hits(x, y, objects);
     // Of points the one next to the ray, not the first that the threshold lets through.
     const solid = hits.find(({ distanceToRay }) => distanceToRay === undefined);
-    const dots = hits.filter(({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3);
+    const dots = hits.filter(
+      ({ distanceToRay, distance }) => distanceToRay !== undefined && distance < (solid?.distance ?? Infinity) + 1e-3,
+    );
     if (dots.length) {
+      /** @type {any} */
       const best = dots.reduce((one, other) => (other.distanceToRay < one.distanceToRay ? other : one));
-      return best.object.localToWorld(new Vector3().fromBufferAttribute(best.object.geometry.attributes.position, best.index));
+      return best.object.localToWorld(
+        new Vector3().fromBufferAttribute(best.object.geometry.attributes.position, best.index),
+      );
     }
     return solid?.point ?? this.ground(x, y);
   }

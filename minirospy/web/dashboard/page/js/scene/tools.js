@@ -1,4 +1,5 @@
-// What the mouse does: turning, moving and zooming the view; poses, goals and points that are published; measuring; focus.
+// What the mouse does: turning, moving and zooming the view; poses, goals and points that are published; measuring;
+// focus.
 
 import { Group } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
@@ -17,12 +18,39 @@ const TURN = Math.PI / 12; // its deviation in radians
 
 /** Name -> {title, key, hint, class in files, topic, type}. */
 export const TOOLS = {
-  move: { title: "Move camera", key: "m", hint: globalThis.matchMedia?.("(pointer: coarse)").matches ? "one finger: turn · two fingers: move, zoom" : "drag: turn · shift or middle button: move · wheel or right button: zoom" },
+  move: {
+    title: "Move camera",
+    key: "m",
+    hint: globalThis.matchMedia?.("(pointer: coarse)").matches
+      ? "one finger: turn · two fingers: move, zoom"
+      : "drag: turn · shift or middle button: move · wheel or right button: zoom",
+  },
   focus: { title: "Focus", key: "c", hint: "click what the view is to turn around" },
   measure: { title: "Measure", key: "n", hint: "click two points" },
-  pose: { title: "2D Pose Estimate", key: "p", hint: "press where the robot is, and drag to where it looks", tool: "SetInitialPose", topic: "/initialpose", type: "geometry_msgs/PoseWithCovarianceStamped" },
-  goal: { title: "2D Nav Goal", key: "g", hint: "press where the robot is to go, and drag to where it shall look", tool: "SetGoal", topic: "/move_base_simple/goal", type: "geometry_msgs/PoseStamped" },
-  point: { title: "Publish Point", key: "u", hint: "click a point", tool: "PublishPoint", topic: "/clicked_point", type: "geometry_msgs/PointStamped" },
+  pose: {
+    title: "2D Pose Estimate",
+    key: "p",
+    hint: "press where the robot is, and drag to where it looks",
+    tool: "SetInitialPose",
+    topic: "/initialpose",
+    type: "geometry_msgs/PoseWithCovarianceStamped",
+  },
+  goal: {
+    title: "2D Nav Goal",
+    key: "g",
+    hint: "press where the robot is to go, and drag to where it shall look",
+    tool: "SetGoal",
+    topic: "/move_base_simple/goal",
+    type: "geometry_msgs/PoseStamped",
+  },
+  point: {
+    title: "Publish Point",
+    key: "u",
+    hint: "click a point",
+    tool: "PublishPoint",
+    topic: "/clicked_point",
+    type: "geometry_msgs/PointStamped",
+  },
 };
 
 /** The tools of a view: {stage, context, config, link, say(text, isError), chosen(name)}. */
@@ -130,7 +158,8 @@ export class Tools {
     const [dx, dy] = [x - held.x, y - held.y];
     if (held.start) this.aim(held.start, stage.ground(x, y));
     else if (this.name === "move" || held.button !== 0) {
-      const isMoved = held.button === 1 || event.shiftKey || (stage.view.kind === "top" && held.button === 0 && !event.altKey);
+      const isMoved =
+        held.button === 1 || event.shiftKey || (stage.view.kind === "top" && held.button === 0 && !event.altKey);
       if (held.button === 2) stage.zoom(Math.exp(-dy * 0.01));
       else if (isMoved) stage.pan(dx, dy);
       else stage.rotate(dx, dy);
@@ -230,8 +259,15 @@ export class Tools {
     this.dropPreview();
     if (!to || to.distanceTo(from) < 1e-6) return;
     const { stage } = this.view;
-    const size = Math.max(0.15, 70 / stage.pixelsPerMetre) * (stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(from));
-    const shape = arrow(bodyMaterial(this.name === "goal" ? [255, 40, 200] : [60, 230, 60]), { shaft: size * 0.7, shaftWidth: size * 0.1, head: size * 0.3, headWidth: size * 0.28 });
+    const size =
+      Math.max(0.15, 70 / stage.pixelsPerMetre) *
+      (stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(from));
+    const shape = arrow(bodyMaterial(this.name === "goal" ? [255, 40, 200] : [60, 230, 60]), {
+      shaft: size * 0.7,
+      shaftWidth: size * 0.1,
+      head: size * 0.3,
+      headWidth: size * 0.28,
+    });
     this.preview = new Group();
     this.preview.add(shape);
     this.preview.position.copy(from);
@@ -252,7 +288,10 @@ export class Tools {
     const pose = { position: { x, y, z: 0 }, orientation: { x: qx, y: qy, z: qz, w: qw } };
     const covariance = new Array(36).fill(0);
     [covariance[0], covariance[7], covariance[35]] = [DEVIATION ** 2, DEVIATION ** 2, TURN ** 2];
-    this.publish(this.name === "pose" ? { pose: { pose, covariance } } : { pose }, `(${x.toFixed(3)}, ${y.toFixed(3)}), ${((yaw * 180) / Math.PI).toFixed(1)}°`);
+    this.publish(
+      this.name === "pose" ? { pose: { pose, covariance } } : { pose },
+      `(${x.toFixed(3)}, ${y.toFixed(3)}), ${((yaw * 180) / Math.PI).toFixed(1)}°`,
+    );
   }
 
   publishPoint({ x, y, z }) {

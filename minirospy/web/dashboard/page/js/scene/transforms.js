@@ -1,5 +1,6 @@
 // Frames and the transforms between them over time, as tf2 has them. Pure.
-// A transform is {p: [x, y, z], q: [x, y, z, w]}; that from `source` to `target` turns coordinates in source into those in target.
+// A transform is {p: [x, y, z], q: [x, y, z, w]}; that from `source` to `target` turns coordinates in source into those
+// in target.
 // Source: tf2's BufferCore (http://wiki.ros.org/tf2); the texts of its errors are tf2's.
 
 import { t } from "../texts.js";
@@ -18,15 +19,25 @@ export class FrameError extends Error {
   }
 }
 
+/**
+ * Return the product of two quaternions [x, y, z, w].
+ * @param {number[]} one
+ * @param {number[]} other
+ */
 export function multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
   return [
     aw * bx + ax * bw + ay * bz - az * by,
     aw * by - ax * bz + ay * bw + az * bx,
     aw * bz + ax * by - ay * bx + az * bw,
-    aw * bw - ax * bx - ay * by - az * bz];
+    aw * bw - ax * bx - ay * by - az * bz,
+  ];
 }
 
-/** Return a point rotated by a quaternion. */
+/**
+ * Return a point rotated by a quaternion.
+ * @param {number[]} quaternion
+ * @param {number[]} point
+ */
 export function rotate([x, y, z, w], [px, py, pz]) {
   const tx = 2 * (y * pz - z * py);
   const ty = 2 * (z * px - x * pz);
@@ -71,12 +82,20 @@ export function normalized(q) {
   return length > 0 ? q.map((value) => value / length) : [0, 0, 0, 1];
 }
 
-/** Return the quaternion of roll, pitch and yaw, as URDF has them. */
+/**
+ * Return the quaternion of roll, pitch and yaw, as URDF has them.
+ * @param {number[]} rpy
+ */
 export function fromRpy([roll, pitch, yaw]) {
   const [cr, sr] = [Math.cos(roll / 2), Math.sin(roll / 2)];
   const [cp, sp] = [Math.cos(pitch / 2), Math.sin(pitch / 2)];
   const [cy, sy] = [Math.cos(yaw / 2), Math.sin(yaw / 2)];
-  return [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy];
+  return [
+    sr * cp * cy - cr * sp * sy,
+    cr * sp * cy + sr * cp * sy,
+    cr * cp * sy - sr * sp * cy,
+    cr * cp * cy + sr * sp * sy,
+  ];
 }
 
 export const fromYaw = (yaw) => [0, 0, Math.sin(yaw / 2), Math.cos(yaw / 2)];
@@ -123,12 +142,14 @@ export class Frames {
     if (!child || !parent) return "TF_NO_FRAME_ID: a transform without frame_id or child_frame_id";
     const { translation: t, rotation: r } = transform;
     const numbers = [t.x, t.y, t.z, r.x, r.y, r.z, r.w];
-    if (!numbers.every(Number.isFinite)) return `TF_NAN_INPUT: the transform of child_frame_id "${child}" has nan values`;
+    if (!numbers.every(Number.isFinite))
+      return `TF_NAN_INPUT: the transform of child_frame_id "${child}" has nan values`;
     if (Math.abs(r.x ** 2 + r.y ** 2 + r.z ** 2 + r.w ** 2 - 1) > QUATERNION_TOLERANCE) {
       return `TF_DENORMALIZED_QUATERNION: the rotation of child_frame_id "${child}" is not normalized`;
     }
 
-    if (this.known.size >= MAX_FRAMES && !(this.known.has(parent) && this.known.has(child))) return `more than ${MAX_FRAMES} frames: "${child}" is left out`;
+    if (this.known.size >= MAX_FRAMES && !(this.known.has(parent) && this.known.has(child)))
+      return `more than ${MAX_FRAMES} frames: "${child}" is left out`;
 
     this.version += 1;
     let edge = this.edges.get(child);
@@ -178,11 +199,15 @@ export class Frames {
       counts.set(root, (counts.get(root) ?? 0) + 1);
     }
     let found = "";
-    for (const [name, count] of counts) if (!found || count > counts.get(found) || (count === counts.get(found) && name < found)) found = name;
+    for (const [name, count] of counts)
+      if (!found || count > counts.get(found) || (count === counts.get(found) && name < found)) found = name;
     return found;
   }
 
-  /** Return the transform from `source` to `target` at a time in seconds; null is the newest that all frames between have. Throws FrameError. */
+  /**
+   * Return the transform from `source` to `target` at a time in seconds; null is the newest that all frames between
+   * have. Throws FrameError.
+   */
   lookup(targetName, sourceName, seconds = null) {
     const target = plainName(targetName);
     const source = plainName(sourceName);
@@ -195,7 +220,10 @@ export class Frames {
     const down = this.chain(target);
     const common = up.find((frame) => down.includes(frame));
     if (common === undefined) {
-      throw new FrameError("unconnected", `Could not find a connection between '${target}' and '${source}' because they are not part of the same tree. Tf has two or more unconnected trees.`);
+      throw new FrameError(
+        "unconnected",
+        `Could not find a connection between '${target}' and '${source}' because they are not part of the same tree. Tf has two or more unconnected trees.`,
+      );
     }
     const sourceEdges = up.slice(0, up.indexOf(common)).map((frame) => this.edges.get(frame));
     const targetEdges = down.slice(0, down.indexOf(common)).map((frame) => this.edges.get(frame));
@@ -210,7 +238,8 @@ export class Frames {
   chain(frame) {
     const found = [frame];
     for (let name = this.parent(frame); name !== null; name = this.parent(name)) {
-      if (found.length > MAX_DEPTH || name === frame) throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
+      if (found.length > MAX_DEPTH || name === frame)
+        throw new FrameError("loop", "The tf tree is invalid because it contains a loop.");
       found.push(name);
     }
     return found;
@@ -219,7 +248,10 @@ export class Frames {
 
 /** Return why a display that is in `frame` cannot be shown, in RViz's words. */
 export function missingText(frame, fixedFrame, error) {
-  return t("No transform from [{frame}] to fixed frame [{fixed}]", { frame: plainName(frame), fixed: fixedFrame }) + (error ? `: ${error.message}` : "");
+  return (
+    t("No transform from [{frame}] to fixed frame [{fixed}]", { frame: plainName(frame), fixed: fixedFrame }) +
+    (error ? `: ${error.message}` : "")
+  );
 }
 
 function record(edge, seconds, value) {
@@ -268,7 +300,14 @@ function at(edge, seconds, source, target) {
   if (stamps[index] === seconds) return transforms[index];
   if (index === 0 || index === stamps.length) {
     const [kind, word, bound] = index ? ["future", "latest", stamps.at(-1)] : ["past", "earliest", stamps[0]];
-    throw new FrameError(kind, `Lookup would require extrapolation into the ${kind}.  Requested time ${seconds.toFixed(9)} but the ${word} data is at time ${bound.toFixed(9)}, when looking up transform from frame [${source}] to frame [${target}]`);
+    throw new FrameError(
+      kind,
+      `Lookup would require extrapolation into the ${kind}.  Requested time ${seconds.toFixed(9)} but the ${word} data is at time ${bound.toFixed(9)}, when looking up transform from frame [${source}] to frame [${target}]`,
+    );
   }
-  return interpolate(transforms[index - 1], transforms[index], (seconds - stamps[index - 1]) / (stamps[index] - stamps[index - 1]));
+  return interpolate(
+    transforms[index - 1],
+    transforms[index],
+    (seconds - stamps[index - 1]) / (stamps[index] - stamps[index - 1]),
+  );
 }

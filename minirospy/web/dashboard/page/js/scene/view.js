@@ -13,7 +13,18 @@ import { Axes, Grid, TF } from "./displays/frames.js";
 import { InteractiveMarkers } from "./displays/interactive.js";
 import { MapDisplay } from "./displays/map.js";
 import { Markers } from "./displays/markers.js";
-import { GridCells, Linked, Odometry, Path, PointStamped, Polygon, Pose, PoseArray, Range, Wrench } from "./displays/poses.js";
+import {
+  GridCells,
+  Linked,
+  Odometry,
+  Path,
+  PointStamped,
+  Polygon,
+  Pose,
+  PoseArray,
+  Range,
+  Wrench,
+} from "./displays/poses.js";
 import { RobotModel } from "./displays/robot.js";
 import { Files } from "./files.js";
 import { Panel } from "./panel.js";
@@ -22,8 +33,32 @@ import { TOOLS, Tools } from "./tools.js";
 
 const DISPLAYS = {
   __proto__: null, // a file may name a class constructor
-  Grid, Axes, TF, RobotModel, LaserScan: Cloud, PointCloud2: Cloud, PointCloud: Cloud, Map: MapDisplay, Marker: Markers, MarkerArray: Markers, InteractiveMarkers, Path, Pose,
-  PoseWithCovariance: Pose, PoseArray, Odometry, Polygon, Range, PointStamped, GridCells, WrenchStamped: Wrench, Wrench, Image: Linked, Camera, DepthCloud };
+  Grid,
+  Axes,
+  TF,
+  RobotModel,
+  LaserScan: Cloud,
+  PointCloud2: Cloud,
+  PointCloud: Cloud,
+  Map: MapDisplay,
+  Marker: Markers,
+  MarkerArray: Markers,
+  InteractiveMarkers,
+  Path,
+  Pose,
+  PoseWithCovariance: Pose,
+  PoseArray,
+  Odometry,
+  Polygon,
+  Range,
+  PointStamped,
+  GridCells,
+  WrenchStamped: Wrench,
+  Wrench,
+  Image: Linked,
+  Camera,
+  DepthCloud,
+};
 const KEY = "3d"; // of what the browser keeps
 const MAX_AUTOMATIC = 20; // displays that are added without a click
 const LEFT_OUT = /_updates$|^\/rosout/;
@@ -43,34 +78,77 @@ export class SceneView {
     this.hint = h("span", { class: "muted", role: "status" });
     this.place = h("span", { class: "mono muted" });
     this.fixed = h("select", { "aria-label": "Fixed frame", onchange: () => this.chooseFixed(this.fixed.value) });
-    this.kind = h("select", { "aria-label": "View", onchange: () => this.chooseView() }, Object.entries(VIEWS).map(([value, title]) => h("option", { value }, t(title))));
+    this.kind = h(
+      "select",
+      { "aria-label": "View", onchange: () => this.chooseView() },
+      Object.entries(VIEWS).map(([value, title]) => h("option", { value }, t(title))),
+    );
     this.target = h("select", { "aria-label": "Target frame", onchange: () => this.chooseView() });
-    this.toolbar = h("div", { class: "tools", role: "toolbar", "aria-label": "Tools" }, Object.entries(TOOLS).map(([name, { title, key }]) => {
-      const button = h("button", { type: "button", class: "small", title: `${t(title)} (${key})`, "aria-pressed": "false", onclick: () => this.tools.choose(name) }, title);
-      button.dataset.tool = name;
-      return button;
-    }));
+    this.toolbar = h(
+      "div",
+      { class: "tools", role: "toolbar", "aria-label": "Tools" },
+      Object.entries(TOOLS).map(([name, { title, key }]) => {
+        const button = h(
+          "button",
+          {
+            type: "button",
+            class: "small",
+            title: `${t(title)} (${key})`,
+            "aria-pressed": "false",
+            onclick: () => this.tools.choose(name),
+          },
+          title,
+        );
+        button.dataset.tool = name;
+        return button;
+      }),
+    );
     this.files = new Files(this);
-    this.sideButton = h("button", { type: "button", class: "small", "aria-pressed": "true", onclick: () => this.toggleSide() }, "Displays");
+    this.sideButton = h(
+      "button",
+      { type: "button", class: "small", "aria-pressed": "true", onclick: () => this.toggleSide() },
+      "Displays",
+    );
     this.panel = new Panel(this);
     main.append(
-      h("div", { class: "bar scenebar" }, this.toolbar, h("label", {}, "Fixed frame", this.fixed), h("label", {}, "View", this.kind), h("label", {}, t("of"), this.target),
-        h("button", { type: "button", class: "small", title: "Back to the view at the start", onclick: () => this.resetView() }, "Reset"), this.files.element, this.sideButton),
+      h(
+        "div",
+        { class: "bar scenebar" },
+        this.toolbar,
+        h("label", {}, "Fixed frame", this.fixed),
+        h("label", {}, "View", this.kind),
+        h("label", {}, t("of"), this.target),
+        h(
+          "button",
+          { type: "button", class: "small", title: "Back to the view at the start", onclick: () => this.resetView() },
+          "Reset",
+        ),
+        this.files.element,
+        this.sideButton,
+      ),
       h("div", { class: "split" }, this.frame, this.panel.element),
-      h("div", { class: "bar status" }, this.hint, this.place));
+      h("div", { class: "bar status" }, this.hint, this.place),
+    );
 
     this.stage = new Stage(this.frame);
-    this.context = new Context(link, this.stage, () => { this.panel.isStale = true; });
+    this.context = new Context(link, this.stage, () => {
+      this.panel.isStale = true;
+    });
     this.tools = new Tools(this);
     this.stage.onTick = () => this.context.tick(this.displays.values());
-    this.stage.onAim = (camera) => { for (const display of this.displays.values()) display.face?.(camera); };
+    this.stage.onAim = (camera) => {
+      for (const display of this.displays.values()) display.face?.(camera);
+    };
     this.stage.onView = () => this.viewChanged();
     this.toggleSide(localStorage.getItem(`${KEY} side`) !== "hidden" && innerWidth > 700);
     this.apply();
     this.tools.choose("move");
     const leave = () => this.save();
     addEventListener("pagehide", leave);
-    this.ends = [link.watch(["channels", "parameters"], () => this.addNew()), () => removeEventListener("pagehide", leave)];
+    this.ends = [
+      link.watch(["channels", "parameters"], () => this.addNew()),
+      () => removeEventListener("pagehide", leave),
+    ];
     this.timer = setInterval(() => this.look(), 300);
     if (this.hasFile && !this.state.isOpened) this.files.read();
   }
@@ -106,7 +184,16 @@ export class SceneView {
     const { isAutomatic, isOpened } = this.state;
     const store = this.hasFile ? sessionStorage : localStorage;
     try {
-      store.setItem(KEY, JSON.stringify({ raw: this.config.raw, isAutomatic, isOpened, dismissed: [...this.dismissed], origin: this.hasFile ? location.origin : "" }));
+      store.setItem(
+        KEY,
+        JSON.stringify({
+          raw: this.config.raw,
+          isAutomatic,
+          isOpened,
+          dismissed: [...this.dismissed],
+          origin: this.hasFile ? location.origin : "",
+        }),
+      );
     } catch {
       // A browser that keeps nothing.
     }
@@ -125,7 +212,10 @@ export class SceneView {
     this.dismissed.clear();
     this.apply();
     const unknown = this.config.unknown();
-    this.say(unknown.length ? t("not shown, but kept when it is saved: {names}", { names: unknown.join(", ") }) : t("opened"), unknown.length > 0);
+    this.say(
+      unknown.length ? t("not shown, but kept when it is saved: {names}", { names: unknown.join(", ") }) : t("opened"),
+      unknown.length > 0,
+    );
     this.changed();
   }
 
@@ -161,15 +251,21 @@ export class SceneView {
     const shown = this.config.displays();
     const topics = new Set(shown.map(({ settings }) => getSetting(settings, topicKeyOf(classOf(settings)))));
     let isChanged = false;
-    if (this.link.parameters.has("/robot_description") && !shown.some(({ settings }) => classOf(settings) === "RobotModel") && !this.dismissed.has("RobotModel")) {
+    if (
+      this.link.parameters.has("/robot_description") &&
+      !shown.some(({ settings }) => classOf(settings) === "RobotModel") &&
+      !this.dismissed.has("RobotModel")
+    ) {
       this.config.add(newSettings("RobotModel"));
       isChanged = true;
     }
     for (const { topic, type } of this.link.channels.values()) {
       const name = classForType(type);
-      if (!name || CLASSES[name].isLinked || topics.has(topic) || this.dismissed.has(topic) || LEFT_OUT.test(topic)) continue;
+      if (!name || CLASSES[name].isLinked || topics.has(topic) || this.dismissed.has(topic) || LEFT_OUT.test(topic))
+        continue;
       // What the page itself publishes by its tools.
-      if (Object.values(TOOLS).some((tool) => tool.topic === topic) || this.config.displays().length >= MAX_AUTOMATIC) continue;
+      if (Object.values(TOOLS).some((tool) => tool.topic === topic) || this.config.displays().length >= MAX_AUTOMATIC)
+        continue;
       this.config.add(this.newDisplay(name, topic));
       isChanged = true;
     }
@@ -234,7 +330,16 @@ export class SceneView {
     this.shownFrames = key;
     const names = new Set([...frames.names(), ...(this.config.fixedFrame ? [this.config.fixedFrame] : [])]);
     const options = (first) => [first, ...[...names].sort().map((name) => h("option", { value: name }, name))];
-    fill(this.fixed, options(h("option", { value: "" }, this.config.fixedFrame ? t("automatic") : t("automatic: {name}", { name: fixedFrame }))));
+    fill(
+      this.fixed,
+      options(
+        h(
+          "option",
+          { value: "" },
+          this.config.fixedFrame ? t("automatic") : t("automatic: {name}", { name: fixedFrame }),
+        ),
+      ),
+    );
     this.fixed.value = this.config.fixedFrame;
     const { target } = this.stage.view;
     if (target !== "<Fixed Frame>") names.add(target);
@@ -256,7 +361,8 @@ export class SceneView {
     const { view } = this.stage;
     const kind = this.kind.value;
     let target = this.target.value;
-    if (kind === "follow" && target === "<Fixed Frame>") target = ["base_footprint", "base_link"].find((name) => this.context.frames.has(name)) ?? target;
+    if (kind === "follow" && target === "<Fixed Frame>")
+      target = ["base_footprint", "base_link"].find((name) => this.context.frames.has(name)) ?? target;
     const parts = { kind, target };
     if (target !== view.target) parts.focus = [0, 0, 0];
     else if (kind === "top") parts.focus = [view.focus[0], view.focus[1], 0];
@@ -270,7 +376,16 @@ export class SceneView {
   }
 
   resetView() {
-    this.stage.setView({ kind: "orbit", distance: 10, focus: [0, 0, 0], pitch: 0.785398, yaw: 0.785398, angle: 0, scale: 50, target: "<Fixed Frame>" });
+    this.stage.setView({
+      kind: "orbit",
+      distance: 10,
+      focus: [0, 0, 0],
+      pitch: 0.785398,
+      yaw: 0.785398,
+      angle: 0,
+      scale: 50,
+      target: "<Fixed Frame>",
+    });
     this.stage.base = { p: [0, 0, 0], yaw: 0 };
     this.showFrames();
   }
@@ -283,13 +398,21 @@ export class SceneView {
   focus({ x, y, z }) {
     const { p, yaw } = this.stage.base;
     const [dx, dy] = [x - p[0], y - p[1]];
-    this.stage.setView({ focus: [dx * Math.cos(yaw) + dy * Math.sin(yaw), dy * Math.cos(yaw) - dx * Math.sin(yaw), this.stage.view.kind === "top" ? 0 : z - p[2]] });
+    this.stage.setView({
+      focus: [
+        dx * Math.cos(yaw) + dy * Math.sin(yaw),
+        dy * Math.cos(yaw) - dx * Math.sin(yaw),
+        this.stage.view.kind === "top" ? 0 : z - p[2],
+      ],
+    });
     this.tools.choose("move");
     this.say(t("the view turns around {place}", { place: `(${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)})` }));
   }
 
   pickable() {
-    return [...this.displays].filter(([settings]) => !["TF", "Grid"].includes(classOf(settings))).map(([, display]) => display.object);
+    return [...this.displays]
+      .filter(([settings]) => !["TF", "Grid"].includes(classOf(settings)))
+      .map(([, display]) => display.object);
   }
 
   // --- the bars
@@ -298,7 +421,8 @@ export class SceneView {
     // Handles of interactive markers are for the mouse; another tool has it.
     this.context.isInteracting = name === "move";
     this.stage.invalidate();
-    for (const button of this.toolbar.children) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
+    for (const button of this.toolbar.children)
+      button.setAttribute("aria-pressed", String(button.dataset.tool === name));
   }
 
   say(text, isError = false) {
@@ -307,7 +431,15 @@ export class SceneView {
   }
 
   showPlace(point) {
-    setText(this.place, point ? t("{place} in {frame}", { place: `x ${point.x.toFixed(2)} y ${point.y.toFixed(2)} m`, frame: this.context.fixedFrame }) : "");
+    setText(
+      this.place,
+      point
+        ? t("{place} in {frame}", {
+            place: `x ${point.x.toFixed(2)} y ${point.y.toFixed(2)} m`,
+            frame: this.context.fixedFrame,
+          })
+        : "",
+    );
   }
 
   toggleSide(isShown = this.panel.element.hidden) {

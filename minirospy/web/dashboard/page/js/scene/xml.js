@@ -5,7 +5,8 @@ import { t } from "../texts.js";
 export class XmlError extends Error {}
 
 const NAMED = { lt: "<", gt: ">", amp: "&", quot: '"', apos: "'" };
-const TOKEN = /<!--[\s\S]*?-->|<!\[CDATA\[([\s\S]*?)\]\]>|<\?[\s\S]*?\?>|<!DOCTYPE[^>[]*(?:\[[^\]]*\])?[^>]*>|<\/([^\s>]+)\s*>|<([A-Za-z_][^\s/>]*)((?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(\/?)>|([^<]+)/gy;
+const TOKEN =
+  /<!--[\s\S]*?-->|<!\[CDATA\[([\s\S]*?)\]\]>|<\?[\s\S]*?\?>|<!DOCTYPE[^>[]*(?:\[[^\]]*\])?[^>]*>|<\/([^\s>]+)\s*>|<([A-Za-z_][^\s/>]*)((?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(\/?)>|([^<]+)/gy;
 const ATTRIBUTE = /([^\s=]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
 const MAX_DEPTH = 500;
 
@@ -13,7 +14,9 @@ const MAX_DEPTH = 500;
 export function parseXml(text) {
   const top = { name: "", attributes: {}, children: [], text: "" };
   const open = [top];
-  const fail = (at, what) => { throw new XmlError(t("line {line}: {what}", { line: text.slice(0, at).split("\n").length, what })); };
+  const fail = (at, what) => {
+    throw new XmlError(t("line {line}: {what}", { line: text.slice(0, at).split("\n").length, what }));
+  };
 
   TOKEN.lastIndex = 0;
   while (TOKEN.lastIndex < text.length) {
@@ -25,11 +28,19 @@ export function parseXml(text) {
     if (data !== undefined) inside.text += data;
     else if (plain !== undefined) inside.text += decoded(plain);
     else if (closed !== undefined) {
-      if (inside.name !== closed || open.length === 1) fail(start, t("</{name}>, where {wanted} is expected", { name: closed, wanted: inside.name ? `</${inside.name}>` : t("the end") }));
+      if (inside.name !== closed || open.length === 1)
+        fail(
+          start,
+          t("</{name}>, where {wanted} is expected", {
+            name: closed,
+            wanted: inside.name ? `</${inside.name}>` : t("the end"),
+          }),
+        );
       open.pop();
     } else if (name !== undefined) {
       const element = { name, attributes: Object.create(null), children: [], text: "" };
-      for (const [, key, double, single] of attributes.matchAll(ATTRIBUTE)) element.attributes[key] = decoded(double ?? single);
+      for (const [, key, double, single] of attributes.matchAll(ATTRIBUTE))
+        element.attributes[key] = decoded(double ?? single);
       inside.children.push(element);
       if (!isEmpty) open.push(element);
       if (open.length > MAX_DEPTH) fail(start, t("elements are nested too deeply"));

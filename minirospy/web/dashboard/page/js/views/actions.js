@@ -25,7 +25,11 @@ export class Actions {
     this.ends = [];
     this.goals = new Map(); // id -> {id, status, text, feedback, result, isOwn, row}
     this.chosen = null;
-    this.choice = h("select", { class: "grow", "aria-label": "Action", onchange: () => this.choose(this.choice.value) });
+    this.choice = h("select", {
+      class: "grow",
+      "aria-label": "Action",
+      onchange: () => this.choose(this.choice.value),
+    });
     this.about = h("span", { class: "muted" });
     this.fields = h("div", {});
     this.sendButton = h("button", { type: "submit", class: "primary" }, "Send goal");
@@ -33,7 +37,20 @@ export class Actions {
     this.buttons = h("div", { class: "bar", hidden: true }, this.sendButton, this.cancelButton);
     this.problem = h("p", { class: "error", role: "alert" });
     this.rows = h("tbody", {});
-    this.table = h("table", { class: "goals" }, h("thead", {}, h("tr", {}, ["Goal", "Status", "", ""].map((each) => h("th", { scope: "col" }, each && t(each))))), this.rows);
+    this.table = h(
+      "table",
+      { class: "goals" },
+      h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          ["Goal", "Status", "", ""].map((each) => h("th", { scope: "col" }, each && t(each))),
+        ),
+      ),
+      this.rows,
+    );
     this.noGoals = h("p", { class: "muted" });
     this.badge = h("span", { class: "badge" });
     this.title = h("h2", { class: "grow" });
@@ -42,12 +59,52 @@ export class Actions {
     this.bar = h("progress", { max: "1", hidden: true, "aria-label": "Progress" });
     this.feedback = h("pre", { class: "answer", "aria-label": "Feedback" });
     this.result = h("pre", { class: "answer", "aria-label": "Result", "aria-live": "polite" });
-    this.details = h("section", { class: "panel details", hidden: true, "aria-label": "Chosen goal" }, h("div", { class: "bar" }, this.title, this.badge), this.statusText, this.bar,
-      h("div", { class: "halves" }, h("div", {}, h("h3", {}, "Feedback"), this.feedback), h("div", {}, h("h3", {}, "Result"), this.result)));
-    main.append(h("div", { class: "bar" }, this.choice, this.about), this.problem, this.silent,
-      h("div", { class: "halves actions" },
-        h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.send(); } }, this.fields, this.buttons),
-        h("div", { class: "column" }, this.details, h("section", { class: "panel details", "aria-label": "Goals" }, h("h3", {}, "Goals of the server"), this.table, this.noGoals))));
+    this.details = h(
+      "section",
+      { class: "panel details", hidden: true, "aria-label": "Chosen goal" },
+      h("div", { class: "bar" }, this.title, this.badge),
+      this.statusText,
+      this.bar,
+      h(
+        "div",
+        { class: "halves" },
+        h("div", {}, h("h3", {}, "Feedback"), this.feedback),
+        h("div", {}, h("h3", {}, "Result"), this.result),
+      ),
+    );
+    main.append(
+      h("div", { class: "bar" }, this.choice, this.about),
+      this.problem,
+      this.silent,
+      h(
+        "div",
+        { class: "halves actions" },
+        h(
+          "form",
+          {
+            class: "panel details",
+            onsubmit: (event) => {
+              event.preventDefault();
+              this.send();
+            },
+          },
+          this.fields,
+          this.buttons,
+        ),
+        h(
+          "div",
+          { class: "column" },
+          this.details,
+          h(
+            "section",
+            { class: "panel details", "aria-label": "Goals" },
+            h("h3", {}, "Goals of the server"),
+            this.table,
+            this.noGoals,
+          ),
+        ),
+      ),
+    );
     this.ending = link.watch(["channels", "state"], () => this.update());
     this.timer = setInterval(() => this.showGoals(), 1000);
   }
@@ -76,8 +133,15 @@ export class Actions {
     const names = servers.map(({ name }) => name);
     if (names.join(" ") !== this.names || !this.choice.options.length) {
       this.names = names.join(" ");
-      fill(this.choice, h("option", { value: "" }, names.length ? t("choose an action server ({count})", { count: names.length }) : t("no action servers")),
-        names.map((name) => h("option", { value: name }, name)));
+      fill(
+        this.choice,
+        h(
+          "option",
+          { value: "" },
+          names.length ? t("choose an action server ({count})", { count: names.length }) : t("no action servers"),
+        ),
+        names.map((name) => h("option", { value: name }, name)),
+      );
     }
     const server = servers.find(({ name }) => name === this.name);
     this.choice.value = server ? this.name : "";
@@ -85,10 +149,25 @@ export class Actions {
     const mayWrite = this.link.state === "open" && this.link.mayWrite;
     this.sendButton.disabled = this.cancelButton.disabled = !mayWrite || !server;
     if (!server && !this.type) {
-      fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" ? "" : names.length ? t("Choose an action server: its goal becomes a form.") : t("No node offers an action. Start one: it appears here.")));
+      fill(
+        this.fields,
+        h(
+          "p",
+          { class: "muted" },
+          this.link.state !== "open"
+            ? ""
+            : names.length
+              ? t("Choose an action server: its goal becomes a form.")
+              : t("No node offers an action. Start one: it appears here."),
+        ),
+      );
       setText(this.noGoals, "");
     }
-    if (this.type) setText(this.about, `${this.type}Action${server || this.link.state !== "open" ? "" : t(": the server has left")}`);
+    if (this.type)
+      setText(
+        this.about,
+        `${this.type}Action${server || this.link.state !== "open" ? "" : t(": the server has left")}`,
+      );
   }
 
   choose(name) {
@@ -114,7 +193,10 @@ export class Actions {
       }),
     ];
     this.buttons.hidden = true;
-    fill(this.fields, h("p", { class: "muted" }, this.link.mayWrite ? "" : t("This token is read-only: it sends no goals.")));
+    fill(
+      this.fields,
+      h("p", { class: "muted" }, this.link.mayWrite ? "" : t("This token is read-only: it sends no goals.")),
+    );
     if (!this.link.mayWrite) return;
     try {
       const { definition } = await this.link.tools.request({ do: "type", name: `${type}ActionGoal` });
@@ -145,7 +227,11 @@ export class Actions {
       const own = this.goalOf(id);
       own.isOwn = true;
       this.select(id);
-      await this.link.publish(`${this.name}/goal`, `${this.type}ActionGoal`, this.schema, { header: { stamp }, goal_id: { stamp, id }, goal });
+      await this.link.publish(`${this.name}/goal`, `${this.type}ActionGoal`, this.schema, {
+        header: { stamp },
+        goal_id: { stamp, id },
+        goal,
+      });
       this.showGoals();
     } catch (error) {
       this.goals.get(id)?.row.remove();
@@ -174,10 +260,28 @@ export class Actions {
     if (!goal) {
       if (this.goals.size >= MAX_GOALS) this.forgetOne();
       goal = { id, status: null, text: "", isOwn: false, isListed: false, received: null };
-      const cancel = h("button", { type: "button", class: "small", title: t("Cancel {id}", { id }), onclick: () => this.cancel(id) }, t("cancel"));
+      const cancel = h(
+        "button",
+        { type: "button", class: "small", title: t("Cancel {id}", { id }), onclick: () => this.cancel(id) },
+        t("cancel"),
+      );
       goal.cancel = cancel;
-      goal.row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.select(this.chosen === id ? null : id) }, id)),
-        h("td", {}, h("span", { class: "badge" })), h("td", { class: "muted" }), h("td", {}, cancel));
+      goal.row = h(
+        "tr",
+        {},
+        h(
+          "td",
+          {},
+          h(
+            "button",
+            { type: "button", class: "link", onclick: () => this.select(this.chosen === id ? null : id) },
+            id,
+          ),
+        ),
+        h("td", {}, h("span", { class: "badge" })),
+        h("td", { class: "muted" }),
+        h("td", {}, cancel),
+      );
       goal.row.dataset.goal = id;
       this.goals.set(id, goal);
       this.rows.prepend(goal.row);
@@ -201,13 +305,26 @@ export class Actions {
     }
     this.seen = performance.now() / 1000;
     for (const goal of this.goals.values()) goal.isListed = false;
-    for (const { goal_id: { id }, status, text } of message.status_list.slice(-MAX_GOALS)) {
+    for (const {
+      goal_id: { id },
+      status,
+      text,
+    } of message.status_list.slice(-MAX_GOALS)) {
       Object.assign(this.goalOf(id), { status, text, isListed: true });
     }
     this.showGoals();
   }
 
-  take({ status: { goal_id: { id }, status, text } }, more) {
+  take(
+    {
+      status: {
+        goal_id: { id },
+        status,
+        text,
+      },
+    },
+    more,
+  ) {
     const goal = this.goalOf(id);
     // A result's status is final; the status topic may be older.
     if (more.result || goal.result === undefined) Object.assign(goal, { status, text });
@@ -222,7 +339,8 @@ export class Actions {
   }
 
   showGoals() {
-    const isStale = this.seen !== null && this.seen !== undefined && performance.now() / 1000 - this.seen > STALE_SECONDS;
+    const isStale =
+      this.seen !== null && this.seen !== undefined && performance.now() / 1000 - this.seen > STALE_SECONDS;
     for (const goal of this.goals.values()) {
       const status = goal.finalStatus ?? goal.status;
       const [, badgeCell, textCell] = goal.row.children;

@@ -9,7 +9,7 @@ import { language, t, errorText } from "../texts.js";
 import { Axis, clockText, heights, sizeText } from "../timeline.js";
 import { Tree } from "./topics.js";
 
-const PROTOCOL = "minirospy.core.bag.v1";
+const PROTOCOL = "minirospy.bag.v1";
 const IMAGES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 const HEAVY = new Set([...IMAGES, "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud"]); // measured when chosen
 const RULER = 26;
@@ -20,7 +20,14 @@ const WIDEST = 160;
 const HEAD_BYTES = 11;
 const MOMENT = 1;
 const MAX_SHOWN_FIRST = 3;
-const COMPRESSIONS = [[".bag", "none"], [".bag", "lz4"], [".bag", "bz2"], [".mcap", "none"], [".mcap", "lz4"], [".mcap", "zstd"]];
+const COMPRESSIONS = [
+  [".bag", "none"],
+  [".bag", "lz4"],
+  [".bag", "bz2"],
+  [".mcap", "none"],
+  [".mcap", "lz4"],
+  [".mcap", "zstd"],
+];
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10];
 
 export class Bag {
@@ -33,10 +40,38 @@ export class Bag {
     this.recorder = new Recorder(link, (fields) => this.endpoint.send(fields));
     this.player = new Player(link, (fields) => this.endpoint.send(fields));
     this.empty = h("p", { class: "empty" });
-    this.recordButton = h("button", { type: "button", "aria-expanded": "false", onclick: () => this.recorder.toggle(this.recordButton) }, h("span", { class: "dot" }), "Record …");
-    main.append(h("div", { class: "bar" }, this.files, h("button", { type: "button", title: "Look for bags again", "aria-label": "Look for bags again", onclick: () => this.endpoint.send({ op: "list" }) }, "↻"), this.recordButton, this.recorder.status),
-      this.problem, this.recorder.element, this.player.element, this.empty);
-    this.onKey = (event) => { if (place.isActive()) this.player.key(event); };
+    this.recordButton = h(
+      "button",
+      { type: "button", "aria-expanded": "false", onclick: () => this.recorder.toggle(this.recordButton) },
+      h("span", { class: "dot" }),
+      "Record …",
+    );
+    main.append(
+      h(
+        "div",
+        { class: "bar" },
+        this.files,
+        h(
+          "button",
+          {
+            type: "button",
+            title: "Look for bags again",
+            "aria-label": "Look for bags again",
+            onclick: () => this.endpoint.send({ op: "list" }),
+          },
+          "↻",
+        ),
+        this.recordButton,
+        this.recorder.status,
+      ),
+      this.problem,
+      this.recorder.element,
+      this.player.element,
+      this.empty,
+    );
+    this.onKey = (event) => {
+      if (place.isActive()) this.player.key(event);
+    };
     addEventListener("keydown", this.onKey);
     this.endpoint = new Endpoint(link, PROTOCOL, {
       opened: () => {
@@ -76,11 +111,28 @@ export class Bag {
 
   showFiles(files, folder, given) {
     this.files.title = t("Bags in {folder} and below", { folder });
-    fill(this.files, h("option", { value: "" }, files.length ? t("choose a bag") : t("no bag in {folder}", { folder })),
-      files.map(([name, size, modified]) => h("option", { value: name }, `${name}  ·  ${sizeText(size)}  ·  ${new Date(modified * 1000).toLocaleString(language)}`)));
+    fill(
+      this.files,
+      h("option", { value: "" }, files.length ? t("choose a bag") : t("no bag in {folder}", { folder })),
+      files.map(([name, size, modified]) =>
+        h(
+          "option",
+          { value: name },
+          `${name}  ·  ${sizeText(size)}  ·  ${new Date(modified * 1000).toLocaleString(language)}`,
+        ),
+      ),
+    );
     if (!this.name && given.length && !this.player.bag) this.choose(given[0]);
     this.files.value = this.name;
-    if (!this.player.bag) setText(this.empty, this.writes === false ? "" : files.length ? t("Choose a bag to look into it, or record one.") : t("There is no bag in {folder} yet: record one.", { folder }));
+    if (!this.player.bag)
+      setText(
+        this.empty,
+        this.writes === false
+          ? ""
+          : files.length
+            ? t("Choose a bag to look into it, or record one.")
+            : t("There is no bag in {folder} yet: record one.", { folder }),
+      );
   }
 
   choose(name) {
@@ -103,22 +155,58 @@ class Recorder {
     this.chosen = new Set();
     this.list = h("div", { class: "record-topics" });
     this.all = h("input", { type: "checkbox", onchange: () => this.chooseAll(this.all.checked) });
-    this.filter = h("input", { type: "search", placeholder: "Filter topics", "aria-label": "Filter topics", oninput: () => this.showFiltered() });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter topics",
+      "aria-label": "Filter topics",
+      oninput: () => this.showFiltered(),
+    });
     this.name = h("input", { type: "text", "aria-label": "Name of the recording", autocomplete: "off", size: 24 });
-    this.format = h("select", { "aria-label": "Format" }, COMPRESSIONS.map(([suffix, compression], number) =>
-      h("option", { value: number }, compression === "none" ? suffix : `${suffix}, ${compression}`)));
+    this.format = h(
+      "select",
+      { "aria-label": "Format" },
+      COMPRESSIONS.map(([suffix, compression], number) =>
+        h("option", { value: number }, compression === "none" ? suffix : `${suffix}, ${compression}`),
+      ),
+    );
     this.start = h("button", { type: "submit", class: "primary" }, "Record");
     this.count = h("span", { class: "muted" });
     this.empty = h("p", { class: "muted" });
-    this.element = h("form", { class: "panel recorder", hidden: true, onsubmit: (event) => { event.preventDefault(); this.record(); } },
-      h("div", { class: "bar" }, h("label", {}, this.all, t("all")), this.filter, this.count), this.list, this.empty,
-      h("div", { class: "bar" }, h("label", {}, "Name", this.name), this.format, this.start));
+    this.element = h(
+      "form",
+      {
+        class: "panel recorder",
+        hidden: true,
+        onsubmit: (event) => {
+          event.preventDefault();
+          this.record();
+        },
+      },
+      h("div", { class: "bar" }, h("label", {}, this.all, t("all")), this.filter, this.count),
+      this.list,
+      this.empty,
+      h("div", { class: "bar" }, h("label", {}, "Name", this.name), this.format, this.start),
+    );
     this.text = h("span", { class: "num" });
-    this.stop = h("button", { type: "button", class: "stop", onclick: () => {
-      this.stop.disabled = true;
-      this.send({ op: "stop" });
-    } }, "Stop");
-    this.status = h("span", { class: "bar recording", role: "status", hidden: true }, h("span", { class: "dot live" }), this.text, this.stop);
+    this.stop = h(
+      "button",
+      {
+        type: "button",
+        class: "stop",
+        onclick: () => {
+          this.stop.disabled = true;
+          this.send({ op: "stop" });
+        },
+      },
+      "Stop",
+    );
+    this.status = h(
+      "span",
+      { class: "bar recording", role: "status", hidden: true },
+      h("span", { class: "dot live" }),
+      this.text,
+      this.stop,
+    );
     this.error = h("span", { class: "error" });
     this.element.append(this.error);
     this.ending = link.watch(["channels"], () => this.update());
@@ -137,7 +225,14 @@ class Recorder {
     if (this.element.hidden) return;
     const now = new Date();
     const two = (value) => String(value).padStart(2, "0");
-    this.name.value = [now.getFullYear(), two(now.getMonth() + 1), two(now.getDate()), two(now.getHours()), two(now.getMinutes()), two(now.getSeconds())].join("-");
+    this.name.value = [
+      now.getFullYear(),
+      two(now.getMonth() + 1),
+      two(now.getDate()),
+      two(now.getHours()),
+      two(now.getMinutes()),
+      two(now.getSeconds()),
+    ].join("-");
     this.update();
   }
 
@@ -164,14 +259,34 @@ class Recorder {
   }
 
   makeRow(topic, type) {
-    const box = h("input", { type: "checkbox", checked: this.chosen.has(topic), onchange: () => {
-      if (box.checked) this.chosen.add(topic);
-      else this.chosen.delete(topic);
-      this.measure(row);
-      this.showCount();
-    } });
-    const row = { topic, type, box, end: null, rate: new Rate(), hz: h("span", { class: "num" }), bytes: h("span", { class: "num" }) };
-    row.element = h("label", { class: "record-row" }, box, h("span", { class: "name" }, topic), h("span", { class: "type" }, type), row.hz, row.bytes);
+    const box = h("input", {
+      type: "checkbox",
+      checked: this.chosen.has(topic),
+      onchange: () => {
+        if (box.checked) this.chosen.add(topic);
+        else this.chosen.delete(topic);
+        this.measure(row);
+        this.showCount();
+      },
+    });
+    const row = {
+      topic,
+      type,
+      box,
+      end: null,
+      rate: new Rate(),
+      hz: h("span", { class: "num" }),
+      bytes: h("span", { class: "num" }),
+    };
+    row.element = h(
+      "label",
+      { class: "record-row" },
+      box,
+      h("span", { class: "name" }, topic),
+      h("span", { class: "type" }, type),
+      row.hz,
+      row.bytes,
+    );
     row.element.dataset.topic = topic;
     this.measure(row);
     return row;
@@ -179,21 +294,27 @@ class Recorder {
 
   measure(row) {
     if (row.end || (HEAVY.has(row.type) && !row.box.checked)) return;
-    row.end = this.link.subscribe({ topic: row.topic, mode: "latest", isCounted: true }, ({ count = 0, bytes = 0 }) => row.rate.add(performance.now() / 1000, count, bytes));
+    row.end = this.link.subscribe({ topic: row.topic, mode: "latest", isCounted: true }, ({ count = 0, bytes = 0 }) =>
+      row.rate.add(performance.now() / 1000, count, bytes),
+    );
   }
 
   refresh() {
     if (this.element.hidden) return;
     for (const { rate, hz, bytes, end } of this.rows.values()) {
       const found = rate.at(performance.now() / 1000);
-      setText(hz, found ? `${found.hz < 10 ? found.hz.toFixed(2) : found.hz.toFixed(1)} Hz` : end ? "–" : t("choose to measure"));
+      setText(
+        hz,
+        found ? `${found.hz < 10 ? found.hz.toFixed(2) : found.hz.toFixed(1)} Hz` : end ? "–" : t("choose to measure"),
+      );
       setText(bytes, found ? bandwidth(found.bytes) : "");
     }
   }
 
   showFiltered() {
     const words = this.filter.value.toLowerCase().split(/\s+/);
-    for (const { element, topic, type } of this.rows.values()) element.hidden = !words.every((word) => `${topic} ${type}`.toLowerCase().includes(word));
+    for (const { element, topic, type } of this.rows.values())
+      element.hidden = !words.every((word) => `${topic} ${type}`.toLowerCase().includes(word));
   }
 
   chooseAll(isChosen) {
@@ -224,7 +345,11 @@ class Recorder {
     if (!this.isRecording) this.stop.disabled = false;
     this.status.hidden = !recording;
     this.status.classList.toggle("ended", !this.isRecording);
-    if (recording) setText(this.text, `${recording.name} · ${clockText(recording.seconds, 0.1)} · ${sizeText(recording.size)}${this.isRecording ? "" : recording.error ? "" : ` · ${t("saved")}`}`);
+    if (recording)
+      setText(
+        this.text,
+        `${recording.name} · ${clockText(recording.seconds, 0.1)} · ${sizeText(recording.size)}${this.isRecording ? "" : recording.error ? "" : ` · ${t("saved")}`}`,
+      );
     setText(this.error, recording?.error ?? "");
     this.showCount();
   }
@@ -238,29 +363,72 @@ class Player {
     this.send = send;
     this.bag = null;
     this.axis = new Axis(1, 1);
-    const button = (text, title, onclick, properties = {}) => h("button", { type: "button", title, "aria-label": title, onclick, ...properties }, text);
+    const button = (text, title, onclick, properties = {}) =>
+      h("button", { type: "button", title, "aria-label": title, onclick, ...properties }, text);
     this.playButton = button("▶", "Play (space)", () => this.toggle(), { class: "primary play" });
-    this.speed = h("input", { type: "range", min: -1, max: 1, step: 0.01, value: "0", "aria-label": "Speed", onchange: () => this.setSpeed(), oninput: () => this.setSpeed(), ondblclick: () => { this.speed.value = "0"; this.setSpeed(); } });
+    this.speed = h("input", {
+      type: "range",
+      min: -1,
+      max: 1,
+      step: 0.01,
+      value: "0",
+      "aria-label": "Speed",
+      onchange: () => this.setSpeed(),
+      oninput: () => this.setSpeed(),
+      ondblclick: () => {
+        this.speed.value = "0";
+        this.setSpeed();
+      },
+    });
     this.speedText = h("span", { class: "num speed" }, "1×");
     this.loop = h("input", { type: "checkbox", onchange: () => this.send({ op: "play", looping: this.loop.checked }) });
     this.publishing = h("input", { type: "checkbox", onchange: () => this.publish() });
     this.clock = h("input", { type: "checkbox", onchange: () => this.publish() });
-    this.clockLabel = h("label", { title: "Publish the bag's time, as rosbag play --clock", hidden: true }, this.clock, "/clock");
+    this.clockLabel = h(
+      "label",
+      { title: "Publish the bag's time, as rosbag play --clock", hidden: true },
+      this.clock,
+      "/clock",
+    );
     this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, "Publish");
     this.now = h("output", { class: "num now" });
     this.date = h("span", { class: "muted num" });
     this.labels = h("div", { class: "bag-labels" });
-    this.canvas = h("canvas", { class: "bag-rows", tabindex: 0, role: "slider", "aria-label": "Time in the bag", "aria-valuemin": 0 });
+    this.canvas = h("canvas", {
+      class: "bag-rows",
+      tabindex: 0,
+      role: "slider",
+      "aria-label": "Time in the bag",
+      "aria-valuemin": 0,
+    });
     this.head = h("div", { class: "playhead" });
     this.area = h("div", { class: "bag-area" }, this.canvas, this.head);
     this.moments = h("div", { class: "moments" });
-    this.element = h("div", { class: "bag", hidden: true },
-      h("div", { class: "panel bag-panel" },
-        h("div", { class: "bar transport" }, button("❙◀◀", "To the start (Home)", () => this.seek(0)), button("◀❙", "To the message before (left arrow)", () => this.send({ op: "back" })),
-          this.playButton, button("❙▶", "To the next message (right arrow)", () => this.send({ op: "step" })), this.now, this.date, h("span", { class: "spring" }),
-          h("label", { title: "Double click: 1×" }, "Speed", this.speed, this.speedText), h("label", {}, this.loop, t("loop")), this.publishLabel, this.clockLabel),
-        h("div", { class: "bag-timeline" }, this.labels, this.area)),
-      this.moments);
+    this.element = h(
+      "div",
+      { class: "bag", hidden: true },
+      h(
+        "div",
+        { class: "panel bag-panel" },
+        h(
+          "div",
+          { class: "bar transport" },
+          button("❙◀◀", "To the start (Home)", () => this.seek(0)),
+          button("◀❙", "To the message before (left arrow)", () => this.send({ op: "back" })),
+          this.playButton,
+          button("❙▶", "To the next message (right arrow)", () => this.send({ op: "step" })),
+          this.now,
+          this.date,
+          h("span", { class: "spring" }),
+          h("label", { title: "Double click: 1×" }, "Speed", this.speed, this.speedText),
+          h("label", {}, this.loop, t("loop")),
+          this.publishLabel,
+          this.clockLabel,
+        ),
+        h("div", { class: "bag-timeline" }, this.labels, this.area),
+      ),
+      this.moments,
+    );
     this.listen();
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(this.area);
@@ -293,13 +461,36 @@ class Player {
     let top = RULER;
     for (const [number, [name, type, count, definition]] of bag.topics.entries()) {
       const height = IMAGES.has(type) ? IMAGE_ROW : ROW;
-      this.rows.push({ number, name, type, count, definition, top, height, counts: [], thumbnails: new Map(), apart: APART, isShown: false, isPublished: name !== "/clock" });
+      this.rows.push({
+        number,
+        name,
+        type,
+        count,
+        definition,
+        top,
+        height,
+        counts: [],
+        thumbnails: new Map(),
+        apart: APART,
+        isShown: false,
+        isPublished: name !== "/clock",
+      });
       top += height;
     }
     this.height = top;
-    fill(this.labels, h("div", { class: "bag-corner muted" }, `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`), this.rows.map((row) => this.label(row)));
+    fill(
+      this.labels,
+      h(
+        "div",
+        { class: "bag-corner muted" },
+        `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`,
+      ),
+      this.rows.map((row) => this.label(row)),
+    );
     fill(this.moments);
-    const order = [...this.rows].sort((one, other) => IMAGES.has(other.type) - IMAGES.has(one.type) || other.count - one.count);
+    const order = [...this.rows].sort(
+      (one, other) => Number(IMAGES.has(other.type)) - Number(IMAGES.has(one.type)) || other.count - one.count,
+    );
     for (const row of order.slice(0, MAX_SHOWN_FIRST)) this.setShown(row, true);
     this.publishing.checked = false;
     this.clock.checked = false;
@@ -311,16 +502,36 @@ class Player {
   }
 
   label(row) {
-    row.box = h("input", { type: "checkbox", "aria-label": t("show {name}", { name: row.name }), title: "Show its messages", onchange: () => {
-      this.setShown(row, row.box.checked);
-      this.sendShown();
-    } });
-    row.publishBox = h("input", { type: "checkbox", class: "publish-box", checked: row.isPublished, "aria-label": t("publish {name}", { name: row.name }), title: "Publish this topic", hidden: true, onchange: () => {
-      row.isPublished = row.publishBox.checked;
-      this.publish();
-    } });
-    const element = h("div", { class: "bag-label", title: `${row.name}\n${row.type}\n${t("{count} messages", { count: row.count })}` }, row.box,
-      h("span", { class: "swatch", style: null }), h("span", { class: "name" }, row.name), h("span", { class: "num" }, String(row.count)), row.publishBox);
+    row.box = h("input", {
+      type: "checkbox",
+      "aria-label": t("show {name}", { name: row.name }),
+      title: "Show its messages",
+      onchange: () => {
+        this.setShown(row, row.box.checked);
+        this.sendShown();
+      },
+    });
+    row.publishBox = h("input", {
+      type: "checkbox",
+      class: "publish-box",
+      checked: row.isPublished,
+      "aria-label": t("publish {name}", { name: row.name }),
+      title: "Publish this topic",
+      hidden: true,
+      onchange: () => {
+        row.isPublished = row.publishBox.checked;
+        this.publish();
+      },
+    });
+    const element = h(
+      "div",
+      { class: "bag-label", title: `${row.name}\n${row.type}\n${t("{count} messages", { count: row.count })}` },
+      row.box,
+      h("span", { class: "swatch", style: null }),
+      h("span", { class: "name" }, row.name),
+      h("span", { class: "num" }, String(row.count)),
+      row.publishBox,
+    );
     element.style.height = `${row.height}px`;
     element.querySelector(".swatch").style.background = color(row.type);
     element.dataset.topic = row.name;
@@ -351,7 +562,11 @@ class Player {
     const isOn = this.publishing.checked;
     for (const { publishBox } of this.rows) publishBox.hidden = !isOn;
     this.clockLabel.hidden = !isOn;
-    this.send({ op: "publish", topics: isOn ? this.rows.filter((row) => row.isPublished).map(({ name }) => name) : [], clock: isOn && this.clock.checked });
+    this.send({
+      op: "publish",
+      topics: isOn ? this.rows.filter((row) => row.isPublished).map(({ name }) => name) : [],
+      clock: isOn && this.clock.checked,
+    });
   }
 
   key(event) {
@@ -359,7 +574,13 @@ class Player {
     // Buttons and switches have keys of their own: space and enter.
     const isField = event.target.closest("input:not([type=checkbox]), select, textarea");
     if (isField || (event.key === " " && event.target.closest("input, button, a"))) return;
-    const action = { " ": () => this.toggle(), ArrowLeft: () => this.send({ op: "back" }), ArrowRight: () => this.send({ op: "step" }), Home: () => this.seek(0), End: () => this.seek(this.bag.length) }[event.key];
+    const action = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => this.send({ op: "back" }),
+      ArrowRight: () => this.send({ op: "step" }),
+      Home: () => this.seek(0),
+      End: () => this.seek(this.bag.length),
+    }[event.key];
     if (!action) return;
     event.preventDefault();
     action();
@@ -383,14 +604,22 @@ class Player {
         this.moved();
       } else this.seek(this.axis.time(at(event)));
     });
-    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { drag = null; });
-    canvas.addEventListener("wheel", (event) => {
-      if (!this.bag) return;
-      event.preventDefault();
-      if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.axis.pan(event.deltaX || event.deltaY);
-      else this.axis.zoom(Math.exp(event.deltaY * 0.0015), at(event));
-      this.moved();
-    }, { passive: false });
+    for (const name of ["pointerup", "pointercancel"])
+      canvas.addEventListener(name, () => {
+        drag = null;
+      });
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (!this.bag) return;
+        event.preventDefault();
+        if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY))
+          this.axis.pan(event.deltaX || event.deltaY);
+        else this.axis.zoom(Math.exp(event.deltaY * 0.0015), at(event));
+        this.moved();
+      },
+      { passive: false },
+    );
     canvas.addEventListener("dblclick", () => {
       this.axis.fit();
       this.moved();
@@ -443,7 +672,7 @@ class Player {
     const time = view.getFloat64(3, true);
     const isMoment = view.getUint8(0) === MOMENT;
     const { bag } = this;
-    let message = null;
+    let message;
     let error = "";
     try {
       const definition = this.link.definition(row.type, row.definition);
@@ -454,7 +683,7 @@ class Player {
         const image = await pictureOf(message);
         const isWanted = bag === this.bag;
         if (isWanted) row.thumbnails.set(time, small(image, IMAGE_ROW - 6));
-        image.close?.();
+        if (image instanceof ImageBitmap) image.close();
         if (!isWanted) return;
         const apart = row.thumbnails.get(time).width + 6;
         if (apart !== row.apart) {
@@ -591,12 +820,20 @@ class Card {
     this.time = h("span", { class: "num muted" });
     this.problem = h("p", { class: "error" });
     this.isImage = IMAGES.has(row.type);
-    this.canvas = this.isImage ? h("canvas", { class: "image", role: "img", width: 0, height: 0, "aria-label": row.name }) : null;
+    this.canvas = this.isImage
+      ? h("canvas", { class: "image", role: "img", width: 0, height: 0, "aria-label": row.name })
+      : null;
     this.tree = this.isImage ? null : new Tree(row.name);
     this.body = h("div", { class: this.isImage ? "card-image" : "fields" }, this.canvas ?? this.tree.element);
     this.waiting = h("p", { class: "muted" }, "No message yet at this time.");
-    this.element = h("section", { class: `panel card${this.isImage ? " wide" : ""}` },
-      h("h2", {}, h("span", { class: "name" }, row.name), h("span", { class: "type" }, row.type), this.time), this.problem, this.waiting, this.body);
+    this.element = h(
+      "section",
+      { class: `panel card${this.isImage ? " wide" : ""}` },
+      h("h2", {}, h("span", { class: "name" }, row.name), h("span", { class: "type" }, row.type), this.time),
+      this.problem,
+      this.waiting,
+      this.body,
+    );
     this.element.dataset.topic = row.name;
   }
 
@@ -622,7 +859,7 @@ class Card {
           this.canvas.height = image.height;
         }
         this.canvas.getContext("2d").drawImage(image, 0, 0);
-        image.close?.();
+        if (image instanceof ImageBitmap) image.close();
       } catch (error) {
         this.fail(error.message);
       }
@@ -646,7 +883,9 @@ async function pictureOf(message) {
   try {
     return await createImageBitmap(new Blob([message.data]));
   } catch {
-    throw new Error(t('a compressed image of format "{format}" cannot be shown by this browser', { format: message.format }));
+    throw new Error(
+      t('a compressed image of format "{format}" cannot be shown by this browser', { format: message.format }),
+    );
   }
 }
 

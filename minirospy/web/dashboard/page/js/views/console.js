@@ -50,35 +50,107 @@ export class Console {
     this.selected = null;
     this.nodes = new Set();
 
-    this.buttons = new Map(LEVELS.map(([level, name]) => [level,
-      h("button", { type: "button", class: `level l${level}`, "aria-pressed": String(this.levels.has(level)), onclick: () => this.switchLevel(level) }, h("span", {}, t(name)), " ", h("span", { class: "count" }, "0"))]));
-    this.node = h("select", { "aria-label": "Node", onchange: () => this.change() }, h("option", { value: "" }, "all nodes"));
-    this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.change() });
+    this.buttons = new Map(
+      LEVELS.map(([level, name]) => [
+        level,
+        h(
+          "button",
+          {
+            type: "button",
+            class: `level l${level}`,
+            "aria-pressed": String(this.levels.has(level)),
+            onclick: () => this.switchLevel(level),
+          },
+          h("span", {}, t(name)),
+          " ",
+          h("span", { class: "count" }, "0"),
+        ),
+      ]),
+    );
+    this.node = h(
+      "select",
+      { "aria-label": "Node", onchange: () => this.change() },
+      h("option", { value: "" }, "all nodes"),
+    );
+    this.text = h("input", {
+      type: "search",
+      placeholder: "Search messages and nodes",
+      "aria-label": "Search",
+      value: words.get("text") ?? "",
+      oninput: () => this.change(),
+    });
     this.isRegex = h("input", { type: "checkbox", checked: words.get("regex") === "1", onchange: () => this.change() });
-    this.isExcluded = h("input", { type: "checkbox", checked: words.get("exclude") === "1", onchange: () => this.change() });
+    this.isExcluded = h("input", {
+      type: "checkbox",
+      checked: words.get("exclude") === "1",
+      onchange: () => this.change(),
+    });
     this.isMarked = h("input", { type: "checkbox", checked: words.get("mark") === "1", onchange: () => this.change() });
-    this.file = h("input", { type: "file", accept: ".log,.txt", hidden: true, "aria-label": "Log file", onchange: () => this.open(this.file) });
+    this.file = h("input", {
+      type: "file",
+      accept: ".log,.txt",
+      hidden: true,
+      "aria-label": "Log file",
+      onchange: () => this.open(this.file),
+    });
     this.pauseButton = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.pause() }, "Pause");
-    this.latest = h("button", { type: "button", hidden: true, class: "primary", onclick: () => { this.list.follow(); this.showCount(); } }, "↓ Latest");
+    this.latest = h(
+      "button",
+      {
+        type: "button",
+        hidden: true,
+        class: "primary",
+        onclick: () => {
+          this.list.follow();
+          this.showCount();
+        },
+      },
+      "↓ Latest",
+    );
     this.loggersButton = h("button", { type: "button", onclick: () => this.toggleLoggers() }, "Logger levels");
     this.count = h("span", { class: "muted" });
     this.problem = h("span", { class: "error" });
-    this.list = new VirtualList(() => this.makeRow(), (row, index) => this.showRow(row, this.shown[index]));
+    this.list = new VirtualList(
+      () => this.makeRow(),
+      (row, index) => this.showRow(row, this.shown[index]),
+    );
     this.list.element.addEventListener("scroll", () => this.showCount());
     this.list.element.setAttribute("aria-label", t("Log lines"));
     this.details = h("div", { class: "panel details", hidden: true });
     this.loggers = h("div", { class: "panel details loggers", hidden: true });
     main.append(
-      h("div", { class: "bar" }, [...this.buttons.values()], this.node, this.text,
-        h("label", {}, this.isRegex, t("regex")), h("label", {}, this.isExcluded, t("exclude")),
-        h("label", { title: "Show all lines, and mark those that fit" }, this.isMarked, t("highlight")), this.problem),
-      h("div", { class: "bar" }, this.pauseButton,
+      h(
+        "div",
+        { class: "bar" },
+        [...this.buttons.values()],
+        this.node,
+        this.text,
+        h("label", {}, this.isRegex, t("regex")),
+        h("label", {}, this.isExcluded, t("exclude")),
+        h("label", { title: "Show all lines, and mark those that fit" }, this.isMarked, t("highlight")),
+        this.problem,
+      ),
+      h(
+        "div",
+        { class: "bar" },
+        this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),
         h("button", { type: "button", onclick: () => this.save() }, "Export CSV"),
-        h("button", { type: "button", title: "rosout.log, or a node's log of ~/.ros/log", onclick: () => this.file.click() }, "Open log"), this.file,
-        this.loggersButton, this.count, this.latest),
-      this.loggers, h("div", { class: "panel lines" }, this.list.element), this.details);
+        h(
+          "button",
+          { type: "button", title: "rosout.log, or a node's log of ~/.ros/log", onclick: () => this.file.click() },
+          "Open log",
+        ),
+        this.file,
+        this.loggersButton,
+        this.count,
+        this.latest,
+      ),
+      this.loggers,
+      h("div", { class: "panel lines" }, this.list.element),
+      this.details,
+    );
 
     this.listener = (cut) => this.arrived(cut);
     listeners.add(this.listener);
@@ -120,13 +192,26 @@ export class Console {
   change() {
     this.filter();
     const isAll = this.levels.size === LEVELS.length;
-    this.place.remember({ text: this.text.value, node: this.node.value, levels: isAll ? "" : [...this.levels].join(",") || "0", regex: this.isRegex.checked, exclude: this.isExcluded.checked, mark: this.isMarked.checked });
+    this.place.remember({
+      text: this.text.value,
+      node: this.node.value,
+      levels: isAll ? "" : [...this.levels].join(",") || "0",
+      regex: this.isRegex.checked,
+      exclude: this.isExcluded.checked,
+      mark: this.isMarked.checked,
+    });
   }
 
   filter() {
     const { checked: isMarked } = this.isMarked;
     try {
-      const filter = { levels: this.levels, node: this.node.value, text: this.text.value, isRegex: this.isRegex.checked, isExcluded: this.isExcluded.checked };
+      const filter = {
+        levels: this.levels,
+        node: this.node.value,
+        text: this.text.value,
+        isRegex: this.isRegex.checked,
+        isExcluded: this.isExcluded.checked,
+      };
       const passes = filterOf(filter);
       this.marks = isMarked && filter.text ? passes : null;
       this.passes = isMarked ? filterOf({ ...filter, text: "" }) : passes;
@@ -161,13 +246,23 @@ export class Console {
   showCount() {
     for (const [level, button] of this.buttons) setText(button.querySelector(".count"), String(counts.get(level)));
     const waiting = this.isPaused ? removed + lines.length - this.seen : 0;
-    setText(this.count, t("{count} of {all} lines", { count: this.shown.length, all: lines.length }) + (this.isPaused ? t(", paused, {waiting} new", { waiting }) : ""));
+    setText(
+      this.count,
+      t("{count} of {all} lines", { count: this.shown.length, all: lines.length }) +
+        (this.isPaused ? t(", paused, {waiting} new", { waiting }) : ""),
+    );
     this.latest.hidden = this.list.isFollowing;
   }
 
   makeRow() {
-    const row = h("div", { class: "line", onclick: () => this.select(row.line) },
-      h("span", { class: "time" }), h("span", { class: "word" }), h("span", { class: "node" }), h("span", { class: "text" }));
+    const row = h(
+      "div",
+      { class: "line", onclick: () => this.select(row.line) },
+      h("span", { class: "time" }),
+      h("span", { class: "word" }),
+      h("span", { class: "node" }),
+      h("span", { class: "text" }),
+    );
     return row;
   }
 
@@ -188,9 +283,27 @@ export class Console {
     this.selected = this.selected === line ? null : line;
     this.details.hidden = !this.selected;
     if (this.selected) {
-      fill(this.details, h("div", { class: "bar" }, h("strong", {}, `${t(NAMES.get(line.level) ?? String(line.level))} · ${line.node}`),
-        h("span", { class: "muted" }, `${timeText(line.stamp)} · ${line.file}:${line.line} ${line.function}`),
-        h("button", { type: "button", onclick: () => { this.node.value = line.node; this.change(); } }, "Only this node")), h("pre", {}, line.text));
+      fill(
+        this.details,
+        h(
+          "div",
+          { class: "bar" },
+          h("strong", {}, `${t(NAMES.get(line.level) ?? String(line.level))} · ${line.node}`),
+          h("span", { class: "muted" }, `${timeText(line.stamp)} · ${line.file}:${line.line} ${line.function}`),
+          h(
+            "button",
+            {
+              type: "button",
+              onclick: () => {
+                this.node.value = line.node;
+                this.change();
+              },
+            },
+            "Only this node",
+          ),
+        ),
+        h("pre", {}, line.text),
+      );
     }
     this.list.draw();
   }
@@ -253,12 +366,31 @@ export class Console {
   }
 
   showLoggers() {
-    const nodes = [...this.link.services.keys()].filter((name) => name.endsWith("/get_loggers")).map((name) => name.slice(0, -"/get_loggers".length));
+    const nodes = [...this.link.services.keys()]
+      .filter((name) => name.endsWith("/get_loggers"))
+      .map((name) => name.slice(0, -"/get_loggers".length));
     const list = h("div", { class: "grid" });
-    const choice = h("select", { "aria-label": "Node of the loggers", onchange: () => this.showLoggersOf(choice.value, list) },
-      h("option", { value: "" }, "choose a node"), nodes.map((name) => h("option", { value: name }, name)));
-    fill(this.loggers, h("div", { class: "bar" }, h("strong", {}, "Logger levels"), choice,
-      h("span", { class: "muted" }, this.link.mayWrite ? t("what a node logs, from this level on") : t("This token is read-only."))), list);
+    const choice = h(
+      "select",
+      { "aria-label": "Node of the loggers", onchange: () => this.showLoggersOf(choice.value, list) },
+      h("option", { value: "" }, "choose a node"),
+      nodes.map((name) => h("option", { value: name }, name)),
+    );
+    fill(
+      this.loggers,
+      h(
+        "div",
+        { class: "bar" },
+        h("strong", {}, "Logger levels"),
+        choice,
+        h(
+          "span",
+          { class: "muted" },
+          this.link.mayWrite ? t("what a node logs, from this level on") : t("This token is read-only."),
+        ),
+      ),
+      list,
+    );
   }
 
   async showLoggersOf(node, list) {
@@ -267,8 +399,11 @@ export class Console {
     try {
       const { loggers } = await this.link.call(`${node}/get_loggers`, {});
       for (const logger of loggers) {
-        const choice = h("select", { "aria-label": logger.name, onchange: () => this.setLevel(node, logger.name, choice, list) },
-          LEVELS.map(([, name]) => h("option", { value: name.toLowerCase() }, name)));
+        const choice = h(
+          "select",
+          { "aria-label": logger.name, onchange: () => this.setLevel(node, logger.name, choice, list) },
+          LEVELS.map(([, name]) => h("option", { value: name.toLowerCase() }, name)),
+        );
         choice.value = logger.level.toLowerCase();
         list.append(h("span", {}, logger.name), choice);
       }
@@ -288,5 +423,9 @@ export class Console {
 
 /** Return a text that stays in its row: all of it is below after a click. */
 function oneLine(text) {
-  return text.slice(0, MAX_IN_ROW).replace(/[\r\n\v\f\u0085\u2028\u2029]+/g, (breaks, at) => (at + breaks.length < Math.min(text.length, MAX_IN_ROW) ? " ↵ " : ""));
+  return text
+    .slice(0, MAX_IN_ROW)
+    .replace(/[\r\n\v\f\u0085\u2028\u2029]+/g, (breaks, at) =>
+      at + breaks.length < Math.min(text.length, MAX_IN_ROW) ? " ↵ " : "",
+    );
 }

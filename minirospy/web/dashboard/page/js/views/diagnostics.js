@@ -1,4 +1,5 @@
-// Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values on a click.
+// Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values
+// on a click.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { timeText } from "../logs.js";
@@ -23,14 +24,26 @@ export class Diagnostics {
     this.folded = new Set();
     this.end = null;
     this.choice = h("select", { "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
-    this.counts = LEVELS.map((name, level) => h("span", { class: `badge d${level}` }, t(name), " ", h("span", { class: "count" }, "0")));
-    this.isBad = h("input", { type: "checkbox", checked: words.get("problems") === "1", onchange: () => { this.remember(); this.draw(); } });
+    this.counts = LEVELS.map((name, level) =>
+      h("span", { class: `badge d${level}` }, t(name), " ", h("span", { class: "count" }, "0")),
+    );
+    this.isBad = h("input", {
+      type: "checkbox",
+      checked: words.get("problems") === "1",
+      onchange: () => {
+        this.remember();
+        this.draw();
+      },
+    });
     this.tree = h("div", { class: "panel tree", role: "tree", "aria-label": "Diagnostics" });
     this.empty = h("p", { class: "empty" });
     this.side = h("div", { class: "panel side details", hidden: true });
     this.problem = h("p", { class: "error" });
-    main.append(h("div", { class: "bar" }, this.choice, this.counts, h("label", {}, this.isBad, "only problems")), this.problem,
-      h("div", { class: "split" }, h("div", { class: "diagnostics" }, this.tree, this.empty), this.side));
+    main.append(
+      h("div", { class: "bar" }, this.choice, this.counts, h("label", {}, this.isBad, "only problems")),
+      this.problem,
+      h("div", { class: "split" }, h("div", { class: "diagnostics" }, this.tree, this.empty), this.side),
+    );
     this.ending = link.watch(["channels", "state"], () => this.update());
     this.timer = setInterval(() => this.draw(), 1000);
   }
@@ -46,7 +59,11 @@ export class Diagnostics {
     const known = [...new Set([AGGREGATED, USUAL, ...topics, ...(this.topic ? [this.topic] : [])])];
     if (known.join(" ") !== this.known) {
       this.known = known.join(" ");
-      fill(this.choice, h("option", { value: "" }, "the aggregated ones, else all"), known.map((topic) => h("option", { value: topic }, topic)));
+      fill(
+        this.choice,
+        h("option", { value: "" }, "the aggregated ones, else all"),
+        known.map((topic) => h("option", { value: topic }, topic)),
+      );
     }
     this.choice.value = this.topic;
     const wanted = this.topic || (topics.includes(AGGREGATED) ? AGGREGATED : USUAL);
@@ -80,7 +97,9 @@ export class Diagnostics {
         if (this.statuses.size >= MOST && !this.statuses.has(path)) continue;
         const before = this.statuses.get(path);
         const isSame = before?.level === level && before.message === text && !before.isSilent;
-        const changes = isSame ? before.changes : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MAX_CHANGES);
+        const changes = isSame
+          ? before.changes
+          : [{ time: Date.now() / 1000, level, message: text }, ...(before?.changes ?? [])].slice(0, MAX_CHANGES);
         this.statuses.set(path, { path, name, level, message: text, hardware, values, at, changes });
       }
     }
@@ -96,7 +115,10 @@ export class Diagnostics {
   /** Record that the messages of a status have ended. */
   silence(status) {
     status.isSilent = true;
-    status.changes = [{ time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) }, ...status.changes].slice(0, MAX_CHANGES);
+    status.changes = [
+      { time: Date.now() / 1000, level: 3, message: t("no message for {seconds} seconds", { seconds: STALE_SECONDS }) },
+      ...status.changes,
+    ].slice(0, MAX_CHANGES);
   }
 
   /** Return the nodes of the tree in order, each with its worst level; parents that nobody reports are added. */
@@ -109,14 +131,16 @@ export class Diagnostics {
       const parts = isTree ? path.slice(1).split("/") : [status.name];
       parts.forEach((part, depth) => {
         const key = isTree ? `/${parts.slice(0, depth + 1).join("/")}` : path;
-        if (!nodes.has(key)) nodes.set(key, { path: key, label: part, depth, level: -1, status: null, hasChildren: false });
+        if (!nodes.has(key))
+          nodes.set(key, { path: key, label: part, depth, level: -1, status: null, hasChildren: false });
         const node = nodes.get(key);
         if (depth < parts.length - 1) node.hasChildren = true;
         else node.status = status;
       });
     }
     const ordered = [...nodes.values()].sort((one, other) => comparison(one.path.split("/"), other.path.split("/")));
-    for (const { status } of ordered) if (status && !status.isSilent && now - status.at > STALE_SECONDS) this.silence(status);
+    for (const { status } of ordered)
+      if (status && !status.isSilent && now - status.at > STALE_SECONDS) this.silence(status);
     for (const node of ordered) if (node.status) node.level = this.levelOf(node.status, now);
     // From the leaves up: a parent without a status has the worst of its children.
     for (const node of [...ordered].reverse()) {
@@ -132,7 +156,8 @@ export class Diagnostics {
     const counts = [0, 0, 0, 0];
     for (const { status, level, hasChildren } of nodes) if (status && !hasChildren) counts[level] += 1;
     this.counts.forEach((badge, level) => setText(badge.querySelector(".count"), String(counts[level])));
-    const isHidden = ({ path, level }) => (this.isBad.checked && level < 1) || [...this.folded].some((each) => path.startsWith(`${each}/`));
+    const isHidden = ({ path, level }) =>
+      (this.isBad.checked && level < 1) || [...this.folded].some((each) => path.startsWith(`${each}/`));
     const shown = nodes.filter((node) => !isHidden(node));
     const seen = new Set(shown.map(({ path }) => path));
     for (const [path, row] of [...this.rows]) {
@@ -149,18 +174,39 @@ export class Diagnostics {
       after = row;
     }
     this.tree.hidden = !shown.length;
-    setText(this.empty, shown.length || this.link.state !== "open" ? "" : nodes.length ? t("Nothing reports a problem.") : t("Nothing has come on {topic}.", { topic: this.subscribed }));
+    setText(
+      this.empty,
+      shown.length || this.link.state !== "open"
+        ? ""
+        : nodes.length
+          ? t("Nothing reports a problem.")
+          : t("Nothing has come on {topic}.", { topic: this.subscribed }),
+    );
     this.showChosen(nodes);
   }
 
   makeRow(path) {
-    const fold = h("button", { type: "button", class: "fold", "aria-label": "Fold", onclick: () => {
-      if (!this.folded.delete(path)) this.folded.add(path);
-      this.draw();
-    } });
-    const row = h("div", { class: "status-row", role: "treeitem" }, fold,
-      h("button", { type: "button", class: "report", onclick: () => this.select(path) },
-        h("span", { class: "badge" }), h("span", { class: "name" }), h("span", { class: "muted text" })));
+    const fold = h("button", {
+      type: "button",
+      class: "fold",
+      "aria-label": "Fold",
+      onclick: () => {
+        if (!this.folded.delete(path)) this.folded.add(path);
+        this.draw();
+      },
+    });
+    const row = h(
+      "div",
+      { class: "status-row", role: "treeitem" },
+      fold,
+      h(
+        "button",
+        { type: "button", class: "report", onclick: () => this.select(path) },
+        h("span", { class: "badge" }),
+        h("span", { class: "name" }),
+        h("span", { class: "muted text" }),
+      ),
+    );
     row.dataset.path = path;
     this.rows.set(path, row);
     return row;
@@ -191,14 +237,54 @@ export class Diagnostics {
     this.side.hidden = !node;
     if (!node) return;
     const { status, level } = node;
-    const content = JSON.stringify([node.path, level, status?.message, status?.hardware, status?.values, status?.changes]);
+    const content = JSON.stringify([
+      node.path,
+      level,
+      status?.message,
+      status?.hardware,
+      status?.values,
+      status?.changes,
+    ]);
     if (content === this.shown) return;
     this.shown = content;
-    refill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
+    refill(
+      this.side,
+      h("h2", {}, status?.name ?? node.path),
+      h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
       status?.hardware ? h("p", { class: "muted" }, t("hardware: "), status.hardware) : null,
-      h("table", { class: "values" }, h("tbody", {}, (status?.values ?? []).map(({ key, value }) => h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value))))),
+      h(
+        "table",
+        { class: "values" },
+        h(
+          "tbody",
+          {},
+          (status?.values ?? []).map(({ key, value }) =>
+            h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value)),
+          ),
+        ),
+      ),
       // What it was before, the newest first.
-      status?.changes.length > 1 ? [h("h3", {}, "History"), h("ul", { class: "history" }, status.changes.map((each) => h("li", {}, h("span", { class: "mono muted" }, timeText(each.time)), " ", h("span", { class: `badge d${Math.min(3, each.level)}` }, t(LEVELS[Math.min(3, each.level)])), " ", each.message)))] : null);
+      status?.changes.length > 1
+        ? [
+            h("h3", {}, "History"),
+            h(
+              "ul",
+              { class: "history" },
+              status.changes.map((each) =>
+                h(
+                  "li",
+                  {},
+                  h("span", { class: "mono muted" }, timeText(each.time)),
+                  " ",
+                  h("span", { class: `badge d${Math.min(3, each.level)}` }, t(LEVELS[Math.min(3, each.level)])),
+                  " ",
+                  each.message,
+                ),
+              ),
+            ),
+          ]
+        : null,
+    );
   }
 }
 

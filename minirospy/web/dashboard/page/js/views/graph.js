@@ -8,7 +8,11 @@ import { PanZoom } from "../panzoom.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
 
-const MODES = [["active", "Nodes and topics (active)"], ["all", "Nodes and topics (all)"], ["nodes", "Nodes only"]];
+const MODES = [
+  ["active", "Nodes and topics (active)"],
+  ["all", "Nodes and topics (all)"],
+  ["nodes", "Nodes only"],
+];
 const SHAPES = { n: "node", t: "topic", a: "action" };
 const HEIGHT = 36;
 const MAX_TRIED = 150; // nodes and topics that are laid out in two ways
@@ -21,29 +25,84 @@ export class Graph {
     this.selected = null;
     this.signature = null;
     this.end = null;
-    this.mode = h("select", { "aria-label": "What is shown", onchange: () => this.change() }, MODES.map(([value, name]) => h("option", { value }, name)));
-    this.hidesDebug = h("input", { type: "checkbox", checked: words.get("debug") !== "1", onchange: () => this.change() });
+    this.mode = h(
+      "select",
+      { "aria-label": "What is shown", onchange: () => this.change() },
+      MODES.map(([value, name]) => h("option", { value }, name)),
+    );
+    this.hidesDebug = h("input", {
+      type: "checkbox",
+      checked: words.get("debug") !== "1",
+      onchange: () => this.change(),
+    });
     if (MODES.some(([value]) => value === words.get("mode"))) this.mode.value = words.get("mode");
-    this.filter = h("input", { type: "search", placeholder: "Filter names", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => this.change() });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter names",
+      "aria-label": "Filter",
+      value: words.get("filter") ?? "",
+      oninput: () => this.change(),
+    });
     this.arrow = uniqueId("arrow");
     this.drawing = svg("g", {});
-    this.picture = svg("svg", { class: "graph", role: "group", "aria-label": "Graph of nodes and topics" },
-      svg("defs", {}, svg("marker", { id: this.arrow, viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 7, markerHeight: 7, orient: "auto-start-reverse" },
-        svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
+    this.picture = svg(
+      "svg",
+      { class: "graph", role: "group", "aria-label": "Graph of nodes and topics" },
+      svg(
+        "defs",
+        {},
+        svg(
+          "marker",
+          {
+            id: this.arrow,
+            viewBox: "0 0 10 10",
+            refX: 9,
+            refY: 5,
+            markerWidth: 7,
+            markerHeight: 7,
+            orient: "auto-start-reverse",
+          },
+          svg("path", { d: "M0 0 10 5 0 10z", class: "head" }),
+        ),
+      ),
+      this.drawing,
+    );
     this.details = h("aside", { class: "panel details side", hidden: true });
     this.empty = h("p", { class: "empty" });
-    this.hasRates = h("input", { type: "checkbox", checked: words.get("rates") !== "0", onchange: () => this.change() });
-    this.hasGroups = h("input", { type: "checkbox", checked: words.get("groups") === "1", onchange: () => this.change() });
+    this.hasRates = h("input", {
+      type: "checkbox",
+      checked: words.get("rates") !== "0",
+      onchange: () => this.change(),
+    });
+    this.hasGroups = h("input", {
+      type: "checkbox",
+      checked: words.get("groups") === "1",
+      onchange: () => this.change(),
+    });
     this.folds = h("input", { type: "checkbox", checked: words.get("fold") !== "0", onchange: () => this.change() });
     this.faults = h("span", { class: "error", role: "status" });
-    main.append(h("div", { class: "bar" }, this.mode, h("label", {}, this.hidesDebug, "hide debug"), h("label", {}, this.hasRates, t("rates")),
-      h("label", {}, this.folds, "fold actions"), h("label", {}, this.hasGroups, t("namespaces")), this.filter,
-      h("button", { type: "button", onclick: () => this.panzoom.fit() }, "Fit"), this.faults),
-    h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details));
+    main.append(
+      h(
+        "div",
+        { class: "bar" },
+        this.mode,
+        h("label", {}, this.hidesDebug, "hide debug"),
+        h("label", {}, this.hasRates, t("rates")),
+        h("label", {}, this.folds, "fold actions"),
+        h("label", {}, this.hasGroups, t("namespaces")),
+        this.filter,
+        h("button", { type: "button", onclick: () => this.panzoom.fit() }, "Fit"),
+        this.faults,
+      ),
+      h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details),
+    );
     this.panzoom = new PanZoom(this.picture, this.drawing);
     this.report = { nodes: [], traffic: [], mismatches: {} };
     this.drawn = [];
-    this.endings = [link.watch(["graph", "channels", "state"], () => this.update()), link.tools.watch((report) => this.reported(report))];
+    this.endings = [
+      link.watch(["graph", "channels", "state"], () => this.update()),
+      link.tools.watch((report) => this.reported(report)),
+    ];
   }
 
   close() {
@@ -53,12 +112,24 @@ export class Graph {
   }
 
   elements() {
-    return elementsOf(this.link.graph, { mode: this.mode.value, hidesDebug: this.hidesDebug.checked, filter: this.filter.value, ownNode: this.link.node, folds: this.folds.checked });
+    return elementsOf(this.link.graph, {
+      mode: this.mode.value,
+      hidesDebug: this.hidesDebug.checked,
+      filter: this.filter.value,
+      ownNode: this.link.node,
+      folds: this.folds.checked,
+    });
   }
 
   change() {
-    this.place.remember({ mode: this.mode.value === MODES[0][0] ? "" : this.mode.value, debug: !this.hidesDebug.checked, filter: this.filter.value,
-      rates: this.hasRates.checked ? "" : "0", groups: this.hasGroups.checked, fold: this.folds.checked ? "" : "0" });
+    this.place.remember({
+      mode: this.mode.value === MODES[0][0] ? "" : this.mode.value,
+      debug: !this.hidesDebug.checked,
+      filter: this.filter.value,
+      rates: this.hasRates.checked ? "" : "0",
+      groups: this.hasGroups.checked,
+      fold: this.folds.checked ? "" : "0",
+    });
     this.update();
   }
 
@@ -66,14 +137,25 @@ export class Graph {
     // While the connection is lost, the last graph stays.
     if (this.link.state !== "open" && this.signature !== null) return;
     const found = this.elements();
-    const signature = JSON.stringify([[...found.nodes].sort(), [...found.topics].sort(), [...found.actions].sort(), found.edges, this.hasRates.checked, this.hasGroups.checked]);
+    const signature = JSON.stringify([
+      [...found.nodes].sort(),
+      [...found.topics].sort(),
+      [...found.actions].sort(),
+      found.edges,
+      this.hasRates.checked,
+      this.hasGroups.checked,
+    ]);
     if (signature !== this.signature) {
       redraw(this.drawing, () => {
         this.signature = signature;
         this.draw(found);
       });
     }
-    this.empty.textContent = found.nodes.size ? "" : this.link.state === "open" ? t("No nodes yet. Start one: it appears here.") : "";
+    this.empty.textContent = found.nodes.size
+      ? ""
+      : this.link.state === "open"
+        ? t("No nodes yet. Start one: it appears here.")
+        : "";
     if (this.selected) this.showDetails();
   }
 
@@ -92,7 +174,12 @@ export class Graph {
       const { key } = part.dataset;
       part.classList.toggle("bad", dead.has(key) || (key[0] === "t" && Object.hasOwn(mismatches, key.slice(1))));
     }
-    const texts = [dead.size ? t(dead.size === 1 ? "{count} dead node" : "{count} dead nodes", { count: dead.size }) : "", ...Object.keys(mismatches).slice(0, 2).map((topic) => t("{topic} has two types", { topic }))];
+    const texts = [
+      dead.size ? t(dead.size === 1 ? "{count} dead node" : "{count} dead nodes", { count: dead.size }) : "",
+      ...Object.keys(mismatches)
+        .slice(0, 2)
+        .map((topic) => t("{topic} has two types", { topic })),
+    ];
     setText(this.faults, texts.filter(Boolean).join(", "));
     for (const { above, below, edge } of this.drawn) {
       const found = this.hasRates.checked ? trafficOf(edge, this.report.traffic) : null;
@@ -128,18 +215,35 @@ export class Graph {
 
   /** Lay out each connected part, and put them in rows. */
   lay({ nodes, topics, actions, edges }, rankdir) {
-    const keys = [["n", nodes], ["t", topics], ["a", actions]].flatMap(([kind, names]) => [...names].sort().map((name) => kind + name));
+    const keys = [
+      ["n", nodes],
+      ["t", topics],
+      ["a", actions],
+    ].flatMap(([kind, names]) => [...names].sort().map((name) => kind + name));
     const groups = this.hasGroups.checked ? groupsOf(keys) : new Map();
     const connected = connectedOf(keys, [...edges.map(({ from, to }) => [from, to]), ...groups.values()]);
     const parts = new Map();
     const partOf = (key) => parts.get(connected.get(key));
     for (const part of connected.values()) {
       if (parts.has(part)) continue;
-      parts.set(part, new Layered({ multigraph: true, compound: true }).setGraph({ rankdir, nodesep: 22, ranksep: this.hasRates.checked ? 30 : 60, marginx: 12, marginy: this.hasGroups.checked ? 26 : 12 }));
+      parts.set(
+        part,
+        new Layered({ multigraph: true, compound: true }).setGraph({
+          rankdir,
+          nodesep: 22,
+          ranksep: this.hasRates.checked ? 30 : 60,
+          marginx: 12,
+          marginy: this.hasGroups.checked ? 26 : 12,
+        }),
+      );
     }
     const measure = h("canvas").getContext("2d");
     measure.font = "600 14px system-ui, sans-serif";
-    for (const key of keys) partOf(key).setNode(key, { width: measure.measureText(brief(key.slice(1))).width + (key[0] === "t" ? 26 : 44), height: HEIGHT });
+    for (const key of keys)
+      partOf(key).setNode(key, {
+        width: measure.measureText(brief(key.slice(1))).width + (key[0] === "t" ? 26 : 44),
+        height: HEIGHT,
+      });
     for (const [name, members] of groups) {
       partOf(members[0]).setNode(`g${name}`, {});
       for (const key of members) partOf(key).setParent(key, `g${name}`);
@@ -148,12 +252,20 @@ export class Graph {
     const room = this.hasRates.checked ? measure.measureText(RATE_TEXT).width : 0;
     edges.forEach(({ from, to, label }, index) => {
       const width = Math.max(label ? measure.measureText(brief(label)).width : 0, room);
-      partOf(from).setEdge(from, to, width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index }, String(index));
+      partOf(from).setEdge(
+        from,
+        to,
+        width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index },
+        String(index),
+      );
     });
     const graphs = [...parts.values()];
     for (const graph of graphs) layout(graph);
     const view = this.viewSize();
-    const { places, ...size } = packed(graphs.map((graph) => graph.graph()), view.width / view.height);
+    const { places, ...size } = packed(
+      graphs.map((graph) => graph.graph()),
+      view.width / view.height,
+    );
     const found = { ...size, boxes: new Map(), edges: [] };
     graphs.forEach((graph, index) => {
       const moved = (point) => Object.assign(point, { x: point.x + places[index].x, y: point.y + places[index].y });
@@ -168,15 +280,24 @@ export class Graph {
   }
 
   makeGroup(name, { x, y, width, height }) {
-    return svg("g", { class: "namespace near" }, svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 8 }),
-      svg("text", { x: x - width / 2 + 8, y: y - height / 2 - 4 }, brief(`/${name}`)));
+    return svg(
+      "g",
+      { class: "namespace near" },
+      svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 8 }),
+      svg("text", { x: x - width / 2 + 8, y: y - height / 2 - 4 }, brief(`/${name}`)),
+    );
   }
 
   makeEdge({ points, x, y, index }, id, edges, box) {
     const edge = edges[index];
     const path = id.v === id.w && x !== undefined ? loopOf(box, { x, y }) : pathOf(points);
     const hasText = x !== undefined;
-    const part = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 4 }, brief(edge.label))] : null);
+    const part = svg(
+      "g",
+      { class: "edge" },
+      svg("path", { d: path, "marker-end": `url(#${this.arrow})` }),
+      hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 4 }, brief(edge.label))] : null,
+    );
     if (hasText) {
       const above = svg("text", { class: "traffic", x, y: edge.label ? y + 12 : y - 4 });
       const below = svg("text", { class: "traffic", x, y: edge.label ? y + 26 : y + 13 });
@@ -190,15 +311,32 @@ export class Graph {
 
   makePart(key, { x, y, width, height }) {
     const kind = SHAPES[key[0]];
-    const shape = { x: x - width / 2, y: y - height / 2, width, height, rx: key[0] === "n" ? height / 2 : key[0] === "a" ? 12 : 4 };
+    const shape = {
+      x: x - width / 2,
+      y: y - height / 2,
+      width,
+      height,
+      rx: key[0] === "n" ? height / 2 : key[0] === "a" ? 12 : 4,
+    };
     const select = () => this.select(key);
-    const part = svg("g", { class: kind, tabindex: 0, role: "button", "aria-label": `${t(kind)} ${key.slice(1)}`,
-      onclick: select, onkeydown: (event) => {
-        if (event.key !== "Enter" && event.key !== " ") return;
-        event.preventDefault(); // the page would scroll
-        select();
-      } },
-    svg("title", {}, key.slice(1)), svg("rect", shape), svg("text", { x, y: y + 5 }, brief(key.slice(1))));
+    const part = svg(
+      "g",
+      {
+        class: kind,
+        tabindex: 0,
+        role: "button",
+        "aria-label": `${t(kind)} ${key.slice(1)}`,
+        onclick: select,
+        onkeydown: (event) => {
+          if (event.key !== "Enter" && event.key !== " ") return;
+          event.preventDefault(); // the page would scroll
+          select();
+        },
+      },
+      svg("title", {}, key.slice(1)),
+      svg("rect", shape),
+      svg("text", { x, y: y + 5 }, brief(key.slice(1))),
+    );
     part.dataset.key = key;
     return part;
   }
@@ -233,34 +371,103 @@ export class Graph {
     if (!this.selected) return;
     const name = this.selected.slice(1);
     const { published, subscribed, services } = this.link.graph;
-    const names = (table) => [...table].filter(([, nodes]) => nodes.includes(name)).map(([each]) => each).sort();
-    const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? "", this.report.mismatches[name] ?? "", this.report.nodes.find((node) => node.name === name)?.trouble ?? ""));
+    const names = (table) =>
+      [...table]
+        .filter(([, nodes]) => nodes.includes(name))
+        .map(([each]) => each)
+        .sort();
+    const content = JSON.stringify(
+      [published, subscribed, services]
+        .flatMap((table) => [names(table), table.get(name) ?? []])
+        .concat(
+          this.link.channels.get(name)?.type ?? "",
+          this.report.mismatches[name] ?? "",
+          this.report.nodes.find((node) => node.name === name)?.trouble ?? "",
+        ),
+    );
     if (content === this.shown) return;
     this.shown = content;
-    const list = (title, items, kind) => (items.length ? [h("h3", {}, `${t(title)} (${items.length})`), h("ul", {}, items.map((each) => h("li", {}, kind
-      ? h("button", { type: "button", class: "link", onclick: () => { this.selected = null; this.select(kind + each); } }, each) : each)))] : []);
+    const list = (title, items, kind) =>
+      items.length
+        ? [
+            h("h3", {}, `${t(title)} (${items.length})`),
+            h(
+              "ul",
+              {},
+              items.map((each) =>
+                h(
+                  "li",
+                  {},
+                  kind
+                    ? h(
+                        "button",
+                        {
+                          type: "button",
+                          class: "link",
+                          onclick: () => {
+                            this.selected = null;
+                            this.select(kind + each);
+                          },
+                        },
+                        each,
+                      )
+                    : each,
+                ),
+              ),
+            ),
+          ]
+        : [];
     if (this.selected[0] === "a") {
       const ends = (part, table) => table.get(`${name}/${part}`) ?? [];
-      refill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, t("goals, feedback and results"))),
-        list("Servers", ends("status", published), "n"), list("Clients", [...new Set([...ends("goal", published), ...ends("cancel", published)])], "n"),
-        list("Topics", ["goal", "cancel", "status", "feedback", "result"].map((part) => `${name}/${part}`)));
+      refill(
+        this.details,
+        h("h2", {}, name),
+        h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, t("goals, feedback and results"))),
+        list("Servers", ends("status", published), "n"),
+        list("Clients", [...new Set([...ends("goal", published), ...ends("cancel", published)])], "n"),
+        list(
+          "Topics",
+          ["goal", "cancel", "status", "feedback", "result"].map((part) => `${name}/${part}`),
+        ),
+      );
     } else if (this.selected[0] === "n") {
       const node = this.report.nodes.find((each) => each.name === name);
-      refill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}. What to do: {advice}.", { trouble: node.trouble, advice: node.advice })) : null,
-        h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, t("process and connections"))), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
+      refill(
+        this.details,
+        h("h2", {}, name),
+        node?.trouble
+          ? h(
+              "p",
+              { class: "error" },
+              t("It does not answer: {trouble}. What to do: {advice}.", { trouble: node.trouble, advice: node.advice }),
+            )
+          : null,
+        h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, t("process and connections"))),
+        list("Publishes", names(published), "t"),
+        list("Subscribes to", names(subscribed), "t"),
+        list("Services", names(services)),
+      );
     } else {
       const type = this.link.channels.get(name)?.type;
       this.rateText ??= h("span", { class: "muted" });
-      refill(this.details, h("h2", {}, name), h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
+      refill(
+        this.details,
+        h("h2", {}, name),
+        h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
         h("p", {}, h("a", { href: `#/topics?open=${encodeURIComponent(name)}` }, t("live values"))),
-        list("Publishers", published.get(name) ?? [], "n"), list("Subscribers", subscribed.get(name) ?? [], "n"),
-        (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."), this.mismatch(name));
+        list("Publishers", published.get(name) ?? [], "n"),
+        list("Subscribers", subscribed.get(name) ?? [], "n"),
+        (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."),
+        this.mismatch(name),
+      );
     }
   }
 
   measure(topic) {
     const rate = new Rate();
-    const end = this.link.subscribe({ topic, mode: "latest", isCounted: true }, (item) => rate.add(performance.now() / 1000, item.count ?? 0, item.bytes ?? 0));
+    const end = this.link.subscribe({ topic, mode: "latest", isCounted: true }, (item) =>
+      rate.add(performance.now() / 1000, item.count ?? 0, item.bytes ?? 0),
+    );
     this.rateText = h("span", { class: "muted" });
     const timer = setInterval(() => {
       const found = rate.at(performance.now() / 1000);
@@ -281,7 +488,15 @@ export class Graph {
   mismatch(topic) {
     const types = this.report.mismatches[topic];
     if (!types) return null;
-    return h("div", { class: "error" }, h("p", {}, "Its nodes have different types and never connect. Use one type, or two names:"),
-      h("ul", {}, Object.entries(types).map(([type, nodes]) => h("li", {}, `${type}: ${nodes.join(", ")}`))));
+    return h(
+      "div",
+      { class: "error" },
+      h("p", {}, "Its nodes have different types and never connect. Use one type, or two names:"),
+      h(
+        "ul",
+        {},
+        Object.entries(types).map(([type, nodes]) => h("li", {}, `${type}: ${nodes.join(", ")}`)),
+      ),
+    );
   }
 }

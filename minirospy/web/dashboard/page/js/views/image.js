@@ -23,23 +23,59 @@ export class Image {
     this.isDecoding = false;
     this.next = null; // the newest that came meanwhile
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
-    this.markerChoice = h("select", { "aria-label": t("Markers over the image"), onchange: () => this.chooseMarkers(this.markerChoice.value) });
-    this.bounds = ["low", "high"].map((name) => h("input", { type: "number", step: "any", value: words.get(name) ?? "", placeholder: t("automatic"), "aria-label": name === "low" ? "Black at" : "White at", onchange: () => this.rescale() }));
+    this.markerChoice = h("select", {
+      "aria-label": t("Markers over the image"),
+      onchange: () => this.chooseMarkers(this.markerChoice.value),
+    });
+    this.bounds = ["low", "high"].map((name) =>
+      h("input", {
+        type: "number",
+        step: "any",
+        value: words.get(name) ?? "",
+        placeholder: t("automatic"),
+        "aria-label": name === "low" ? "Black at" : "White at",
+        onchange: () => this.rescale(),
+      }),
+    );
     this.scale = h("label", { hidden: true }, t("black to white"), this.bounds);
     this.zoomed = null; // pixels of the screen for one of the image; null: as it fits
     this.isActual = h("input", { type: "checkbox", onchange: () => this.unzoom() });
     this.about = h("span", { class: "muted" });
     this.value = h("span", { class: "mono" });
     this.problem = h("p", { class: "error" });
-    this.canvas = h("canvas", { class: "image", role: "img", width: 0, height: 0, onpointermove: (event) => this.point(event), onpointerleave: () => setText(this.value, "") });
+    this.canvas = h("canvas", {
+      class: "image",
+      role: "img",
+      width: 0,
+      height: 0,
+      onpointermove: (event) => this.point(event),
+      onpointerleave: () => setText(this.value, ""),
+    });
     this.overlay = h("canvas", { class: "overlay", width: 0, height: 0, "aria-hidden": "true" });
     this.empty = h("p", { class: "empty" });
-    this.frame = h("div", { class: "panel frame", ondblclick: () => this.unzoom() }, h("div", { class: "layers" }, this.canvas, this.overlay), this.empty, this.problem);
+    this.frame = h(
+      "div",
+      { class: "panel frame", ondblclick: () => this.unzoom() },
+      h("div", { class: "layers" }, this.canvas, this.overlay),
+      this.empty,
+      this.problem,
+    );
     this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.observer = new ResizeObserver(() => this.fit());
     this.observer.observe(this.frame);
-    main.append(h("div", { class: "bar" }, this.choice, this.markerChoice, h("label", {}, this.isActual, "actual size"), this.scale, h("button", { type: "button", onclick: () => this.save() }, "PNG")),
-      this.frame, h("div", { class: "bar status" }, this.about, this.value));
+    main.append(
+      h(
+        "div",
+        { class: "bar" },
+        this.choice,
+        this.markerChoice,
+        h("label", {}, this.isActual, "actual size"),
+        this.scale,
+        h("button", { type: "button", onclick: () => this.save() }, "PNG"),
+      ),
+      this.frame,
+      h("div", { class: "bar status" }, this.about, this.value),
+    );
     this.ending = link.watch(["channels"], () => this.update());
     this.timer = setInterval(() => this.showAbout(), 500);
     this.expiry = setInterval(() => this.markers.expire(performance.now()) && this.drawMarkers(), 100);
@@ -58,12 +94,25 @@ export class Image {
   update() {
     const topics = [...this.link.channels.values()].filter(({ type }) => TYPES.has(type)).map(({ topic }) => topic);
     if (this.topic && !topics.includes(this.topic)) topics.unshift(this.topic);
-    fill(this.choice, h("option", { value: "" }, topics.length ? "choose a topic" : "no topic has images"), topics.map((topic) => h("option", { value: topic }, topic)));
+    fill(
+      this.choice,
+      h("option", { value: "" }, topics.length ? "choose a topic" : "no topic has images"),
+      topics.map((topic) => h("option", { value: topic }, topic)),
+    );
     if (!this.topic && topics.length === 1) this.choose(topics[0]);
     this.choice.value = this.topic;
     if (this.topic && !this.end) this.subscribe();
     this.updateMarkers();
-    setText(this.empty, this.pixels ? "" : this.topic ? t("Waiting for {topic} …", { topic: this.topic }) : topics.length ? t("Choose a topic above.") : t("Start a camera, or play a bag with images."));
+    setText(
+      this.empty,
+      this.pixels
+        ? ""
+        : this.topic
+          ? t("Waiting for {topic} …", { topic: this.topic })
+          : topics.length
+            ? t("Choose a topic above.")
+            : t("Start a camera, or play a bag with images."),
+    );
   }
 
   choose(topic) {
@@ -87,9 +136,15 @@ export class Image {
   // --- markers
 
   updateMarkers() {
-    const topics = [...this.link.channels.values()].filter(({ type }) => type === MARKER_TYPE).map(({ topic }) => topic);
+    const topics = [...this.link.channels.values()]
+      .filter(({ type }) => type === MARKER_TYPE)
+      .map(({ topic }) => topic);
     if (this.markerTopic && !topics.includes(this.markerTopic)) topics.unshift(this.markerTopic);
-    fill(this.markerChoice, h("option", { value: "" }, t("no markers")), topics.map((topic) => h("option", { value: topic }, topic)));
+    fill(
+      this.markerChoice,
+      h("option", { value: "" }, t("no markers")),
+      topics.map((topic) => h("option", { value: topic }, topic)),
+    );
     this.markerChoice.value = this.markerTopic;
     this.markerChoice.hidden = !topics.length;
     if (this.markerTopic && !this.markerEnd) this.subscribeMarkers();
@@ -193,7 +248,10 @@ export class Image {
     event.preventDefault();
     const before = this.canvas.getBoundingClientRect();
     const [x, y] = [(event.clientX - before.left) / before.width, (event.clientY - before.top) / before.height];
-    this.zoomed = Math.min(LARGEST / Math.max(this.canvas.width, this.canvas.height), Math.max(0.05, (before.width / this.canvas.width) * Math.exp(-event.deltaY * 0.0015)));
+    this.zoomed = Math.min(
+      LARGEST / Math.max(this.canvas.width, this.canvas.height),
+      Math.max(0.05, (before.width / this.canvas.width) * Math.exp(-event.deltaY * 0.0015)),
+    );
     this.fit();
     const after = this.canvas.getBoundingClientRect();
     this.frame.scrollBy(after.left + x * after.width - event.clientX, after.top + y * after.height - event.clientY);
@@ -204,30 +262,48 @@ export class Image {
     const { width, height } = this.canvas;
     if (!width) return;
     const isActual = this.isActual.checked;
-    const scale = this.zoomed ?? (isActual ? 1 : Math.min((this.frame.clientWidth - 2) / width, (this.frame.clientHeight - 2) / height));
+    const scale =
+      this.zoomed ??
+      (isActual ? 1 : Math.min((this.frame.clientWidth - 2) / width, (this.frame.clientHeight - 2) / height));
     this.canvas.classList.toggle("large", scale === 1 || scale > 2);
-    for (const { style } of [this.canvas, this.overlay]) [style.width, style.height] = [width, height].map((pixels) => `${Math.max(1, pixels * scale)}px`);
+    for (const { style } of [this.canvas, this.overlay])
+      [style.width, style.height] = [width, height].map((pixels) => `${Math.max(1, pixels * scale)}px`);
   }
 
   showAbout() {
     if (!this.pixels) return;
     const { width, height, range } = this.pixels;
     const rate = this.rate.at(performance.now() / 1000);
-    setText(this.about, [`${width} × ${height}`, this.message.encoding ?? this.message.format, range ? `${number(range[0])} … ${number(range[1])}` : "",
-      rate ? `${rate.hz.toFixed(1)} Hz` : "", this.message.header.frame_id].filter(Boolean).join(" · "));
+    setText(
+      this.about,
+      [
+        `${width} × ${height}`,
+        this.message.encoding ?? this.message.format,
+        range ? `${number(range[0])} … ${number(range[1])}` : "",
+        rate ? `${rate.hz.toFixed(1)} Hz` : "",
+        this.message.header.frame_id,
+      ]
+        .filter(Boolean)
+        .join(" · "),
+    );
   }
 
   point(event) {
     if (event.buttons & 1) this.frame.scrollBy(-event.movementX, -event.movementY);
     const box = this.canvas.getBoundingClientRect();
-    this.pointed = [Math.floor(((event.clientX - box.left) / box.width) * this.canvas.width), Math.floor(((event.clientY - box.top) / box.height) * this.canvas.height)];
+    this.pointed = [
+      Math.floor(((event.clientX - box.left) / box.width) * this.canvas.width),
+      Math.floor(((event.clientY - box.top) / box.height) * this.canvas.height),
+    ];
     this.showValue();
   }
 
   showValue() {
     const [x, y] = this.pointed;
     if (!this.pixels || x < 0 || y < 0 || x >= this.pixels.width || y >= this.pixels.height) return;
-    const value = this.pixels.at ? this.pixels.at(x, y) : Array.from(this.canvas.getContext("2d").getImageData(x, y, 1, 1).data.subarray(0, 3)).join(" ");
+    const value = this.pixels.at
+      ? this.pixels.at(x, y)
+      : Array.from(this.canvas.getContext("2d").getImageData(x, y, 1, 1).data.subarray(0, 3)).join(" ");
     setText(this.value, `(${x}, ${y}): ${value}`);
   }
 

@@ -1,13 +1,22 @@
-// Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log lines.
+// Launch files of the packages: their arguments as a form, started, stopped, restarted; their nodes with state and log
+// lines.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { Endpoint } from "../endpoint.js";
 import { t } from "../texts.js";
 
-const PROTOCOL = "minirospy.ros.roslaunch.launcher.v1";
+const PROTOCOL = "minirospy.launch.v1";
 const MAX_LOG = 400_000; // characters
 const GOOD = "d0";
-const LEVELS = { "running": GOOD, "starting": "d1", "ending": "d1", "stopping": "d1", "stopped": "d3", "ended": "d3", "failed": "d2" };
+const LEVELS = {
+  "running": GOOD,
+  "starting": "d1",
+  "ending": "d1",
+  "stopping": "d1",
+  "stopped": "d3",
+  "ended": "d3",
+  "failed": "d2",
+};
 
 export class Launch {
   constructor(link, words, main, place) {
@@ -17,27 +26,79 @@ export class Launch {
     this.runs = new Map(); // id -> elements
     this.chosen = words.get("file") ? [words.get("package") ?? "", words.get("file")] : null;
     this.followed = null;
-    this.filter = h("input", { type: "search", placeholder: "Filter packages and files", "aria-label": "Filter packages and files", oninput: () => this.drawFiles() });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter packages and files",
+      "aria-label": "Filter packages and files",
+      oninput: () => this.drawFiles(),
+    });
     this.list = h("div", { class: "launch-files" });
     this.problem = h("p", { class: "error", role: "alert" });
-    this.form = h("form", { class: "panel details launch-form", hidden: true, onsubmit: (event) => { event.preventDefault(); this.start(); } });
+    this.form = h("form", {
+      class: "panel details launch-form",
+      hidden: true,
+      onsubmit: (event) => {
+        event.preventDefault();
+        this.start();
+      },
+    });
     this.area = h("div", { class: "launches" });
     this.empty = h("p", { class: "empty" });
     this.logTitle = h("span", { class: "name" });
     this.text = h("pre", { class: "launch-log", tabindex: 0, role: "log" });
-    this.log = h("section", { class: "panel launch-output", hidden: true },
-      h("div", { class: "bar" }, this.logTitle, h("span", { class: "spring" }), h("button", { type: "button", class: "small", onclick: () => this.text.replaceChildren() }, t("clear")),
-        h("button", { type: "button", class: "small", "aria-label": "Close the log", onclick: () => this.follow(null) }, "×")), this.text);
-    main.append(h("div", { class: "split launch" },
-      h("div", { class: "panel side details launch-side" }, h("div", { class: "bar" }, this.filter, h("button", { type: "button", title: "Look for launch files again", "aria-label": "Look for launch files again", onclick: () => this.endpoint.send({ op: "list" }) }, "↻")), this.list),
-      h("div", { class: "launch-main" }, this.problem, this.form, this.area, this.empty, this.log)));
+    this.log = h(
+      "section",
+      { class: "panel launch-output", hidden: true },
+      h(
+        "div",
+        { class: "bar" },
+        this.logTitle,
+        h("span", { class: "spring" }),
+        h("button", { type: "button", class: "small", onclick: () => this.text.replaceChildren() }, t("clear")),
+        h(
+          "button",
+          { type: "button", class: "small", "aria-label": "Close the log", onclick: () => this.follow(null) },
+          "×",
+        ),
+      ),
+      this.text,
+    );
+    main.append(
+      h(
+        "div",
+        { class: "split launch" },
+        h(
+          "div",
+          { class: "panel side details launch-side" },
+          h(
+            "div",
+            { class: "bar" },
+            this.filter,
+            h(
+              "button",
+              {
+                type: "button",
+                title: "Look for launch files again",
+                "aria-label": "Look for launch files again",
+                onclick: () => this.endpoint.send({ op: "list" }),
+              },
+              "↻",
+            ),
+          ),
+          this.list,
+        ),
+        h("div", { class: "launch-main" }, this.problem, this.form, this.area, this.empty, this.log),
+      ),
+    );
     this.endpoint = new Endpoint(link, PROTOCOL, {
       opened: () => {
         this.say("");
         this.endpoint.send({ op: "list" });
         if (this.followed) this.follow(this.followed);
       },
-      writes: (writes) => { this.writes = writes; },
+      writes: (writes) => {
+        this.writes = writes;
+      },
       files: (files) => {
         this.files = files;
         this.drawFiles();
@@ -62,21 +123,54 @@ export class Launch {
 
   drawFiles() {
     const words = this.filter.value.toLowerCase().split(/\s+/);
-    const shown = this.files.filter(([name, file]) => words.every((word) => `${name}/${file}`.toLowerCase().includes(word)));
+    const shown = this.files.filter(([name, file]) =>
+      words.every((word) => `${name}/${file}`.toLowerCase().includes(word)),
+    );
     const groups = Map.groupBy ? Map.groupBy(shown, ([name]) => name) : groupsOf(shown);
-    refill(this.list, [...groups].map(([name, files]) => h("details", { open: groups.size <= 12 || Boolean(this.filter.value.trim()) || name === this.chosen?.[0] },
-      h("summary", {}, h("span", { class: "name" }, name), " ", h("span", { class: "muted" }, String(files.length))),
-      files.map(([, file]) => {
-        const button = h("button", { type: "button", class: "link", onclick: () => this.describe(name, file) }, file);
-        if (name === this.chosen?.[0] && file === this.chosen[1]) button.setAttribute("aria-current", "true");
-        return button;
-      }))));
-    if (!shown.length) refill(this.list, h("p", { class: "muted" }, this.files.length ? t("No launch file fits the filter.") : t("No package has a launch file.")));
+    refill(
+      this.list,
+      [...groups].map(([name, files]) =>
+        h(
+          "details",
+          { open: groups.size <= 12 || Boolean(this.filter.value.trim()) || name === this.chosen?.[0] },
+          h(
+            "summary",
+            {},
+            h("span", { class: "name" }, name),
+            " ",
+            h("span", { class: "muted" }, String(files.length)),
+          ),
+          files.map(([, file]) => {
+            const button = h(
+              "button",
+              { type: "button", class: "link", onclick: () => this.describe(name, file) },
+              file,
+            );
+            if (name === this.chosen?.[0] && file === this.chosen[1]) button.setAttribute("aria-current", "true");
+            return button;
+          }),
+        ),
+      ),
+    );
+    if (!shown.length)
+      refill(
+        this.list,
+        h(
+          "p",
+          { class: "muted" },
+          this.files.length ? t("No launch file fits the filter.") : t("No package has a launch file."),
+        ),
+      );
     this.showEmpty();
   }
 
   showEmpty() {
-    setText(this.empty, this.writes === false || this.launches.length || !this.form.hidden ? "" : t("Choose a launch file: its arguments appear here, and Start runs its nodes."));
+    setText(
+      this.empty,
+      this.writes === false || this.launches.length || !this.form.hidden
+        ? ""
+        : t("Choose a launch file: its arguments appear here, and Start runs its nodes."),
+    );
   }
 
   describe(name, file) {
@@ -90,12 +184,32 @@ export class Launch {
   showForm({ package: name, file, args }) {
     if (name !== this.chosen?.[0] || file !== this.chosen[1]) return;
     this.inputs = new Map(args.map(([each, value, doc]) => [each, { value, doc, input: argInput(each, value) }]));
-    fill(this.form, h("h2", {}, h("span", { class: "muted" }, `${name} / `), file),
-      [...this.inputs].map(([each, { value, doc, input }]) => h("label", { class: "launch-arg" }, h("span", { class: "key" }, each), input,
-        h("span", { class: "muted hint" }, doc || "", doc && value === null ? " " : "", value === null ? h("em", {}, t("required")) : ""))),
+    fill(
+      this.form,
+      h("h2", {}, h("span", { class: "muted" }, `${name} / `), file),
+      [...this.inputs].map(([each, { value, doc, input }]) =>
+        h(
+          "label",
+          { class: "launch-arg" },
+          h("span", { class: "key" }, each),
+          input,
+          h(
+            "span",
+            { class: "muted hint" },
+            doc || "",
+            doc && value === null ? " " : "",
+            value === null ? h("em", {}, t("required")) : "",
+          ),
+        ),
+      ),
       args.length ? null : h("p", { class: "muted" }, "It has no arguments."),
-      h("div", { class: "bar" }, h("button", { type: "submit", class: "primary" }, "Start"),
-        h("code", { class: "muted" }, this.commandLine = h("span", {}))));
+      h(
+        "div",
+        { class: "bar" },
+        h("button", { type: "submit", class: "primary" }, "Start"),
+        h("code", { class: "muted" }, (this.commandLine = h("span", {}))),
+      ),
+    );
     this.form.oninput = () => this.showCommand();
     this.form.hidden = false;
     this.showCommand();
@@ -104,7 +218,11 @@ export class Launch {
 
   /** Return the arguments that differ from their defaults. */
   given() {
-    return Object.fromEntries([...this.inputs].filter(([, { value, input }]) => input.value !== (value ?? "")).map(([name, { input }]) => [name, input.value]));
+    return Object.fromEntries(
+      [...this.inputs]
+        .filter(([, { value, input }]) => input.value !== (value ?? ""))
+        .map(([name, { input }]) => [name, input.value]),
+    );
   }
 
   showCommand() {
@@ -113,7 +231,15 @@ export class Launch {
     const [name, file] = this.chosen;
     const base = file.slice(file.lastIndexOf("/") + 1);
     const isOnly = this.files.filter(([each, other]) => each === name && `/${other}`.endsWith(`/${base}`)).length === 1;
-    setText(this.commandLine, ["roslaunch", name, isOnly ? base : file, ...Object.entries(this.given()).map(([name, value]) => `${name}:=${quoted(value)}`)].join(" "));
+    setText(
+      this.commandLine,
+      [
+        "roslaunch",
+        name,
+        isOnly ? base : file,
+        ...Object.entries(this.given()).map(([name, value]) => `${name}:=${quoted(value)}`),
+      ].join(" "),
+    );
   }
 
   start() {
@@ -142,17 +268,54 @@ export class Launch {
   }
 
   makeRun({ id, package: name, file, args }) {
-    const button = (text, op, title) => h("button", { type: "button", class: op === "stop" ? "stop small" : "small", title, onclick: () => {
-      this.say("");
-      this.endpoint.send({ op, id });
-    } }, text);
-    const run = { badge: h("span", { class: "badge" }), error: h("p", { class: "error" }), rows: new Map(), table: h("tbody", {}),
-      stop: button("Stop", "stop", "End its nodes"), restart: button("Restart", "restart", "End its nodes, and start it again"), remove: button("×", "remove", "Remove from this list") };
-    const words = Object.entries(args).map(([key, value]) => `${key}:=${value}`).join(" ");
-    run.element = h("section", { class: "panel launch-run" },
-      h("h2", {}, run.badge, h("span", { class: "name" }, `${name} / ${file}`), h("code", { class: "muted" }, words), h("span", { class: "spring" }),
-        h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: "" }) }, t("roslaunch log")), run.restart, run.stop, run.remove),
-      run.error, h("table", { class: "values launch-nodes" }, run.table));
+    const button = (text, op, title) =>
+      h(
+        "button",
+        {
+          type: "button",
+          class: op === "stop" ? "stop small" : "small",
+          title,
+          onclick: () => {
+            this.say("");
+            this.endpoint.send({ op, id });
+          },
+        },
+        text,
+      );
+    const run = {
+      badge: h("span", { class: "badge" }),
+      error: h("p", { class: "error" }),
+      rows: new Map(),
+      table: h("tbody", {}),
+      stop: button("Stop", "stop", "End its nodes"),
+      restart: button("Restart", "restart", "End its nodes, and start it again"),
+      remove: button("×", "remove", "Remove from this list"),
+    };
+    const words = Object.entries(args)
+      .map(([key, value]) => `${key}:=${value}`)
+      .join(" ");
+    run.element = h(
+      "section",
+      { class: "panel launch-run" },
+      h(
+        "h2",
+        {},
+        run.badge,
+        h("span", { class: "name" }, `${name} / ${file}`),
+        h("code", { class: "muted" }, words),
+        h("span", { class: "spring" }),
+        h(
+          "button",
+          { type: "button", class: "small", onclick: () => this.follow({ id, node: "" }) },
+          t("roslaunch log"),
+        ),
+        run.restart,
+        run.stop,
+        run.remove,
+      ),
+      run.error,
+      h("table", { class: "values launch-nodes" }, run.table),
+    );
     run.element.dataset.file = file;
     this.area.prepend(run.element);
     return run;
@@ -173,10 +336,24 @@ export class Launch {
 
   makeNode(run, id, { name, program }) {
     const end = (restarts) => () => this.endpoint.send({ op: "end", id, node: name, restarts });
-    const row = { badge: h("span", { class: "badge" }), pid: h("span", { class: "num" }), starts: h("span", { class: "muted" }),
-      restart: h("button", { type: "button", class: "small", onclick: end(true) }, t("restart")), stop: h("button", { type: "button", class: "small", onclick: end(false) }, t("stop")) };
+    const row = {
+      badge: h("span", { class: "badge" }),
+      pid: h("span", { class: "num" }),
+      starts: h("span", { class: "muted" }),
+      restart: h("button", { type: "button", class: "small", onclick: end(true) }, t("restart")),
+      stop: h("button", { type: "button", class: "small", onclick: end(false) }, t("stop")),
+    };
     row.log = h("button", { type: "button", class: "small", onclick: () => this.follow({ id, node: name }) }, t("log"));
-    row.element = h("tr", {}, h("td", {}, row.badge), h("th", { scope: "row" }, name), h("td", { class: "muted" }, program), h("td", {}, row.starts), h("td", {}, row.pid), h("td", { class: "launch-buttons" }, row.log, row.restart, row.stop));
+    row.element = h(
+      "tr",
+      {},
+      h("td", {}, row.badge),
+      h("th", { scope: "row" }, name),
+      h("td", { class: "muted" }, program),
+      h("td", {}, row.starts),
+      h("td", {}, row.pid),
+      h("td", { class: "launch-buttons" }, row.log, row.restart, row.stop),
+    );
     row.element.dataset.node = name;
     run.table.append(row.element);
     return row;
@@ -185,8 +362,20 @@ export class Launch {
   showNode(row, node, launch) {
     const isBad = node.state === "exited" && node.status !== 0;
     row.badge.className = `badge ${node.state === "exited" ? (isBad ? "d2" : "d3") : LEVELS[node.state]}`;
-    setText(row.badge, node.state === "exited" ? (isBad ? t("exited: {status}", { status: statusText(node.status) }) : t("finished")) : node.state === "failed" ? t("not started") : t(node.state));
-    setText(row.starts, node.starts > 1 ? t("started {count} times", { count: node.starts }) : node.respawns ? t("respawns") : "");
+    setText(
+      row.badge,
+      node.state === "exited"
+        ? isBad
+          ? t("exited: {status}", { status: statusText(node.status) })
+          : t("finished")
+        : node.state === "failed"
+          ? t("not started")
+          : t(node.state),
+    );
+    setText(
+      row.starts,
+      node.starts > 1 ? t("started {count} times", { count: node.starts }) : node.respawns ? t("respawns") : "",
+    );
     setText(row.pid, node.pid ? `pid ${node.pid}` : "");
     row.log.disabled = node.starts === 0;
     row.restart.disabled = row.stop.disabled = node.state !== "running" || launch.state !== "running";
@@ -224,8 +413,20 @@ export class Launch {
 
 function argInput(name, value) {
   const isFlag = value === "true" || value === "false";
-  if (isFlag) return h("select", { name, value }, [value, value === "true" ? "false" : "true"].map((each) => h("option", { value: each }, each)));
-  return h("input", { type: "text", name, autocomplete: "off", spellcheck: "false", value: value ?? "", required: value === null });
+  if (isFlag)
+    return h(
+      "select",
+      { name, value },
+      [value, value === "true" ? "false" : "true"].map((each) => h("option", { value: each }, each)),
+    );
+  return h("input", {
+    type: "text",
+    name,
+    autocomplete: "off",
+    spellcheck: "false",
+    value: value ?? "",
+    required: value === null,
+  });
 }
 
 function groupsOf(rows) {

@@ -19,17 +19,58 @@ export class Layouts {
     // A layout in a layout would have no end.
     this.views = Object.fromEntries(Object.entries(place.views).filter(([name]) => name !== "layout"));
     this.choice = h("select", { "aria-label": t("Layout"), onchange: () => this.choose(this.choice.value) });
-    this.adding = h("select", { "aria-label": t("Add a view"), onchange: () => this.add() }, h("option", { value: "" }, t("Add a view …")),
-      Object.entries(this.views).map(([name, [title]]) => h("option", { value: name }, t(title))));
-    this.title = h("input", { type: "text", class: "layout-name", "aria-label": t("Name of the layout"), placeholder: t("Name"), value: this.name, autocomplete: "off", maxlength: 60 });
-    this.file = h("input", { type: "file", accept: ".json,application/json", hidden: true, onchange: () => this.read() });
+    this.adding = h(
+      "select",
+      { "aria-label": t("Add a view"), onchange: () => this.add() },
+      h("option", { value: "" }, t("Add a view …")),
+      Object.entries(this.views).map(([name, [title]]) => h("option", { value: name }, t(title))),
+    );
+    this.title = h("input", {
+      type: "text",
+      class: "layout-name",
+      "aria-label": t("Name of the layout"),
+      placeholder: t("Name"),
+      value: this.name,
+      autocomplete: "off",
+      maxlength: 60,
+    });
+    this.file = h("input", {
+      type: "file",
+      accept: ".json,application/json",
+      hidden: true,
+      onchange: () => this.read(),
+    });
     const button = (text, react, more = {}) => h("button", { type: "button", onclick: react, ...more }, text);
     this.deleting = button(t("Delete"), () => this.delete());
     this.message = h("span", { class: "muted", role: "status" });
-    this.shared = h("input", { type: "text", class: "grow", readonly: true, hidden: true, "aria-label": t("Link of the layout") });
-    this.bar = h("form", { class: "bar layout-bar", onsubmit: (event) => { event.preventDefault(); this.save(); } }, this.choice, this.adding, this.title,
-      h("button", { type: "submit" }, t("Save")), this.deleting, button(t("Copy link"), () => this.share()), button(t("Export"), () => this.export()),
-      button(t("Import"), () => this.file.click()), this.file, this.message, this.shared);
+    this.shared = h("input", {
+      type: "text",
+      class: "grow",
+      readonly: true,
+      hidden: true,
+      "aria-label": t("Link of the layout"),
+    });
+    this.bar = h(
+      "form",
+      {
+        class: "bar layout-bar",
+        onsubmit: (event) => {
+          event.preventDefault();
+          this.save();
+        },
+      },
+      this.choice,
+      this.adding,
+      this.title,
+      h("button", { type: "submit" }, t("Save")),
+      this.deleting,
+      button(t("Copy link"), () => this.share()),
+      button(t("Export"), () => this.export()),
+      button(t("Import"), () => this.file.click()),
+      this.file,
+      this.message,
+      this.shared,
+    );
     this.start = h("div", { class: "starts" });
     this.dock = new Dock(link, new Layout(), this.views, () => this.changed());
     main.append(this.bar, this.start, this.dock.element);
@@ -76,7 +117,7 @@ export class Layouts {
       this.show(text, "", { preset: name });
       return;
     }
-    const requested = this.requested = {};
+    const requested = (this.requested = {});
     const group = await this.group();
     if (this.requested === requested) this.show(classroom(group), "", { preset: name });
   }
@@ -85,7 +126,11 @@ export class Layouts {
   async group() {
     this.report(t("Looking for boards and robots …"));
     const endings = [];
-    const soon = (react) => new Promise((resolve) => { react(resolve); setTimeout(() => resolve(null), WAIT_MS); });
+    const soon = (react) =>
+      new Promise((resolve) => {
+        react(resolve);
+        setTimeout(() => resolve(null), WAIT_MS);
+      });
     const [boards] = await Promise.all([
       soon((resolve) => {
         const socket = new WebSocket(this.link.address(), this.link.protocols("minirospy.board.v1"));
@@ -95,8 +140,14 @@ export class Layouts {
       }),
       soon((resolve) => {
         if (this.link.channels.size) resolve();
-        else endings.push(this.link.watch(["channels"], () => { if (this.link.channels.size) resolve(); }));
-      })]);
+        else
+          endings.push(
+            this.link.watch(["channels"], () => {
+              if (this.link.channels.size) resolve();
+            }),
+          );
+      }),
+    ]);
     for (const end of endings) end();
     return { boards: boards ?? [], topics: [...this.link.channels.keys(), ...this.link.graph.subscribed.keys()] };
   }
@@ -106,16 +157,40 @@ export class Layouts {
     this.start.hidden = !isEmpty;
     this.dock.element.hidden = isEmpty;
     if (!isEmpty) return;
-    const card = (value, title, about) => h("button", { type: "button", class: "panel start", onclick: () => this.choose(value) }, h("strong", {}, title), h("span", { class: "muted" }, about));
-    fill(this.start, Object.entries(PRESETS).map(([name, [title, about]]) => card(`preset ${name}`, t(title), t(about))),
-      Object.entries(this.saved()).map(([name, text]) => card(`saved ${name}`, name, t("{count} views", { count: countOf(text) }))));
+    const card = (value, title, about) =>
+      h(
+        "button",
+        { type: "button", class: "panel start", onclick: () => this.choose(value) },
+        h("strong", {}, title),
+        h("span", { class: "muted" }, about),
+      );
+    fill(
+      this.start,
+      Object.entries(PRESETS).map(([name, [title, about]]) => card(`preset ${name}`, t(title), t(about))),
+      Object.entries(this.saved()).map(([name, text]) =>
+        card(`saved ${name}`, name, t("{count} views", { count: countOf(text) })),
+      ),
+    );
   }
 
   showNames() {
     const saved = Object.keys(this.saved()).sort();
-    fill(this.choice, h("option", { value: "" }, t("Layouts …")),
-      h("optgroup", { label: t("Presets") }, Object.entries(PRESETS).map(([name, [title]]) => h("option", { value: `preset ${name}` }, t(title)))),
-      saved.length ? h("optgroup", { label: t("Saved in this browser") }, saved.map((name) => h("option", { value: `saved ${name}` }, name))) : null);
+    fill(
+      this.choice,
+      h("option", { value: "" }, t("Layouts …")),
+      h(
+        "optgroup",
+        { label: t("Presets") },
+        Object.entries(PRESETS).map(([name, [title]]) => h("option", { value: `preset ${name}` }, t(title))),
+      ),
+      saved.length
+        ? h(
+            "optgroup",
+            { label: t("Saved in this browser") },
+            saved.map((name) => h("option", { value: `saved ${name}` }, name)),
+          )
+        : null,
+    );
     this.choice.value = saved.includes(this.name) ? `saved ${this.name}` : "";
     this.deleting.hidden = !saved.includes(this.name);
   }
@@ -196,7 +271,10 @@ export class Layouts {
   export() {
     const name = this.title.value.trim() || "layout";
     const content = { [FILE]: 1, name, layout: this.dock.layout.toString() };
-    download(`${name.replace(/[^\w .-]/g, "_")}.json`, new Blob([`${JSON.stringify(content, null, 2)}\n`], { type: "application/json" }));
+    download(
+      `${name.replace(/[^\w .-]/g, "_")}.json`,
+      new Blob([`${JSON.stringify(content, null, 2)}\n`], { type: "application/json" }),
+    );
   }
 
   async read() {
@@ -206,7 +284,8 @@ export class Layouts {
     try {
       if (file.size > MAX_FILE) throw new Error(t("it is too large"));
       const content = JSON.parse(await file.text());
-      if (content?.[FILE] !== 1 || typeof content.layout !== "string") throw new Error(t("it is not a layout of this page"));
+      if (content?.[FILE] !== 1 || typeof content.layout !== "string")
+        throw new Error(t("it is not a layout of this page"));
       Layout.parse(content.layout);
       this.show(content.layout, String(content.name ?? "").slice(0, 60));
     } catch (error) {
@@ -219,7 +298,9 @@ export class Layouts {
   /** Return the saved layouts: name -> text. */
   saved() {
     try {
-      const found = Object.entries(JSON.parse(localStorage.getItem(KEY) ?? "{}")).filter(([, text]) => typeof text === "string");
+      const found = Object.entries(JSON.parse(localStorage.getItem(KEY) ?? "{}")).filter(
+        ([, text]) => typeof text === "string",
+      );
       return Object.fromEntries(found);
     } catch {
       return {};

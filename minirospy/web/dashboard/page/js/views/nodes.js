@@ -1,4 +1,5 @@
-// Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after the dead.
+// Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after
+// the dead.
 
 import { fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
@@ -15,18 +16,44 @@ export class Nodes {
     this.nodes = new Map();
     this.rows = new Map();
     this.pings = new Map(); // name -> text of the last ping
-    this.filter = h("input", { type: "search", placeholder: "Filter nodes and hosts", "aria-label": "Filter", oninput: () => this.showList() });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter nodes and hosts",
+      "aria-label": "Filter",
+      oninput: () => this.showList(),
+    });
     this.count = h("span", { class: "muted" });
     this.cleanButton = h("button", { type: "button", hidden: true, onclick: () => this.askCleanup() }, "Clean up …");
-    this.question = h("div", { class: "panel details question", hidden: true, role: "alertdialog", "aria-label": "Confirm" });
+    this.question = h("div", {
+      class: "panel details question",
+      hidden: true,
+      role: "alertdialog",
+      "aria-label": "Confirm",
+    });
     this.result = h("p", { class: "note", role: "status" });
     this.body = h("tbody", {});
-    this.heads = COLUMNS.map((each) => h("th", { scope: "col" }, each in SORTED ? h("button", { type: "button", class: "link", title: "sort", onclick: () => this.sortBy(SORTED[each]) }, t(each)) : t(each)));
+    this.heads = COLUMNS.map((each) =>
+      h(
+        "th",
+        { scope: "col" },
+        each in SORTED
+          ? h(
+              "button",
+              { type: "button", class: "link", title: "sort", onclick: () => this.sortBy(SORTED[each]) },
+              t(each),
+            )
+          : t(each),
+      ),
+    );
     this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, this.heads)), this.body);
     this.side = h("aside", { class: "panel details side wide", hidden: true });
     this.empty = h("p", { class: "empty" });
-    main.append(h("div", { class: "bar" }, this.filter, this.count, this.cleanButton), this.result, this.question,
-      h("div", { class: "split" }, h("div", { class: "panel scroll" }, this.table, this.empty), this.side));
+    main.append(
+      h("div", { class: "bar" }, this.filter, this.count, this.cleanButton),
+      this.result,
+      this.question,
+      h("div", { class: "split" }, h("div", { class: "panel scroll" }, this.table, this.empty), this.side),
+    );
     this.endings = [link.tools.watch((report) => this.received(report)), link.watch(["state"], () => this.showList())];
   }
 
@@ -56,7 +83,8 @@ export class Nodes {
     }
     let before = null;
     COLUMNS.forEach((each, index) => {
-      if (SORTED[each] === this.sort) this.heads[index].setAttribute("aria-sort", this.sort ? "descending" : "ascending");
+      if (SORTED[each] === this.sort)
+        this.heads[index].setAttribute("aria-sort", this.sort ? "descending" : "ascending");
       else this.heads[index].removeAttribute("aria-sort");
     });
     const { sort } = this;
@@ -72,7 +100,13 @@ export class Nodes {
       before = row;
     }
     const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).length;
-    setText(this.count, this.nodes.size ? t(this.nodes.size === 1 ? "{count} node" : "{count} nodes", { count: this.nodes.size }) + (dead ? t(", {count} without an answer", { count: dead }) : "") : "");
+    setText(
+      this.count,
+      this.nodes.size
+        ? t(this.nodes.size === 1 ? "{count} node" : "{count} nodes", { count: this.nodes.size }) +
+            (dead ? t(", {count} without an answer", { count: dead }) : "")
+        : "",
+    );
     this.cleanButton.hidden = !dead;
     this.cleanButton.disabled = !this.mayChange;
     this.table.hidden = !this.nodes.size;
@@ -94,7 +128,12 @@ export class Nodes {
   }
 
   makeRow(name) {
-    const row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.choose(name) }, name)), COLUMNS.slice(1).map(() => h("td", {})));
+    const row = h(
+      "tr",
+      {},
+      h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.choose(name) }, name)),
+      COLUMNS.slice(1).map(() => h("td", {})),
+    );
     row.dataset.node = name;
     this.rows.set(name, row);
     return row;
@@ -106,7 +145,9 @@ export class Nodes {
     setText(pid, node.pid ? String(node.pid) : "");
     setText(cpu, Number.isFinite(node.cpu) ? `${node.cpu.toFixed(1)} %` : "");
     setText(memory, node.memory ? `${(node.memory / 1e6).toFixed(1)} MB` : "");
-    memory.title = node.threads ? t(node.threads === 1 ? "{count} thread" : "{count} threads", { count: node.threads }) : "";
+    memory.title = node.threads
+      ? t(node.threads === 1 ? "{count} thread" : "{count} threads", { count: node.threads })
+      : "";
     setText(answer, node.trouble ? t("no answer") : `${node.milliseconds.toFixed(1)} ms`);
     setText(topics, t("{out} out, {in} in", { out: node.publishes.length, in: node.subscribes.length }));
     setText(services, String(node.services.length));
@@ -129,17 +170,92 @@ export class Nodes {
     const content = JSON.stringify([{ ...node, milliseconds: 0, cpu: 0, memory: 0, threads: 0 }, this.mayChange]);
     if (content === this.shown) return;
     this.shown = content;
-    const topics = (title, list) => part(title, list.map(([topic, type]) => h("li", {}, h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic), " ", h("span", { class: "muted" }, type))));
-    const killButton = h("button", { type: "button", class: "danger", disabled: !this.mayChange || node.name === this.link.node, onclick: () => this.askKill(node.name) }, "Kill …");
+    const topics = (title, list) =>
+      part(
+        title,
+        list.map(([topic, type]) =>
+          h(
+            "li",
+            {},
+            h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic),
+            " ",
+            h("span", { class: "muted" }, type),
+          ),
+        ),
+      );
+    const killButton = h(
+      "button",
+      {
+        type: "button",
+        class: "danger",
+        disabled: !this.mayChange || node.name === this.link.node,
+        onclick: () => this.askKill(node.name),
+      },
+      "Kill …",
+    );
     this.pingText = h("span", { class: "muted", role: "status" }, this.pings.get(node.name) ?? "");
-    refill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, t("It does not answer: {trouble}.", { trouble: node.trouble }), " ", h("br"), sentence(node.advice)) : null,
-      h("table", { class: "values facts" }, h("tbody", {}, [["host", node.host], ["process", node.pid || ""], ["address", node.uri]].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, t(name)), h("td", {}, value))))),
-      h("div", { class: "bar" }, h("button", { type: "button", onclick: () => this.ping(node.name) }, "Ping"), killButton, this.pingText,
-        node.name === this.link.node ? h("span", { class: "muted" }, t("this page")) : this.mayChange ? null : h("span", { class: "muted" }, t("read-only"))),
-      topics("Publishes", node.publishes), topics("Subscribes to", node.subscribes),
-      part("Services", node.services.map((name) => h("li", {}, h("a", { href: `#/services?service=${encodeURIComponent(name)}` }, name)))),
-      part("Connections", node.links.map(([topic, direction, other, transport, isConnected]) => h("li", { class: isConnected ? "" : "error" },
-        `${direction === "o" ? "→" : direction === "i" ? "←" : "↔"} ${other} `, h("span", { class: "muted" }, t("{topic} by {transport}", { topic, transport }) + (isConnected ? "" : t(", not connected")))))));
+    refill(
+      this.side,
+      h("h2", {}, node.name),
+      node.trouble
+        ? h(
+            "p",
+            { class: "error" },
+            t("It does not answer: {trouble}.", { trouble: node.trouble }),
+            " ",
+            h("br"),
+            sentence(node.advice),
+          )
+        : null,
+      h(
+        "table",
+        { class: "values facts" },
+        h(
+          "tbody",
+          {},
+          [
+            ["host", node.host],
+            ["process", node.pid || ""],
+            ["address", node.uri],
+          ].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, t(name)), h("td", {}, value))),
+        ),
+      ),
+      h(
+        "div",
+        { class: "bar" },
+        h("button", { type: "button", onclick: () => this.ping(node.name) }, "Ping"),
+        killButton,
+        this.pingText,
+        node.name === this.link.node
+          ? h("span", { class: "muted" }, t("this page"))
+          : this.mayChange
+            ? null
+            : h("span", { class: "muted" }, t("read-only")),
+      ),
+      topics("Publishes", node.publishes),
+      topics("Subscribes to", node.subscribes),
+      part(
+        "Services",
+        node.services.map((name) =>
+          h("li", {}, h("a", { href: `#/services?service=${encodeURIComponent(name)}` }, name)),
+        ),
+      ),
+      part(
+        "Connections",
+        node.links.map(([topic, direction, other, transport, isConnected]) =>
+          h(
+            "li",
+            { class: isConnected ? "" : "error" },
+            `${direction === "o" ? "→" : direction === "i" ? "←" : "↔"} ${other} `,
+            h(
+              "span",
+              { class: "muted" },
+              t("{topic} by {transport}", { topic, transport }) + (isConnected ? "" : t(", not connected")),
+            ),
+          ),
+        ),
+      ),
+    );
   }
 
   async ping(name) {
@@ -159,12 +275,26 @@ export class Nodes {
 
   /** Show a question; do what it asks for if a person agrees. */
   ask(text, button, act) {
-    const shut = () => { this.question.hidden = true; };
-    const yes = h("button", { type: "button", class: "danger", onclick: () => {
-      shut();
-      act();
-    } }, button);
-    fill(this.question, h("p", {}, text), h("div", { class: "bar" }, yes, h("button", { type: "button", onclick: shut }, "Keep")));
+    const shut = () => {
+      this.question.hidden = true;
+    };
+    const yes = h(
+      "button",
+      {
+        type: "button",
+        class: "danger",
+        onclick: () => {
+          shut();
+          act();
+        },
+      },
+      button,
+    );
+    fill(
+      this.question,
+      h("p", {}, text),
+      h("div", { class: "bar" }, yes, h("button", { type: "button", onclick: shut }, "Keep")),
+    );
     this.question.hidden = false;
     yes.focus();
   }
@@ -183,14 +313,25 @@ export class Nodes {
 
   askCleanup() {
     const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).map(({ name }) => name);
-    this.ask(t("Remove {names} from the master? A node that still runs and was only unreachable for a moment would have to be started again.", { names: dead.join(", ") }), "Clean up", async () => {
-      try {
-        const removed = await this.link.tools.request({ do: "cleanup", nodes: dead });
-        this.note(removed.length ? t("Removed: {names}.", { names: removed.join(", ") }) : t("They answer again: nothing was removed."));
-      } catch (error) {
-        this.note(error.message, true);
-      }
-    });
+    this.ask(
+      t(
+        "Remove {names} from the master? A node that still runs and was only unreachable for a moment would have to be started again.",
+        { names: dead.join(", ") },
+      ),
+      "Clean up",
+      async () => {
+        try {
+          const removed = await this.link.tools.request({ do: "cleanup", nodes: dead });
+          this.note(
+            removed.length
+              ? t("Removed: {names}.", { names: removed.join(", ") })
+              : t("They answer again: nothing was removed."),
+          );
+        } catch (error) {
+          this.note(error.message, true);
+        }
+      },
+    );
   }
 
   note(text, isError = false) {

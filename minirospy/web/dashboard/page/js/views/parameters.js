@@ -9,17 +9,45 @@ export class Parameters {
   constructor(link, words, main, place) {
     this.link = link;
     this.rows = new Map();
-    this.filter = h("input", { type: "search", placeholder: "Filter names and values", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
-      this.showFiltered();
-      place.remember({ filter: this.filter.value });
-    } });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter names and values",
+      "aria-label": "Filter",
+      value: words.get("filter") ?? "",
+      oninput: () => {
+        this.showFiltered();
+        place.remember({ filter: this.filter.value });
+      },
+    });
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "group", "aria-label": "Parameters" });
     this.name = h("input", { placeholder: "/name", "aria-label": "Name of a new parameter", autocomplete: "off" });
-    this.value = h("input", { placeholder: "value, as 5 or [1, 2] or text", "aria-label": "Its value", class: "grow", autocomplete: "off", oninput: () => this.preview(this.value, this.typed) });
+    this.value = h("input", {
+      placeholder: "value, as 5 or [1, 2] or text",
+      "aria-label": "Its value",
+      class: "grow",
+      autocomplete: "off",
+      oninput: () => this.preview(this.value, this.typed),
+    });
     this.typed = h("span", { class: "muted preview-type", "aria-live": "polite" }); // what becomes of the text
-    main.append(h("div", { class: "bar" }, this.filter, this.count), this.list,
-      h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.add(); } }, this.name, this.value, this.typed, h("button", { type: "submit" }, "Set")));
+    main.append(
+      h("div", { class: "bar" }, this.filter, this.count),
+      this.list,
+      h(
+        "form",
+        {
+          class: "bar",
+          onsubmit: (event) => {
+            event.preventDefault();
+            this.add();
+          },
+        },
+        this.name,
+        this.value,
+        this.typed,
+        h("button", { type: "submit" }, "Set"),
+      ),
+    );
     this.ending = link.watch(["parameters"], () => this.update());
   }
 
@@ -56,16 +84,37 @@ export class Parameters {
 
   makeRow(name) {
     const typed = h("span", { class: "muted preview-type", "aria-live": "polite" });
-    const input = h("input", { "aria-label": t("Value of {name}", { name }), autocomplete: "off", oninput: () => this.preview(input, typed) });
+    const input = h("input", {
+      "aria-label": t("Value of {name}", { name }),
+      autocomplete: "off",
+      oninput: () => this.preview(input, typed),
+    });
     const row = { input, text: "" };
-    const element = h("form", { class: "row parameter", onsubmit: (event) => {
-      event.preventDefault();
-      // What was not changed stays as it is: doubles in lists of other values look like ints.
-      const text = input.value;
-      input.blur();
-      if (text !== row.text) this.set(name, text, typed);
-    } }, h("span", { class: "name" }, name), h("span", { class: "with-type" }, input, typed),
-    h("button", { type: "button", class: "small", title: t("Delete {name}", { name }), onclick: () => this.link.setParameter(name, undefined) }, t("delete")));
+    const element = h(
+      "form",
+      {
+        class: "row parameter",
+        onsubmit: (event) => {
+          event.preventDefault();
+          // What was not changed stays as it is: doubles in lists of other values look like ints.
+          const text = input.value;
+          input.blur();
+          if (text !== row.text) this.set(name, text, typed);
+        },
+      },
+      h("span", { class: "name" }, name),
+      h("span", { class: "with-type" }, input, typed),
+      h(
+        "button",
+        {
+          type: "button",
+          class: "small",
+          title: t("Delete {name}", { name }),
+          onclick: () => this.link.setParameter(name, undefined),
+        },
+        t("delete"),
+      ),
+    );
     input.addEventListener("blur", () => {
       say(typed, "");
       if (!input.value.trim()) input.value = row.text;
@@ -80,7 +129,7 @@ export class Parameters {
     let count = 0;
     for (const [name, row] of this.rows) {
       row.element.hidden = !`${name} ${row.text}`.toLowerCase().includes(words);
-      count += !row.element.hidden;
+      if (!row.element.hidden) count += 1;
     }
     setText(this.count, t("{count} of {all} parameters", { count, all: this.rows.size }));
   }
@@ -116,14 +165,15 @@ export class Parameters {
         found = error.message;
         isWrong = true;
       }
-      if (input.value === text && (input === this.value || document.activeElement === input)) say(shown, found, isWrong);
+      if (input.value === text && (input === this.value || document.activeElement === input))
+        say(shown, found, isWrong);
     }, PREVIEW_MS);
   }
 
   async add() {
     const name = this.name.value.trim();
     if (!name) return;
-    if (!await this.set(name.startsWith("/") ? name : `/${name}`, this.value.value, this.typed)) return;
+    if (!(await this.set(name.startsWith("/") ? name : `/${name}`, this.value.value, this.typed))) return;
     this.name.value = this.value.value = "";
   }
 }
@@ -133,7 +183,9 @@ export function textOf(value, type) {
   if (type === "float64_array") return `[${value.map((each) => textOf(each, "float64")).join(",")}]`;
   if (type === "float64" && Number.isInteger(value) && Math.abs(value) < 1e21) return `${value}.0`;
   // JSON, but for numbers such as 1e-7: to YAML 1.1 they are texts.
-  return quoted(value).replace(/"(?:[^"\\]|\\.)*"|(-?\d+)(\.\d+)?e/g, (all, digits, fraction) => (digits === undefined || fraction ? all : `${digits}.0e`));
+  return quoted(value).replace(/"(?:[^"\\]|\\.)*"|(-?\d+)(\.\d+)?e/g, (all, digits, fraction) =>
+    digits === undefined || fraction ? all : `${digits}.0e`,
+  );
 }
 
 function say(element, text, isWrong = false) {

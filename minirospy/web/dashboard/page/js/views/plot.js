@@ -7,12 +7,30 @@ import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 import { t } from "../texts.js";
 
-const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
+const WINDOWS = [
+  ["5", "5 s"],
+  ["10", "10 s"],
+  ["30", "30 s"],
+  ["60", "1 min"],
+  ["300", "5 min"],
+  ["", "all"],
+];
 const USUAL_WINDOW = "10";
 const MAX_PAIRS = 5000; // points of one series over another
 const FRAME_MS = 33;
 const QUIET_MS = 300; // without another change, until it is in the address
-const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
+const COLORS = [
+  "#2f7ed8",
+  "#e4572e",
+  "#2a9d5c",
+  "#a05cc7",
+  "#c98a00",
+  "#0c9fb0",
+  "#d6458b",
+  "#7a7f87",
+  "#6b8e23",
+  "#8c5a3c",
+];
 
 export class Plot {
   constructor(link, words, main, place) {
@@ -20,6 +38,7 @@ export class Plot {
     this.place = place;
     this.ends = new Map(); // path -> what ends its subscription
     this.series = new Map(); // label -> {label, path, samples, color, axis, isHidden}
+    this.removed = new Set(); // labels of series that the user removed while others of their path are shown
     this.problems = new Map(); // path without a series -> why: an error, or "" while its topic is not there
     this.origin = null;
     this.zoom = null; // {min, max} of time, null: it follows
@@ -35,32 +54,89 @@ export class Plot {
       this.unsaved = setTimeout(() => this.remember(), QUIET_MS);
     });
     this.over = words.get("x") ?? ""; // label of the series on the x axis; time where it is empty
-    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse())); // label -> kind, where it is not as it comes
+    // label -> kind, where it is not as it comes
+    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse()));
 
     this.known = h("datalist", { id: uniqueId("paths") });
-    this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
+    this.input = h("input", {
+      class: "grow",
+      list: this.known.id,
+      placeholder: "/topic/field, /topic/array[0:5]",
+      "aria-label": "What to plot",
+      autocomplete: "off",
+    });
     this.waiting = h("div", { role: "status" });
-    this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, t(name))));
+    this.window = h(
+      "select",
+      {
+        "aria-label": "Time shown",
+        onchange: () => {
+          this.live();
+          this.remember();
+        },
+      },
+      WINDOWS.map(([value, name]) => h("option", { value }, t(name))),
+    );
     const wanted = words.get("window") ?? USUAL_WINDOW;
     this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
     this.axis = h("select", { "aria-label": "The x axis", onchange: () => this.setOver(this.axis.value) });
     this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
-    this.liveButton = h("button", { type: "button", class: "primary keeps-place", onclick: () => this.live() }, "Follow");
-    this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
-      this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"));
-    this.area = h("div", { class: "panel chart", tabindex: 0, role: "group", "aria-label": "Chart: left and right pan, plus and minus zoom, Escape follows" });
-    this.hint = h("p", { class: "empty" }, "Type a path above, choose “plot” next to a field in Topics, or drag the field here.");
+    this.liveButton = h(
+      "button",
+      { type: "button", class: "primary keeps-place", onclick: () => this.live() },
+      "Follow",
+    );
+    this.form = h(
+      "form",
+      {
+        class: "bar",
+        onsubmit: (event) => {
+          event.preventDefault();
+          this.addTyped();
+        },
+      },
+      this.input,
+      this.known,
+      h("button", { type: "submit", class: "primary" }, "Plot"),
+    );
+    this.area = h("div", {
+      class: "panel chart",
+      tabindex: 0,
+      role: "group",
+      "aria-label": "Chart: left and right pan, plus and minus zoom, Escape follows",
+    });
+    this.hint = h(
+      "p",
+      { class: "empty" },
+      "Type a path above, choose “plot” next to a field in Topics, or drag the field here.",
+    );
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
-    main.append(this.form,
-      h("div", { class: "bar" }, this.pauseButton, this.window, h("label", {}, "x axis", this.axis), this.axes.button, this.liveButton, this.axes.autoButton,
+    main.append(
+      this.form,
+      h(
+        "div",
+        { class: "bar" },
+        this.pauseButton,
+        this.window,
+        h("label", {}, "x axis", this.axis),
+        this.axes.button,
+        this.liveButton,
+        this.axes.autoButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
-        h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow"))),
-      this.axes.element, this.area, this.waiting, this.legend);
+        h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
+      ),
+      this.axes.element,
+      this.area,
+      this.waiting,
+      this.legend,
+    );
     this.area.append(this.hint);
     for (const element of [this.area, this.form, this.legend]) {
-      element.addEventListener("dragover", (event) => { if (event.dataTransfer.types.includes("text/plain")) event.preventDefault(); });
+      element.addEventListener("dragover", (event) => {
+        if (event.dataTransfer.types.includes("text/plain")) event.preventDefault();
+      });
       element.addEventListener("drop", (event) => this.dropped(event));
     }
     this.pause(this.isPaused);
@@ -113,7 +189,10 @@ export class Plot {
   add(path) {
     if (this.ends.has(path)) return;
     this.problems.set(path, "");
-    this.ends.set(path, this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)));
+    this.ends.set(
+      path,
+      this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)),
+    );
     this.remember();
     this.showProblems();
   }
@@ -124,7 +203,7 @@ export class Plot {
       this.forget(series.path);
     } else {
       series.isRemoved = true;
-      (this.removed ??= new Set()).add(series.label);
+      this.removed.add(series.label);
     }
     series.row.remove();
     if (this.over === series.label) this.over = "";
@@ -146,14 +225,23 @@ export class Plot {
 
   remember() {
     const span = this.window.value;
-    this.place.remember([...[...this.ends.keys()].map((path) => ["path", path]), ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]]),
-      ...(this.over ? [["x", this.over]] : []), ...[...this.kinds].map(([label, kind]) => ["show", `${kind} ${label}`]), ...this.axes.words()]);
+    this.place.remember([
+      ...[...this.ends.keys()].map((path) => ["path", path]),
+      ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]]),
+      ...(this.over ? [["x", this.over]] : []),
+      ...[...this.kinds].map(([label, kind]) => ["show", `${kind} ${label}`]),
+      ...this.axes.words(),
+    ]);
   }
 
   /** Offer time and each series for the x axis. */
   showAxis() {
     const labels = [...this.series.keys(), ...(this.over && !this.series.has(this.over) ? [this.over] : [])];
-    fill(this.axis, h("option", { value: "" }, t("time")), labels.map((label) => h("option", { value: label }, label)));
+    fill(
+      this.axis,
+      h("option", { value: "" }, t("time")),
+      labels.map((label) => h("option", { value: label }, label)),
+    );
     this.axis.value = this.over;
   }
 
@@ -172,7 +260,10 @@ export class Plot {
     if (series.derived) {
       const { times, values, stamps, count, total } = series.raw;
       series.samples = new Samples();
-      series.samples.append(times.subarray(0, count), series.derived.append(times.subarray(0, count), values.subarray(0, count), stamps?.subarray(0, count)));
+      series.samples.append(
+        times.subarray(0, count),
+        series.derived.append(times.subarray(0, count), values.subarray(0, count), stamps?.subarray(0, count)),
+      );
       series.samples.total = total;
     }
     this.isDirty = true;
@@ -185,9 +276,30 @@ export class Plot {
   }
 
   showProblems() {
-    refill(this.waiting, [...this.problems].map(([path, error]) => h("div", { class: "series-missing" },
-      h("span", { class: error ? "error" : "muted" }, error ? `${path}: ${error}` : t("waiting for {path}", { path })),
-      h("button", { type: "button", class: "small", title: t("Remove {name}", { name: path }), onclick: () => this.forget(path) }, "×"))));
+    refill(
+      this.waiting,
+      [...this.problems].map(([path, error]) =>
+        h(
+          "div",
+          { class: "series-missing" },
+          h(
+            "span",
+            { class: error ? "error" : "muted" },
+            error ? `${path}: ${error}` : t("waiting for {path}", { path }),
+          ),
+          h(
+            "button",
+            {
+              type: "button",
+              class: "small",
+              title: t("Remove {name}", { name: path }),
+              onclick: () => this.forget(path),
+            },
+            "×",
+          ),
+        ),
+      ),
+    );
   }
 
   received(path, item) {
@@ -196,7 +308,7 @@ export class Plot {
       this.showProblems();
     }
     for (const { label, times, values, stamps } of item.series ?? []) {
-      if (this.removed?.has(label)) continue;
+      if (this.removed.has(label)) continue;
       let series = this.series.get(label);
       if (!series) {
         series = this.makeSeries(label, path);
@@ -222,23 +334,55 @@ export class Plot {
     const series = { label, path, raw, samples: raw, kind: "", derived: null, color, isHidden: false };
     const known = this.kinds.get(label) ?? "";
     if (KINDS.some(([kind]) => kind === known)) this.setKind(series, known);
-    const kinds = h("select", { class: "small", "aria-label": t("How {label} is shown", { label }), onchange: () => {
-      this.setKind(series, kinds.value);
-      if (kinds.value) this.kinds.set(label, kinds.value);
-      else this.kinds.delete(label);
-      this.remember();
-    } }, KINDS.map(([kind, name]) => h("option", { value: kind }, t(name))));
+    const kinds = h(
+      "select",
+      {
+        class: "small",
+        "aria-label": t("How {label} is shown", { label }),
+        onchange: () => {
+          this.setKind(series, kinds.value);
+          if (kinds.value) this.kinds.set(label, kinds.value);
+          else this.kinds.delete(label);
+          this.remember();
+        },
+      },
+      KINDS.map(([kind, name]) => h("option", { value: kind }, t(name))),
+    );
     kinds.value = series.kind;
     series.value = h("span", { class: "num" });
     series.count = h("span", { class: "muted count" });
-    const swatch = h("button", { type: "button", class: "swatch", title: "Show or hide", "aria-pressed": "true", onclick: () => {
-      series.isHidden = !series.isHidden;
-      swatch.setAttribute("aria-pressed", String(!series.isHidden));
-      this.rebuild();
-    } });
+    const swatch = h("button", {
+      type: "button",
+      class: "swatch",
+      title: "Show or hide",
+      "aria-pressed": "true",
+      onclick: () => {
+        series.isHidden = !series.isHidden;
+        swatch.setAttribute("aria-pressed", String(!series.isHidden));
+        this.rebuild();
+      },
+    });
     swatch.style.background = color;
-    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, kinds, this.axes.choice(series),
-      h("button", { type: "button", class: "small", title: t("Remove {name}", { name: label }), onclick: () => this.remove(series) }, "×"));
+    series.row = h(
+      "div",
+      { class: "series", role: "listitem" },
+      swatch,
+      h("span", { class: "label" }, label),
+      series.value,
+      series.count,
+      kinds,
+      this.axes.choice(series),
+      h(
+        "button",
+        {
+          type: "button",
+          class: "small",
+          title: t("Remove {name}", { name: label }),
+          onclick: () => this.remove(series),
+        },
+        "×",
+      ),
+    );
     series.row.dataset.label = label;
     this.series.set(label, series);
     this.legend.append(series.row);
@@ -287,34 +431,74 @@ export class Plot {
     const style = getComputedStyle(document.documentElement);
     const text = style.getPropertyValue("--muted").trim();
     const line = style.getPropertyValue("--line").trim();
-    const styled = (more) => ({ stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui", ...more });
+    const styled = (more) => ({
+      stroke: text,
+      grid: { stroke: line, width: 1 },
+      ticks: { stroke: line, width: 1 },
+      font: "12px system-ui",
+      ...more,
+    });
     if (this.over) {
       this.chart = this.makeOver(shown, styled);
       return;
     }
     const axes = this.axes.drawn(shown, styled);
-    const scale = ({ label }) => [this.axes.scaleOf(label), { range: (_, low, high) => this.axes.rangeOf(label, low === null || low === high ? rangeOf([[low ?? NaN]]) : globalThis.uPlot.rangeNum(low, high, 0.1, true)) }];
-    this.chart = new globalThis.uPlot({
-      width: this.area.clientWidth,
-      height: this.area.clientHeight,
-      padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
-      legend: { show: false },
-      cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.live() }, points: { size: 6 } },
-      scales: { x: { time: false, range: () => this.range().map((each) => each - (this.origin ?? 0)) }, ...Object.fromEntries(shown.map(scale)) },
-      series: [{}, ...shown.map((each) => ({ label: each.label, stroke: each.color, width: 1.5, scale: this.axes.scaleOf(each.label), spanGaps: true,
-        points: { size: 6, fill: each.color, show: () => each.samples.count === 1 } }))], // a line has two points
-      axes: [styled({ values: (_, all) => all.map((each) => `${number(each)} s`) }), ...axes],
-      hooks: {
-        setSelect: [(chart) => {
-          const { left, width } = chart.select;
-          if (width < 4) return;
-          this.zoom = { min: chart.posToVal(left, "x") + this.origin, max: chart.posToVal(left + width, "x") + this.origin };
-          chart.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-          this.isDirty = true;
-        }],
-        setCursor: [() => this.showValues()],
+    const scale = ({ label }) => [
+      this.axes.scaleOf(label),
+      {
+        range: (_, low, high) =>
+          this.axes.rangeOf(
+            label,
+            low === null || low === high ? rangeOf([[low ?? NaN]]) : uPlot.rangeNum(low, high, 0.1, true),
+          ),
       },
-    }, [[], ...shown.map(() => [])], this.area);
+    ];
+    this.chart = new uPlot(
+      {
+        width: this.area.clientWidth,
+        height: this.area.clientHeight,
+        padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
+        legend: { show: false },
+        cursor: {
+          drag: { x: true, y: false, setScale: false },
+          bind: { dblclick: () => () => this.live() },
+          points: { size: 6 },
+        },
+        scales: {
+          x: { time: false, range: () => this.range().map((each) => each - (this.origin ?? 0)) },
+          ...Object.fromEntries(shown.map(scale)),
+        },
+        series: [
+          {},
+          ...shown.map((each) => ({
+            label: each.label,
+            stroke: each.color,
+            width: 1.5,
+            scale: this.axes.scaleOf(each.label),
+            spanGaps: true,
+            points: { size: 6, fill: each.color, show: () => each.samples.count === 1 },
+          })),
+        ], // a line has two points
+        axes: [styled({ values: (_, all) => all.map((each) => `${number(each)} s`) }), ...axes],
+        hooks: {
+          setSelect: [
+            (chart) => {
+              const { left, width } = chart.select;
+              if (width < 4) return;
+              this.zoom = {
+                min: chart.posToVal(left, "x") + this.origin,
+                max: chart.posToVal(left + width, "x") + this.origin,
+              };
+              chart.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+              this.isDirty = true;
+            },
+          ],
+          setCursor: [() => this.showValues()],
+        },
+      },
+      [[], ...shown.map(() => [])],
+      this.area,
+    );
     this.axes.attach(this.chart);
     this.listenToFingers(this.chart.over);
   }
@@ -325,7 +509,9 @@ export class Plot {
       const [xs, ys] = chart.data[number];
       const scale = this.axes.scaleOf(shown[number - 1].label);
       const path = new Path2D();
-      xs.forEach((x, index) => path[index ? "lineTo" : "moveTo"](chart.valToPos(x, "x", true), chart.valToPos(ys[index], scale, true)));
+      xs.forEach((x, index) =>
+        path[index ? "lineTo" : "moveTo"](chart.valToPos(x, "x", true), chart.valToPos(ys[index], scale, true)),
+      );
       chart.ctx.save();
       chart.ctx.strokeStyle = shown[number - 1].color;
       chart.ctx.lineWidth = 1.5 * devicePixelRatio;
@@ -335,32 +521,59 @@ export class Plot {
         const last = xs.length - 1;
         chart.ctx.fillStyle = shown[number - 1].color;
         chart.ctx.beginPath();
-        chart.ctx.arc(chart.valToPos(xs[last], "x", true), chart.valToPos(ys[last], scale, true), 4 * devicePixelRatio, 0, 2 * Math.PI);
+        chart.ctx.arc(
+          chart.valToPos(xs[last], "x", true),
+          chart.valToPos(ys[last], scale, true),
+          4 * devicePixelRatio,
+          0,
+          2 * Math.PI,
+        );
         chart.ctx.fill();
       }
       chart.ctx.restore();
       return null;
     };
     const axes = this.axes.drawn(shown, styled);
-    const scale = ({ label }) => [this.axes.scaleOf(label), { range: () => this.axes.rangeOf(label, this.ranges.get(this.axes.scaleOf(label)) ?? [0, 1]) }];
-    const chart = new globalThis.uPlot({
-      mode: 2,
-      width: this.area.clientWidth,
-      height: this.area.clientHeight,
-      padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
-      legend: { show: false },
-      cursor: { show: false },
-      scales: { x: { time: false, range: () => this.ranges.get("x") ?? [0, 1] }, ...Object.fromEntries(shown.map(scale)) },
-      series: [null, ...shown.map(({ label }) => ({ label, paths: line, facets: [{ scale: "x", auto: true }, { scale: this.axes.scaleOf(label), auto: true }] }))],
-      axes: [styled({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), ...axes],
-    }, [null, ...shown.map(() => [[], []])], this.area);
+    const scale = ({ label }) => [
+      this.axes.scaleOf(label),
+      { range: () => this.axes.rangeOf(label, this.ranges.get(this.axes.scaleOf(label)) ?? [0, 1]) },
+    ];
+    const chart = new uPlot(
+      {
+        mode: 2,
+        width: this.area.clientWidth,
+        height: this.area.clientHeight,
+        padding: [12, axes.some(({ side }) => side === 1) ? 0 : 14, 0, 0],
+        legend: { show: false },
+        cursor: { show: false },
+        scales: {
+          x: { time: false, range: () => this.ranges.get("x") ?? [0, 1] },
+          ...Object.fromEntries(shown.map(scale)),
+        },
+        series: [
+          null,
+          ...shown.map(({ label }) => ({
+            label,
+            paths: line,
+            facets: [
+              { scale: "x", auto: true },
+              { scale: this.axes.scaleOf(label), auto: true },
+            ],
+          })),
+        ],
+        axes: [styled({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), ...axes],
+      },
+      [null, ...shown.map(() => [[], []])],
+      this.area,
+    );
     this.axes.attach(chart);
     return chart;
   }
 
   resize() {
     if (!this.chart) this.rebuild();
-    else if (this.area.clientWidth) this.chart.setSize({ width: this.area.clientWidth, height: this.area.clientHeight });
+    else if (this.area.clientWidth)
+      this.chart.setSize({ width: this.area.clientWidth, height: this.area.clientHeight });
   }
 
   wheel(event) {
@@ -374,7 +587,13 @@ export class Plot {
 
   key(event) {
     if (event.target !== this.area || event.ctrlKey || event.altKey || event.metaKey || this.origin === null) return;
-    const act = { ArrowLeft: () => this.pan(-0.1), ArrowRight: () => this.pan(0.1), "+": () => this.zoomBy(0.5), "-": () => this.zoomBy(2), Escape: () => this.live() }[event.key];
+    const act = {
+      ArrowLeft: () => this.pan(-0.1),
+      ArrowRight: () => this.pan(0.1),
+      "+": () => this.zoomBy(0.5),
+      "-": () => this.zoomBy(2),
+      Escape: () => this.live(),
+    }[event.key];
     if (!act) return;
     event.preventDefault();
     act();
@@ -383,7 +602,9 @@ export class Plot {
   /** Let one finger pan the time, and two zoom it. */
   listenToFingers(over) {
     const fingers = new Map(); // pointer -> x
-    over.addEventListener("pointerdown", ({ pointerType, pointerId, clientX }) => { if (pointerType === "touch") fingers.set(pointerId, clientX); });
+    over.addEventListener("pointerdown", ({ pointerType, pointerId, clientX }) => {
+      if (pointerType === "touch") fingers.set(pointerId, clientX);
+    });
     over.addEventListener("pointermove", ({ pointerId, clientX }) => {
       if (!fingers.has(pointerId) || this.origin === null) return;
       const before = [...fingers.values()];
@@ -391,9 +612,14 @@ export class Plot {
       const { left, width } = over.getBoundingClientRect();
       const [from, to] = this.range();
       if (after.length === 1) this.pan((before[0] - after[0]) / width);
-      if (after.length === 2) this.zoomBy(Math.abs(before[0] - before[1]) / Math.max(1, Math.abs(after[0] - after[1])), from + (to - from) * ((after[0] + after[1]) / 2 - left) / width);
+      if (after.length === 2)
+        this.zoomBy(
+          Math.abs(before[0] - before[1]) / Math.max(1, Math.abs(after[0] - after[1])),
+          from + ((to - from) * ((after[0] + after[1]) / 2 - left)) / width,
+        );
     });
-    for (const name of ["pointerup", "pointercancel"]) over.addEventListener(name, ({ pointerId }) => fingers.delete(pointerId));
+    for (const name of ["pointerup", "pointercancel"])
+      over.addEventListener(name, ({ pointerId }) => fingers.delete(pointerId));
   }
 
   /** Show the time later by a share of what is shown. */
@@ -422,13 +648,26 @@ export class Plot {
         const shown = this.visible();
         const data = shown.map(({ samples }) => pairs(over, samples, from, to, MAX_PAIRS));
         const scales = shown.map(({ label }) => this.axes.scaleOf(label));
-        this.ranges = new Map([["x", rangeOf(data.map(([xs]) => xs))],
-          ...scales.map((scale) => [scale, rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys))])]);
+        this.ranges = new Map(
+          /** @type {[string, any][]} */ ([
+            ["x", rangeOf(data.map(([xs]) => xs))],
+            ...scales.map((scale) => [
+              scale,
+              rangeOf(data.filter((_, index) => scales[index] === scale).map(([, ys]) => ys)),
+            ]),
+          ]),
+        );
         this.chart.setData([null, ...data]);
         this.showValues();
         return;
       }
-      const data = drawn(this.visible().map((each) => each.samples), from, to, this.chart.bbox.width / devicePixelRatio, this.origin ?? 0);
+      const data = drawn(
+        this.visible().map((each) => each.samples),
+        from,
+        to,
+        this.chart.bbox.width / devicePixelRatio,
+        this.origin ?? 0,
+      );
       this.chart.setData(data);
     }
     this.showValues();
@@ -465,7 +704,18 @@ export class Plot {
 
   saveCsv() {
     const all = [...this.series.values()].filter((each) => !each.isHidden);
-    download("plot.csv", new Blob([csv(all.map(titleWithKind), all.map((each) => each.samples))], { type: "text/csv" }));
+    download(
+      "plot.csv",
+      new Blob(
+        [
+          csv(
+            all.map(titleWithKind),
+            all.map((each) => each.samples),
+          ),
+        ],
+        { type: "text/csv" },
+      ),
+    );
   }
 
   savePng() {

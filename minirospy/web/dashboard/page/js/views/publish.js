@@ -20,17 +20,56 @@ export class Publish {
     this.choice = h("select", { class: "grow", "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
     this.about = h("span", { class: "muted" });
     this.isNew = false;
-    this.name = h("input", { class: "grow", placeholder: "/name", "aria-label": "Name of the new topic", autocomplete: "off", onchange: () => this.choose(this.name.value.trim()) });
-    this.typeName = h("input", { class: "grow", placeholder: "its type, as geometry_msgs/Twist", "aria-label": "Its type", autocomplete: "off", onchange: () => this.describe(this.typeName.value.trim()) });
+    this.name = h("input", {
+      class: "grow",
+      placeholder: "/name",
+      "aria-label": "Name of the new topic",
+      autocomplete: "off",
+      onchange: () => this.choose(this.name.value.trim()),
+    });
+    this.typeName = h("input", {
+      class: "grow",
+      placeholder: "its type, as geometry_msgs/Twist",
+      "aria-label": "Its type",
+      autocomplete: "off",
+      onchange: () => this.describe(this.typeName.value.trim()),
+    });
     this.fresh = h("div", { class: "bar", hidden: true }, this.name, this.typeName);
     this.fields = h("div", {});
     this.once = h("button", { type: "submit", class: "primary" }, "Publish once");
     this.repeat = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.toggle() }, "Repeat");
-    this.rate = h("input", { type: "number", min: 0.1, max: 100, step: "any", value: "10", "aria-label": "Times a second" });
-    this.buttons = h("div", { class: "bar", hidden: true }, this.once, this.repeat, h("label", {}, this.rate, "times a second"));
+    this.rate = h("input", {
+      type: "number",
+      min: 0.1,
+      max: 100,
+      step: "any",
+      value: "10",
+      "aria-label": "Times a second",
+    });
+    this.buttons = h(
+      "div",
+      { class: "bar", hidden: true },
+      this.once,
+      this.repeat,
+      h("label", {}, this.rate, "times a second"),
+    );
     this.result = h("p", { role: "status" });
-    main.append(h("div", { class: "bar" }, this.choice, this.about), this.fresh,
-      h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.send(); } }, this.fields, h("div", { class: "form-foot" }, this.buttons, this.result)));
+    main.append(
+      h("div", { class: "bar" }, this.choice, this.about),
+      this.fresh,
+      h(
+        "form",
+        {
+          class: "panel details",
+          onsubmit: (event) => {
+            event.preventDefault();
+            this.send();
+          },
+        },
+        this.fields,
+        h("div", { class: "form-foot" }, this.buttons, this.result),
+      ),
+    );
     this.ending = link.watch(["channels", "state", "graph"], () => this.update());
   }
 
@@ -44,7 +83,12 @@ export class Publish {
     const names = [...new Set([...this.link.channels.keys(), ...this.link.graph.subscribed.keys()])].sort();
     if (names.join(" ") !== this.names) {
       this.names = names.join(" ");
-      fill(this.choice, h("option", { value: "" }, "choose a topic"), names.map((name) => h("option", { value: name }, name)), h("option", { value: NEW }, "another topic …"));
+      fill(
+        this.choice,
+        h("option", { value: "" }, "choose a topic"),
+        names.map((name) => h("option", { value: name }, name)),
+        h("option", { value: NEW }, "another topic …"),
+      );
     }
     this.choice.value = names.includes(this.topic) ? this.topic : this.isNew || this.topic ? NEW : "";
     const channel = this.link.channels.get(this.topic);
@@ -55,7 +99,17 @@ export class Publish {
     if (isOpen && this.topic && !channel && !this.schema && this.asked !== this.topic) this.describe("");
     // A form that is in use stays: the channel may be that of its own messages.
     if (channel && channel.schema !== this.schema && !this.sent) this.show(channel);
-    else if (!this.schema) fill(this.fields, h("p", { class: "muted" }, this.link.state !== "open" || this.link.mayWrite ? "Choose a topic: its type becomes a form." : "This token is read-only: it publishes nothing."));
+    else if (!this.schema)
+      fill(
+        this.fields,
+        h(
+          "p",
+          { class: "muted" },
+          this.link.state !== "open" || this.link.mayWrite
+            ? "Choose a topic: its type becomes a form."
+            : "This token is read-only: it publishes nothing.",
+        ),
+      );
   }
 
   choose(topic) {
@@ -78,14 +132,19 @@ export class Publish {
     if (this.isNew) this.name.focus();
   }
 
-  /** Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have. */
+  /**
+   * Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have.
+   */
   async describe(type) {
     const { topic } = this;
     this.asked = topic;
     setText(this.result, "");
     this.result.classList.remove("error");
     try {
-      const { name, definition } = await this.link.tools.request({ do: "type", ...(type ? { name: type } : { topic }) });
+      const { name, definition } = await this.link.tools.request({
+        do: "type",
+        ...(type ? { name: type } : { topic }),
+      });
       if (topic !== this.topic || this.link.channels.has(topic)) return;
       this.typeName.value = name;
       this.show({ type: name, schema: definition });

@@ -1,4 +1,5 @@
-// Reconfigure: the parameters of dynamic_reconfigure servers as sliders, switches and selections; saved to and loaded from YAML.
+// Reconfigure: the parameters of dynamic_reconfigure servers as sliders, switches and selections; saved to and loaded
+// from YAML.
 
 import { download, fill, h, setText } from "../dom.js";
 import { converted, describe, requestOf, shownNumber, sliderStep, statesOf, valuesOf, yamlOf } from "../reconfigure.js";
@@ -18,11 +19,23 @@ export class Reconfigure {
     this.panels = new Map(); // name of a server -> its panel
     this.rows = new Map();
     this.wanted = new Set(words.getAll("node"));
-    this.filter = h("input", { type: "search", placeholder: "Filter servers", "aria-label": "Filter", oninput: () => this.showFiltered() });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter servers",
+      "aria-label": "Filter",
+      oninput: () => this.showFiltered(),
+    });
     this.list = h("div", { class: "servers", role: "group", "aria-label": "Servers" });
     this.area = h("div", { class: "configs" });
     this.empty = h("p", { class: "empty" });
-    main.append(h("div", { class: "split reconfigure" }, h("aside", { class: "panel details side" }, this.filter, this.list), h("div", { class: "scroll" }, this.area, this.empty)));
+    main.append(
+      h(
+        "div",
+        { class: "split reconfigure" },
+        h("aside", { class: "panel details side" }, this.filter, this.list),
+        h("div", { class: "scroll" }, this.area, this.empty),
+      ),
+    );
     this.ending = link.watch(["channels", "services", "state"], () => this.update());
   }
 
@@ -56,7 +69,11 @@ export class Reconfigure {
     for (const name of servers) {
       let row = this.rows.get(name);
       if (!row) {
-        row = h("button", { type: "button", class: "server", "aria-pressed": "false", onclick: () => this.choose(name) }, name || "/");
+        row = h(
+          "button",
+          { type: "button", class: "server", "aria-pressed": "false", onclick: () => this.choose(name) },
+          name || "/",
+        );
         this.rows.set(name, row);
       }
       const next = before ? before.nextSibling : this.list.firstChild;
@@ -113,8 +130,14 @@ export class Reconfigure {
       row.hidden = !name.toLowerCase().includes(words);
       row.setAttribute("aria-pressed", String(this.panels.has(name)));
     }
-    setText(this.empty, this.panels.size || this.link.state !== "open" ? ""
-      : this.rows.size ? t("Choose a server on the left.") : t("No node offers dynamic_reconfigure. Start one: it appears here."));
+    setText(
+      this.empty,
+      this.panels.size || this.link.state !== "open"
+        ? ""
+        : this.rows.size
+          ? t("Choose a server on the left.")
+          : t("No node offers dynamic_reconfigure. Start one: it appears here."),
+    );
   }
 }
 
@@ -133,13 +156,32 @@ class Panel {
     this.isCalling = false;
     this.result = h("p", { class: "note", role: "status" });
     this.body = h("div", { class: "config" }, h("p", { class: "muted" }, t("waiting for its description …")));
-    this.file = h("input", { type: "file", accept: ".yaml,.yml", hidden: true, "aria-label": t("File for {name}", { name }), onchange: () => this.load() });
+    this.file = h("input", {
+      type: "file",
+      accept: ".yaml,.yml",
+      hidden: true,
+      "aria-label": t("File for {name}", { name }),
+      onchange: () => this.load(),
+    });
     this.saveButton = h("button", { type: "button", disabled: true, onclick: () => this.save() }, "Save");
     this.loadButton = h("button", { type: "button", disabled: true, onclick: () => this.file.click() }, "Load");
     this.usualButton = h("button", { type: "button", disabled: true, onclick: () => this.reset() }, "Defaults");
-    this.element = h("section", { class: "panel details", "aria-label": name },
-      h("div", { class: "bar" }, h("h2", {}, name || "/"), this.result, this.saveButton, this.loadButton, this.usualButton, this.file,
-        h("button", { type: "button", title: t("Close {name}", { name }), onclick: shut }, "×")), this.body);
+    this.element = h(
+      "section",
+      { class: "panel details", "aria-label": name },
+      h(
+        "div",
+        { class: "bar" },
+        h("h2", {}, name || "/"),
+        this.result,
+        this.saveButton,
+        this.loadButton,
+        this.usualButton,
+        this.file,
+        h("button", { type: "button", title: t("Close {name}", { name }), onclick: shut }, "×"),
+      ),
+      this.body,
+    );
     this.element.dataset.server = name;
     this.ends = [
       link.subscribe({ topic: name + DESCRIPTIONS, mode: "latest" }, (item) => this.described(item)),
@@ -165,7 +207,8 @@ class Panel {
     this.saveButton.disabled = !this.values.size;
     this.loadButton.disabled = this.usualButton.disabled = !mayChange;
     if (!isThere) this.note(t("This server has left."), true, true);
-    else if (this.link.state === "open" && !this.link.mayWrite) this.note(t("This token is read-only: values are shown and cannot be changed."), false, true);
+    else if (this.link.state === "open" && !this.link.mayWrite)
+      this.note(t("This token is read-only: values are shown and cannot be changed."), false, true);
     else if (this.isStateShown) this.note("");
   }
 
@@ -179,13 +222,18 @@ class Panel {
 
   described({ message, error }) {
     if (error) return this.note(error, true);
-    const text = JSON.stringify(message, (_, each) => (Number.isFinite(each) || typeof each !== "number" ? each : String(each)));
+    const text = JSON.stringify(message, (_, each) =>
+      Number.isFinite(each) || typeof each !== "number" ? each : String(each),
+    );
     if (text === this.text) return undefined;
     this.text = text;
     this.description = describe(message);
     this.controls.clear();
     this.groups = [];
-    fill(this.body, this.makeGroup(this.description.root, (name, value) => this.change(name, value)));
+    fill(
+      this.body,
+      this.makeGroup(this.description.root, (name, value) => this.change(name, value)),
+    );
     this.show();
     return this.showState(this.isThere);
   }
@@ -226,9 +274,20 @@ class Panel {
     const inside = h("div", {}, this.makeGroup(group, change));
     const box = h("fieldset", { class: "group" }, h("legend", {}, group.name), inside);
     box.dataset.group = group.name;
-    if (group.type === "hide") this.groups.push({ id: group.id, show: (state) => { box.hidden = !state; } });
+    if (group.type === "hide")
+      this.groups.push({
+        id: group.id,
+        show: (state) => {
+          box.hidden = !state;
+        },
+      });
     if (group.type === "collapse") {
-      const fold = h("button", { type: "button", class: "fold", "aria-label": t("Open {name}", { name: group.name }), onclick: () => this.setState(group.id, inside.hidden) });
+      const fold = h("button", {
+        type: "button",
+        class: "fold",
+        "aria-label": t("Open {name}", { name: group.name }),
+        onclick: () => this.setState(group.id, inside.hidden),
+      });
       const show = (state) => {
         inside.hidden = !state;
         fold.setAttribute("aria-expanded", String(state));
@@ -242,28 +301,50 @@ class Panel {
   /** Return a box whose changes are sent together. */
   makeApplied(group) {
     const waiting = new Map();
-    const apply = h("button", { type: "button", class: "primary", disabled: true, onclick: () => {
-      for (const [name, value] of waiting) this.changes.set(name, value);
-      discardAll();
-      this.send();
-    } }, "Apply");
-    const discard = h("button", { type: "button", disabled: true, onclick: () => {
-      discardAll();
-      this.show();
-    } }, "Discard");
+    const apply = h(
+      "button",
+      {
+        type: "button",
+        class: "primary",
+        disabled: true,
+        onclick: () => {
+          for (const [name, value] of waiting) this.changes.set(name, value);
+          discardAll();
+          this.send();
+        },
+      },
+      "Apply",
+    );
+    const discard = h(
+      "button",
+      {
+        type: "button",
+        disabled: true,
+        onclick: () => {
+          discardAll();
+          this.show();
+        },
+      },
+      "Discard",
+    );
     const update = () => {
       apply.disabled = discard.disabled = !waiting.size || !this.mayChange;
-      for (const [name, control] of this.controls) if (inside.contains(control.element)) control.mark(waiting.has(name));
+      for (const [name, control] of this.controls)
+        if (inside.contains(control.element)) control.mark(waiting.has(name));
     };
     const discardAll = () => {
       waiting.clear();
       update();
     };
     const inside = h("div", {});
-    fill(inside, this.makeGroup(group, (name, value) => {
-      waiting.set(name, value);
-      update();
-    }), h("div", { class: "bar" }, apply, discard));
+    fill(
+      inside,
+      this.makeGroup(group, (name, value) => {
+        waiting.set(name, value);
+        update();
+      }),
+      h("div", { class: "bar" }, apply, discard),
+    );
     this.groups.push({ id: group.id, show: () => {}, enable: update });
     const box = h("fieldset", { class: "group" }, h("legend", {}, group.name), inside);
     box.dataset.group = group.name;
@@ -293,7 +374,13 @@ class Panel {
       }
     });
     this.controls.set(parameter.name, control);
-    const row = h("div", { class: "parameter-row", title: limits(parameter) }, label, control.element, h("span", { class: "muted about" }, parameter.description));
+    const row = h(
+      "div",
+      { class: "parameter-row", title: limits(parameter) },
+      label,
+      control.element,
+      h("span", { class: "muted about" }, parameter.description),
+    );
     row.dataset.parameter = parameter.name;
     return row;
   }
@@ -323,26 +410,45 @@ class Panel {
   async call(sent, hasStates) {
     const { root, parameters } = this.description;
     try {
-      const { config } = await this.link.call(this.name + SERVICE, { config: requestOf(parameters, sent, hasStates ? root : null, this.states) });
+      const { config } = await this.link.call(this.name + SERVICE, {
+        config: requestOf(parameters, sent, hasStates ? root : null, this.states),
+      });
       const values = valuesOf(config);
-      const corrected = [...sent].filter(([name, value]) => values.has(name) && !Object.is(values.get(name), value) && !this.changes.has(name));
+      const corrected = [...sent].filter(
+        ([name, value]) => values.has(name) && !Object.is(values.get(name), value) && !this.changes.has(name),
+      );
       for (const [name, value] of values) this.values.set(name, value);
       this.sent = new Map();
       this.show();
       for (const [name] of corrected) this.controls.get(name)?.flash();
-      const texts = corrected.map(([name, value]) => t("{name}: {value} instead of {wanted}", { name, value: shownNumber(values.get(name)), wanted: shownNumber(value) }));
-      if (texts.length) this.note(t("The server has set {values}.", { values: `${texts.slice(0, 3).join(", ")}${texts.length > 3 ? ", …" : ""}` }));
+      const texts = corrected.map(([name, value]) =>
+        t("{name}: {value} instead of {wanted}", {
+          name,
+          value: shownNumber(values.get(name)),
+          wanted: shownNumber(value),
+        }),
+      );
+      if (texts.length)
+        this.note(
+          t("The server has set {values}.", {
+            values: `${texts.slice(0, 3).join(", ")}${texts.length > 3 ? ", …" : ""}`,
+          }),
+        );
     } catch (error) {
       this.sent = new Map();
       // rospy's server fails on the states of groups in every release; what a person sees is folded all the same.
       if (hasStates && !sent.size) return;
-      this.note(t("The server refuses {names}: {why}", { names: [...sent.keys()].join(", "), why: error.message }), true);
+      this.note(
+        t("The server refuses {names}: {why}", { names: [...sent.keys()].join(", "), why: error.message }),
+        true,
+      );
       this.show();
     }
   }
 
   reset() {
-    for (const { name, usual } of this.description.parameters.values()) if (usual !== undefined && !Object.is(usual, this.values.get(name))) this.changes.set(name, usual);
+    for (const { name, usual } of this.description.parameters.values())
+      if (usual !== undefined && !Object.is(usual, this.values.get(name))) this.changes.set(name, usual);
     this.send();
   }
 
@@ -368,7 +474,10 @@ class Panel {
       const found = known.map((name) => [name, converted(parameters.get(name), values[name])]);
       for (const [name, value] of found) this.changes.set(name, value);
       const others = names.filter((name) => !parameters.has(name));
-      this.note(t("{count} values of {name}", { count: found.length, name: file.name }) + (others.length ? t("; not known here: {names}", { names: others.slice(0, 5).join(", ") }) : ""));
+      this.note(
+        t("{count} values of {name}", { count: found.length, name: file.name }) +
+          (others.length ? t("; not known here: {names}", { names: others.slice(0, 5).join(", ") }) : ""),
+      );
       await this.send();
     } catch (error) {
       this.note(`${file.name}: ${errorText(error)}`, true);
@@ -377,7 +486,10 @@ class Panel {
 }
 
 function limits({ type, min, max, usual, constants }) {
-  const range = type === "int" || type === "double" ? t(" from {min} to {max},", { min: shownNumber(min), max: shownNumber(max) }) : "";
+  const range =
+    type === "int" || type === "double"
+      ? t(" from {min} to {max},", { min: shownNumber(min), max: shownNumber(max) })
+      : "";
   return `${constants.length ? t("enum of ") : ""}${type},${range} ${t("default {value}", { value: shownNumber(usual) })}`;
 }
 
@@ -414,7 +526,9 @@ function withState(element, inputs, show) {
       // What a person is typing or dragging stays.
       if (isTyped || !inputs.some((each) => each.dataset.isEdited)) show(value);
     },
-    enable: (isEnabled) => { for (const each of inputs) each.disabled = !isEnabled; },
+    enable: (isEnabled) => {
+      for (const each of inputs) each.disabled = !isEnabled;
+    },
     mark: (isWaiting) => element.classList.toggle("waiting", isWaiting),
     flash: () => element.animate([{ background: "var(--warn-back)" }, { background: "transparent" }], 1500),
   };
@@ -422,12 +536,19 @@ function withState(element, inputs, show) {
 
 function makeSwitch({ name }, changed) {
   const box = h("input", { type: "checkbox", "aria-label": name, onchange: () => changed(box.checked) });
-  return withState(h("span", { class: "control" }, box), [box], (value) => { box.checked = value; });
+  return withState(h("span", { class: "control" }, box), [box], (value) => {
+    box.checked = value;
+  });
 }
 
 function makeChoice({ name: parameterName, constants }, changed) {
-  const select = h("select", { "aria-label": parameterName, onchange: () => changed(constants[Number(select.value)].value) },
-    constants.map(({ name, value, description }, index) => h("option", { value: String(index), title: description }, `${name} (${shownNumber(value)})`)));
+  const select = h(
+    "select",
+    { "aria-label": parameterName, onchange: () => changed(constants[Number(select.value)].value) },
+    constants.map(({ name, value, description }, index) =>
+      h("option", { value: String(index), title: description }, `${name} (${shownNumber(value)})`),
+    ),
+  );
   const other = h("option", { value: "", hidden: true });
   select.append(other);
   return withState(h("span", { class: "control" }, select), [select], (value) => {
@@ -440,11 +561,22 @@ function makeChoice({ name: parameterName, constants }, changed) {
 function makeField(parameter, changed) {
   const isText = parameter.type === "str";
   const step = isText ? null : sliderStep(parameter);
-  const input = h("input", { type: "text", "aria-label": parameter.name, autocomplete: "off", inputmode: isText ? "text" : "decimal",
-    oninput: () => { input.dataset.isEdited = "1"; },
+  const input = h("input", {
+    type: "text",
+    "aria-label": parameter.name,
+    autocomplete: "off",
+    inputmode: isText ? "text" : "decimal",
+    oninput: () => {
+      input.dataset.isEdited = "1";
+    },
     onchange: () => finish(input.value),
-    onkeydown: (event) => { if (event.key === "Escape") cancel(); },
-    onblur: () => { delete input.dataset.isEdited; } });
+    onkeydown: (event) => {
+      if (event.key === "Escape") cancel();
+    },
+    onblur: () => {
+      delete input.dataset.isEdited;
+    },
+  });
   let last = "";
   const cancel = () => {
     delete input.dataset.isEdited;
@@ -455,19 +587,40 @@ function makeField(parameter, changed) {
     if (slider) delete slider.dataset.isEdited;
     changed(text);
   };
-  const slider = step === null ? null : h("input", { type: "range", min: parameter.min, max: parameter.max, step: parameter.type === "int" ? 1 : "any", "aria-label": t("Slider of {name}", { name: parameter.name }),
-    oninput: () => {
-      slider.dataset.isEdited = "1";
-      input.value = text();
-    },
-    onchange: () => finish(text()) });
+  const slider =
+    step === null
+      ? null
+      : h("input", {
+          type: "range",
+          min: parameter.min,
+          max: parameter.max,
+          step: parameter.type === "int" ? 1 : "any",
+          "aria-label": t("Slider of {name}", { name: parameter.name }),
+          oninput: () => {
+            slider.dataset.isEdited = "1";
+            input.value = text();
+          },
+          onchange: () => finish(text()),
+        });
   const text = () => {
     const value = Number(slider.value);
     const isEnd = value <= parameter.min || value >= parameter.max;
-    return shownNumber(isEnd || parameter.type === "int" ? value : Number((Math.round(value / step) * step).toPrecision(12)));
+    return shownNumber(
+      isEnd || parameter.type === "int" ? value : Number((Math.round(value / step) * step).toPrecision(12)),
+    );
   };
-  const element = h("span", { class: `control${slider ? " sliding" : ""}${isText ? " text" : ""}` },
-    slider ? [h("span", { class: "muted limit" }, shownNumber(parameter.min)), slider, h("span", { class: "muted limit" }, shownNumber(parameter.max))] : null, input);
+  const element = h(
+    "span",
+    { class: `control${slider ? " sliding" : ""}${isText ? " text" : ""}` },
+    slider
+      ? [
+          h("span", { class: "muted limit" }, shownNumber(parameter.min)),
+          slider,
+          h("span", { class: "muted limit" }, shownNumber(parameter.max)),
+        ]
+      : null,
+    input,
+  );
   return withState(element, slider ? [input, slider] : [input], (value) => {
     last = input.value = shownNumber(value);
     if (slider) slider.value = String(value);

@@ -18,7 +18,15 @@ export class Scene {
       fill(main);
       this.view = new SceneView(link, words, main);
     } catch (error) {
-      if (!this.isClosed) fill(main, h("p", { class: "empty error", role: "alert" }, t("The 3D view cannot be shown: {why}", { why: error.message })));
+      if (!this.isClosed)
+        fill(
+          main,
+          h(
+            "p",
+            { class: "empty error", role: "alert" },
+            t("The 3D view cannot be shown: {why}", { why: error.message }),
+          ),
+        );
     }
   }
 

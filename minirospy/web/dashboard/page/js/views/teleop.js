@@ -1,4 +1,5 @@
-// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server publishes them,
+// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server
+// publishes them,
 // and zero where nothing is held any more, or the page is lost.
 
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
@@ -11,7 +12,16 @@ const PERIOD_MS = 50;
 const RADIUS = 100; // of the stick's way
 const DEAD_ZONE = 0.1; // of a gamepad's stick
 const DEADMAN = [4, 5]; // the gamepad's shoulder buttons
-const KEYS = { ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0], ArrowLeft: [0, 1], KeyA: [0, 1], ArrowRight: [0, -1], KeyD: [0, -1] };
+const KEYS = {
+  ArrowUp: [1, 0],
+  KeyW: [1, 0],
+  ArrowDown: [-1, 0],
+  KeyS: [-1, 0],
+  ArrowLeft: [0, 1],
+  KeyA: [0, 1],
+  ArrowRight: [0, -1],
+  KeyD: [0, -1],
+};
 
 const isText = (element) => /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "");
 
@@ -26,40 +36,82 @@ export class Teleop {
     this.joyTopic = words.get("joy") ?? "";
     this.hasJoy = false; // whether a joystick's state was sent that may not be at rest
     this.drive = new Drive(link, (fields) => this.answered(fields));
-    const field = (label, value, attributes) => h("input", { "aria-label": label, value, autocomplete: "off", ...attributes });
-    this.where = field("Topic", this.topic, { type: "text", class: "grow", onchange: () => this.choose(this.where.value.trim()) });
+    const field = (label, value, attributes) =>
+      h("input", { "aria-label": label, value, autocomplete: "off", ...attributes });
+    this.where = field("Topic", this.topic, {
+      type: "text",
+      class: "grow",
+      onchange: () => this.choose(this.where.value.trim()),
+    });
     this.topics = h("datalist", { id: uniqueId("twists") });
     this.where.setAttribute("list", this.topics.id);
-    const speed = (label, name, usual) => field(label, words.get(name) || usual, { type: "number", min: 0, step: "any", onchange: () => this.remember() });
+    const speed = (label, name, usual) =>
+      field(label, words.get(name) || usual, { type: "number", min: 0, step: "any", onchange: () => this.remember() });
     this.forward = speed("Metres a second", "linear", "0.5");
     this.turn = speed("Radians a second", "angular", "1");
     this.joy = h("input", { type: "checkbox", checked: Boolean(this.joyTopic), onchange: () => this.switchJoy() });
     this.knob = svg("circle", { class: "knob", r: 38 });
-    this.pad = svg("svg", { class: "stick", viewBox: "-150 -150 300 300", tabindex: 0, role: "application", "aria-label": "Stick: up is forward" },
-      svg("circle", { class: "way", r: 138 }), svg("path", { class: "cross", d: "M 0 -130 V 130 M -130 0 H 130" }), this.knob);
+    this.pad = svg(
+      "svg",
+      {
+        class: "stick",
+        viewBox: "-150 -150 300 300",
+        tabindex: 0,
+        role: "application",
+        "aria-label": "Stick: up is forward",
+      },
+      svg("circle", { class: "way", r: 138 }),
+      svg("path", { class: "cross", d: "M 0 -130 V 130 M -130 0 H 130" }),
+      this.knob,
+    );
     this.pad.addEventListener("pointerdown", (event) => {
       this.pad.setPointerCapture(event.pointerId);
       this.pointer = event.pointerId;
       this.pull(event);
     });
-    this.pad.addEventListener("pointermove", (event) => { if (this.pointer === event.pointerId) this.pull(event); });
+    this.pad.addEventListener("pointermove", (event) => {
+      if (this.pointer === event.pointerId) this.pull(event);
+    });
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      this.pad.addEventListener(name, (event) => { if (this.pointer === event.pointerId) this.letGo(); });
+      this.pad.addEventListener(name, (event) => {
+        if (this.pointer === event.pointerId) this.letGo();
+      });
     }
     this.values = h("p", { class: "mono", role: "status" }, t("stopped"));
     this.device = h("p", { class: "muted hint" });
     this.problem = h("p", { class: "error", role: "alert" });
     main.append(
-      h("div", { class: "bar" }, this.where, this.topics, h("label", {}, this.forward, "m/s"), h("label", {}, this.turn, "rad/s"),
-        h("button", { type: "button", class: "stop", onclick: () => this.release(true) }, "Stop")),
-      h("div", { class: "panel teleop" }, this.pad, this.values,
-        h("p", { class: "muted hint" }, "Hold the stick, or the arrow keys or W A S D. With a gamepad hold a shoulder button and push its left stick."), this.device,
-        h("label", { class: "muted hint" }, this.joy, "publish the gamepad as /joy"), this.problem));
+      h(
+        "div",
+        { class: "bar" },
+        this.where,
+        this.topics,
+        h("label", {}, this.forward, "m/s"),
+        h("label", {}, this.turn, "rad/s"),
+        h("button", { type: "button", class: "stop", onclick: () => this.release(true) }, "Stop"),
+      ),
+      h(
+        "div",
+        { class: "panel teleop" },
+        this.pad,
+        this.values,
+        h(
+          "p",
+          { class: "muted hint" },
+          "Hold the stick, or the arrow keys or W A S D. With a gamepad hold a shoulder button and push its left stick.",
+        ),
+        this.device,
+        h("label", { class: "muted hint" }, this.joy, "publish the gamepad as /joy"),
+        this.problem,
+      ),
+    );
     this.ends = [link.watch(["channels", "graph", "state"], () => this.update())];
     this.listen(window, "keydown", (event) => this.key(event));
     this.listen(window, "keyup", (event) => this.key(event));
     for (const name of ["blur", "pagehide"]) this.listen(window, name, () => this.release());
-    this.listen(document, "visibilitychange", () => { if (document.hidden) this.release(); });
+    this.listen(document, "visibilitychange", () => {
+      if (document.hidden) this.release();
+    });
     for (const name of ["gamepadconnected", "gamepaddisconnected"]) this.listen(window, name, () => this.tick());
     this.timer = setInterval(() => this.tick(), PERIOD_MS);
   }
@@ -81,12 +133,21 @@ export class Teleop {
     const typed = [...channels.values()].filter(({ type }) => type === TYPE).map(({ topic }) => topic);
     // A topic that is only subscribed has no channel yet, and no type here: its name says enough.
     const waiting = [...graph.subscribed.keys()].filter((topic) => topic.endsWith("cmd_vel"));
-    fill(this.topics, [...new Set([...typed, ...waiting])].sort().map((topic) => h("option", { value: topic })));
+    fill(
+      this.topics,
+      [...new Set([...typed, ...waiting])].sort().map((topic) => h("option", { value: topic })),
+    );
     if (state !== "open") this.drop();
     else {
       const other = channels.get(this.topic);
-      setText(this.problem, !mayWrite ? t("This token is read-only: it drives nothing.")
-        : other && other.type !== TYPE ? t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: other.type, wanted: TYPE }) : "");
+      setText(
+        this.problem,
+        !mayWrite
+          ? t("This token is read-only: it drives nothing.")
+          : other && other.type !== TYPE
+            ? t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: other.type, wanted: TYPE })
+            : "",
+      );
     }
   }
 
@@ -100,7 +161,12 @@ export class Teleop {
   }
 
   remember() {
-    this.place.remember({ topic: this.topic, linear: this.forward.value, angular: this.turn.value, joy: this.joyTopic });
+    this.place.remember({
+      topic: this.topic,
+      linear: this.forward.value,
+      angular: this.turn.value,
+      joy: this.joyTopic,
+    });
   }
 
   // --- what is held
@@ -143,7 +209,10 @@ export class Teleop {
     if (this.stick) return this.stick;
     if (!this.keys.size) return pad;
     const sums = [0, 0];
-    for (const code of this.keys) KEYS[code].forEach((value, index) => { sums[index] += value; });
+    for (const code of this.keys)
+      KEYS[code].forEach((value, index) => {
+        sums[index] += value;
+      });
     return sums.map((value) => Math.max(-1, Math.min(1, value)));
   }
 
@@ -179,6 +248,7 @@ export class Teleop {
     else if (this.isDriving) this.release();
   }
 
+  /** @param {number[]} velocity */
   push([forward, left]) {
     this.isDriving = true;
     const linear = forward * (Number(this.forward.value) || 0);

@@ -7,8 +7,15 @@ import { isList } from "../ros1.js";
 import { t } from "../texts.js";
 
 // Measuring these costs the bandwidth of a camera: only when opened.
-const HEAVY = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud",
-  "nav_msgs/OccupancyGrid", "theora_image_transport/Packet", "stereo_msgs/DisparityImage"]);
+const HEAVY = new Set([
+  "sensor_msgs/Image",
+  "sensor_msgs/CompressedImage",
+  "sensor_msgs/PointCloud2",
+  "sensor_msgs/PointCloud",
+  "nav_msgs/OccupancyGrid",
+  "theora_image_transport/Packet",
+  "stereo_msgs/DisparityImage",
+]);
 const MAX_ITEMS = 100; // of one array that is opened
 const REFRESH_MS = 500;
 
@@ -19,10 +26,16 @@ export class Topics {
     this.rows = new Map();
     this.opened = new Set(words.getAll("open"));
     this.linked = words.get("open");
-    this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
-      this.showFiltered();
-      this.remember();
-    } });
+    this.filter = h("input", {
+      type: "search",
+      placeholder: "Filter topics and types",
+      "aria-label": "Filter",
+      value: words.get("filter") ?? "",
+      oninput: () => {
+        this.showFiltered();
+        this.remember();
+      },
+    });
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "tree", "aria-label": "Topics" });
     this.empty = h("p", { class: "empty" });
@@ -97,11 +110,19 @@ export class Topics {
     for (const row of this.rows.values()) {
       const text = `${row.channel.topic} ${row.channel.type}`.toLowerCase();
       row.element.hidden = !words.every((word) => text.includes(word));
-      count += !row.element.hidden;
+      if (!row.element.hidden) count += 1;
     }
     setText(this.count, t("{count} of {all} topics", { count, all: this.rows.size }));
-    setText(this.empty, this.rows.size ? (count ? "" : t("No topic fits the filter."))
-      : this.link.state === "open" ? t("Nothing is published yet. Start a node: its topics appear here.") : "");
+    setText(
+      this.empty,
+      this.rows.size
+        ? count
+          ? ""
+          : t("No topic fits the filter.")
+        : this.link.state === "open"
+          ? t("Nothing is published yet. Start a node: its topics appear here.")
+          : "",
+    );
   }
 
   refresh() {
@@ -121,8 +142,15 @@ class Row {
     this.bandwidth = h("span", { class: "num wide" });
     this.preview = h("span", { class: "preview" });
     this.fields = h("div", { class: "fields", role: "group", hidden: true });
-    this.button = h("button", { type: "button", class: "topic", "aria-expanded": "false", onclick: () => this.toggle() },
-      h("span", { class: "name" }, channel.topic), h("span", { class: "type" }, channel.type), this.hz, this.bandwidth, this.preview);
+    this.button = h(
+      "button",
+      { type: "button", class: "topic", "aria-expanded": "false", onclick: () => this.toggle() },
+      h("span", { class: "name" }, channel.topic),
+      h("span", { class: "type" }, channel.type),
+      this.hz,
+      this.bandwidth,
+      this.preview,
+    );
     this.element = h("div", { class: "row", role: "treeitem" }, this.button, this.fields);
     this.element.dataset.topic = channel.topic;
     this.tree = null;
@@ -134,8 +162,10 @@ class Row {
 
   subscribe() {
     this.end?.();
-    this.end = this.link.subscribe({ topic: this.channel.topic, mode: "latest", isCounted: HEAVY.has(this.channel.type) && !this.isOpen },
-      (item) => this.received(item));
+    this.end = this.link.subscribe(
+      { topic: this.channel.topic, mode: "latest", isCounted: HEAVY.has(this.channel.type) && !this.isOpen },
+      (item) => this.received(item),
+    );
   }
 
   toggle() {
@@ -162,7 +192,14 @@ class Row {
 
   refresh() {
     const rate = this.rate.at(performance.now() / 1000);
-    setText(this.hz, rate ? `${rate.hz < 10 ? rate.hz.toFixed(2) : rate.hz.toFixed(1)} Hz` : HEAVY.has(this.channel.type) && !this.end ? t("open to measure") : "–");
+    setText(
+      this.hz,
+      rate
+        ? `${rate.hz < 10 ? rate.hz.toFixed(2) : rate.hz.toFixed(1)} Hz`
+        : HEAVY.has(this.channel.type) && !this.end
+          ? t("open to measure")
+          : "–",
+    );
     setText(this.bandwidth, rate ? bandwidth(rate.bytes) : "");
     if (this.isStale && !this.isOpen) setText(this.preview, this.error ?? oneLine(this.message));
     if (this.isOpen) setText(this.preview, "");
@@ -203,7 +240,10 @@ export class Tree {
 
   show(message) {
     const isArray = isList(message);
-    const names = isArray ? Array.from({ length: Math.min(message.length, MAX_ITEMS) }, (_, index) => index) : Object.keys(message);
+    /** @type {(string | number)[]} */
+    const names = isArray
+      ? Array.from({ length: Math.min(message.length, MAX_ITEMS) }, (_, index) => index)
+      : Object.keys(message);
     const wanted = new Set(names);
     for (const [name, item] of this.items) {
       if (!wanted.has(name)) {
@@ -214,7 +254,10 @@ export class Tree {
     for (const name of names) {
       let item = this.items.get(name);
       if (!item) {
-        item = new Field(isArray ? `[${name}]` : String(name), isArray ? `${this.path}[${name}]` : `${this.path}/${name}`);
+        item = new Field(
+          isArray ? `[${name}]` : String(name),
+          isArray ? `${this.path}[${name}]` : `${this.path}/${name}`,
+        );
         this.items.set(name, item);
         this.element.append(item.element);
       }
@@ -227,8 +270,21 @@ class Field {
   constructor(label, path) {
     this.path = path;
     this.value = h("span", { class: "value" });
-    this.plot = h("a", { class: "plot", href: `#/plot?path=${encodeURIComponent(path)}`, title: t("Plot {path}", { path }), hidden: true }, t("plot"));
-    this.head = h("button", { type: "button", class: "field", disabled: true, onclick: () => this.toggle() }, h("span", { class: "key" }, label));
+    this.plot = h(
+      "a",
+      {
+        class: "plot",
+        href: `#/plot?path=${encodeURIComponent(path)}`,
+        title: t("Plot {path}", { path }),
+        hidden: true,
+      },
+      t("plot"),
+    );
+    this.head = h(
+      "button",
+      { type: "button", class: "field", disabled: true, onclick: () => this.toggle() },
+      h("span", { class: "key" }, label),
+    );
     this.element = h("li", { ondragstart: (event) => this.drag(event) }, this.head, this.value, this.plot);
     this.tree = null;
     this.isOpen = null;
@@ -247,7 +303,15 @@ class Field {
     this.isOpen ??= !isList(value);
     this.head.disabled = false;
     this.head.setAttribute("aria-expanded", String(this.isOpen));
-    setText(this.value, this.isOpen ? (!isList(value) ? "" : t("{count} values", { count: value.length }) + (value.length > MAX_ITEMS ? t(", the first {count} are shown", { count: MAX_ITEMS }) : "")) : shown(value));
+    setText(
+      this.value,
+      this.isOpen
+        ? !isList(value)
+          ? ""
+          : t("{count} values", { count: value.length }) +
+            (value.length > MAX_ITEMS ? t(", the first {count} are shown", { count: MAX_ITEMS }) : "")
+        : shown(value),
+    );
     if (this.isOpen) {
       if (!this.tree) {
         this.tree = new Tree(this.path);

@@ -1,7 +1,15 @@
 // The scene as a camera sees it, in and over its picture: in a corner of the view, large after a click.
 // Source: http://wiki.ros.org/rviz/DisplayTypes/Camera, sensor_msgs/CameraInfo.
 
-import { DataTexture, Group, PerspectiveCamera, Quaternion, RGBAFormat, UnsignedByteType, Vector3 } from "../../../vendor/three/three.min.js";
+import {
+  DataTexture,
+  Group,
+  PerspectiveCamera,
+  Quaternion,
+  RGBAFormat,
+  UnsignedByteType,
+  Vector3,
+} from "../../../vendor/three/three.min.js";
 import { h } from "../../dom.js";
 import { pixelsOf } from "../../pixels.js";
 import { t } from "../../texts.js";
@@ -17,14 +25,23 @@ export class Camera extends TopicDisplay {
     this.info = null;
     this.texture = null;
     this.picture = document.createElement("canvas");
-    this.canvas = h("canvas", { class: "inset", hidden: true, title: "click: larger or smaller", onclick: () => this.enlarge() });
+    this.canvas = h("canvas", {
+      class: "inset",
+      hidden: true,
+      title: "click: larger or smaller",
+      onclick: () => this.enlarge(),
+    });
     super.start();
     if (!this.topic) return;
     this.canvas.setAttribute("aria-label", this.topic);
     this.context.stage.addInset(this);
     const topic = infoTopicOf(this.topic);
     this.setStatus("Camera Info", 1, t("No CameraInfo received on [{topic}]. Topic may not exist.", { topic }));
-    this.ends.push(this.listen(topic, "latest", (info) => this.informed(info)), () => this.context.stage.removeInset(this), () => this.texture?.dispose());
+    this.ends.push(
+      this.listen(topic, "latest", (info) => this.informed(info)),
+      () => this.context.stage.removeInset(this),
+      () => this.texture?.dispose(),
+    );
   }
 
   changed(path) {
@@ -46,7 +63,8 @@ export class Camera extends TopicDisplay {
   received(message) {
     const { width, height, rgba } = pixelsOf(message);
     const most = this.context.stage.renderer.capabilities.maxTextureSize;
-    if (!width || !height || Math.max(width, height) > most) throw new Error(t("an image of {width} x {height} cannot be shown here", { width, height }));
+    if (!width || !height || Math.max(width, height) > most)
+      throw new Error(t("an image of {width} x {height} cannot be shown here", { width, height }));
     if (this.picture.width !== width || this.picture.height !== height) {
       Object.assign(this.picture, { width, height });
       this.texture?.dispose();

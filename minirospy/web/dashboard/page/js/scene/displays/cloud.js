@@ -1,6 +1,13 @@
 // Scans and clouds: points colored by intensity, axis, or their own colors; older ones stay for the decay time.
 
-import { colorsOf, pointsOfCloud, pointsOfOldCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../points.js";
+import {
+  colorsOf,
+  pointsOfCloud,
+  pointsOfOldCloud,
+  pointsOfScan,
+  suitableTransformer,
+  wantedChannels,
+} from "../points.js";
 import { points, solids } from "../shapes.js";
 import { t } from "../../texts.js";
 import { IDENTITY } from "../transforms.js";
@@ -42,20 +49,45 @@ export class Cloud extends TopicDisplay {
 
     const isPixels = settings.Style === "Points";
     const { size, grows } = isPixels ? { size: this.number("Size (Pixels)", 3) } : this.sizeOf();
-    const paint = { rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1) };
+    const paint = {
+      rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255],
+      alpha: this.number("Alpha", 1),
+    };
     // Boxes are 36 corners each: of very many a square is drawn.
-    const object = settings.Style === "Boxes" && found.count <= MAX_BOXES && !grows ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
-      : points(found.positions, colors, { ...paint, size, isMetres: !isPixels, grows, isRound: settings.Style === "Spheres" });
+    const object =
+      settings.Style === "Boxes" && found.count <= MAX_BOXES && !grows
+        ? solids(found.positions, colors, { ...paint, size: [size, size, size] })
+        : points(found.positions, colors, {
+            ...paint,
+            size,
+            isMetres: !isPixels,
+            grows,
+            isRound: settings.Style === "Spheres",
+          });
     const item = this.addAt(message.header, object);
     item.until = performance.now() + this.number("Decay Time") * 1000;
-    this.setStatus("Points", stride > 1 ? 1 : 0, stride > 1
-      ? t(this.context.stage.isSoftware ? "Showing {count} points of {all}: one of {stride}, for this software renderer" : "Showing {count} points of {all}: one of {stride}, for this browser", { count: found.count, all: total, stride })
-      : t("Showing {count} points from {all}", { count: found.count, all: message.ranges ? message.ranges.length : found.total }));
+    this.setStatus(
+      "Points",
+      stride > 1 ? 1 : 0,
+      stride > 1
+        ? t(
+            this.context.stage.isSoftware
+              ? "Showing {count} points of {all}: one of {stride}, for this software renderer"
+              : "Showing {count} points of {all}: one of {stride}, for this browser",
+            { count: found.count, all: total, stride },
+          )
+        : t("Showing {count} points from {all}", {
+            count: found.count,
+            all: message.ranges ? message.ranges.length : found.total,
+          }),
+    );
   }
 
   pointsOf(message, settings, stride) {
     if (message.ranges) return pointsOfScan(message);
-    return message.point_step === undefined ? pointsOfOldCloud(message) : pointsOfCloud(message, wantedChannels(settings), stride);
+    return message.point_step === undefined
+      ? pointsOfOldCloud(message)
+      : pointsOfCloud(message, wantedChannels(settings), stride);
   }
 
   namesOf(message) {
@@ -72,7 +104,8 @@ export class Cloud extends TopicDisplay {
     const names = this.namesOf(message);
     if (!this.get("Color Transformer")) this.settings["Color Transformer"] = suitableTransformer(names);
     const settings = { ...this.settings };
-    const isThere = !(message.ranges && !message.intensities.length) && wantedChannels(settings).some((name) => names.includes(name));
+    const isThere =
+      !(message.ranges && !message.intensities.length) && wantedChannels(settings).some((name) => names.includes(name));
     // What RViz shows in white: without the field that the colors come from.
     if (!isThere && settings["Color Transformer"] !== "AxisColor") settings["Color Transformer"] = "FlatColor";
     return settings;

@@ -18,19 +18,23 @@ export class DepthCloud extends Cloud {
     if (!this.topic) return;
     const topic = infoTopicOf(this.topic);
     this.setStatus("Camera Info", 1, t("No CameraInfo received on [{topic}]. Topic may not exist.", { topic }));
-    this.ends.push(this.listen(topic, "latest", (info) => {
-      this.info = info;
-      this.setStatus("Camera Info", 0, "OK");
-      if (!this.items.size) this.show();
-    }));
+    this.ends.push(
+      this.listen(topic, "latest", (info) => {
+        this.info = info;
+        this.setStatus("Camera Info", 0, "OK");
+        if (!this.items.size) this.show();
+      }),
+    );
     const colors = String(this.get("Color Image Topic") ?? "");
     this.isColored = colors !== "";
     if (!this.isColored) return;
     this.setStatus("Color Image", 1, t("No image received on [{topic}]", { topic: colors }));
-    this.ends.push(this.listen(colors.startsWith("/") ? colors : `/${colors}`, "latest", (image) => {
-      this.colors = { ...pixelsOf(image), seconds: secondsOf(image.header.stamp) };
-      if (!this.items.size || (this.seconds === this.colors.seconds && this.coloredAt !== this.seconds)) this.show();
-    }));
+    this.ends.push(
+      this.listen(colors.startsWith("/") ? colors : `/${colors}`, "latest", (image) => {
+        this.colors = { ...pixelsOf(image), seconds: secondsOf(image.header.stamp) };
+        if (!this.items.size || (this.seconds === this.colors.seconds && this.coloredAt !== this.seconds)) this.show();
+      }),
+    );
   }
 
   received(message) {
@@ -40,13 +44,22 @@ export class DepthCloud extends Cloud {
     this.show();
   }
 
-  /** Show the newest depths, once all is there: in the colors of the same moment where those come, else in the newest. */
+  /**
+   * Show the newest depths, once all is there: in the colors of the same moment where those come, else in the newest.
+   */
   show() {
     const { message, info, colors, isColored } = this;
     if (!message || !info || (isColored && !colors)) return;
     if (isColored) {
       if (colors.width !== message.width || colors.height !== message.height) {
-        this.setStatus("Color Image", 2, t("Depth image resolution ({depth}) does not match color image resolution ({color})", { depth: sizeOf(message), color: sizeOf(colors) }));
+        this.setStatus(
+          "Color Image",
+          2,
+          t("Depth image resolution ({depth}) does not match color image resolution ({color})", {
+            depth: sizeOf(message),
+            color: sizeOf(colors),
+          }),
+        );
         return;
       }
       this.setStatus("Color Image", 0, "OK");

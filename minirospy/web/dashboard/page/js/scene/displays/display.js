@@ -9,7 +9,10 @@ import { t } from "../../texts.js";
 
 export const LEVELS = ["ok", "warn", "error"];
 
-/** One display. The context: {link, stage, frames, fixedFrame, place(item), transformNow(frame), time(), statusChanged()}. */
+/**
+ * One display. The context: {link, stage, frames, fixedFrame, place(item), transformNow(frame), time(),
+ * statusChanged()}.
+ */
 export class Display {
   constructor(context, settings) {
     this.context = context;
@@ -113,6 +116,11 @@ export class TopicDisplay extends Display {
     return "latest";
   }
 
+  /** Show a message. */
+  received(_message) {
+    throw new TypeError(`${this.constructor.name} does not show messages`);
+  }
+
   start() {
     const { types, topicKey = "Topic" } = CLASSES[classOf(this.settings)];
     this.types = types;
@@ -123,11 +131,13 @@ export class TopicDisplay extends Display {
       this.setStatus("Topic", 1, t("No topic is set"));
       return;
     }
-    this.ends = [this.listen(this.topic, this.mode, (message) => {
-      this.count += 1;
-      this.received(message);
-      this.setStatus("Topic", 0, t("Messages received"));
-    })];
+    this.ends = [
+      this.listen(this.topic, this.mode, (message) => {
+        this.count += 1;
+        this.received(message);
+        this.setStatus("Topic", 0, t("Messages received"));
+      }),
+    ];
     this.setStatus("Topic", 1, t("No messages received"));
     this.ends.push(this.context.link.watch(["channels"], () => this.checkType()));
   }
@@ -155,7 +165,16 @@ export class TopicDisplay extends Display {
     const channel = this.context.link.channels.get(this.topic);
     this.type = channel?.type;
     this.isWrong = Boolean(channel) && !this.types.includes(channel.type);
-    if (this.isWrong) this.setStatus("Topic", 2, t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: channel.type, wanted: this.types[0] }));
+    if (this.isWrong)
+      this.setStatus(
+        "Topic",
+        2,
+        t("{topic} has the type {type}, not {wanted}", {
+          topic: this.topic,
+          type: channel.type,
+          wanted: this.types[0],
+        }),
+      );
     else if (!this.count) this.setStatus("Topic", 1, t("No messages received"));
   }
 

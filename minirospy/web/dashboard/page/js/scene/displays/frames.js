@@ -7,7 +7,10 @@ import { t } from "../../texts.js";
 import { Display } from "./display.js";
 
 const MAX_CELLS = 1000;
-const ARROW_COLORS = [[255, 26, 153], [204, 204, 77]];
+const ARROW_COLORS = [
+  [255, 26, 153],
+  [204, 204, 77],
+];
 
 /** Return a setting's frame: "" stands for the fixed one. */
 const reference = (display) => {
@@ -22,6 +25,11 @@ function someOf(texts, most, between) {
 }
 
 class Anchored extends Display {
+  /** Return the object to show. @returns {any} */
+  make() {
+    throw new TypeError(`${this.constructor.name} makes no object`);
+  }
+
   start() {
     this.item = this.add(this.make(), "", 0, true);
   }
@@ -45,7 +53,7 @@ export class Grid extends Anchored {
     const grid = hairlines(positions, this.color(), this.number("Alpha", 0.5));
     if (this.get("Plane") === "XZ") grid.rotation.x = Math.PI / 2;
     if (this.get("Plane") === "YZ") grid.rotation.y = Math.PI / 2;
-    grid.position.set(...["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
+    grid.position.fromArray(["X", "Y", "Z"].map((name) => this.number(`Offset/${name}`)));
     const group = new Group();
     group.add(grid);
     return group;
@@ -77,10 +85,14 @@ export class TF extends Display {
   }
 
   parts() {
-    return this.context.frames.names().map((name) => ({ name, isShown: this.isShown(name), set: (isShown) => {
-      this.settings.Frames ??= { "All Enabled": true };
-      this.settings.Frames[name] = { Value: isShown };
-    } }));
+    return this.context.frames.names().map((name) => ({
+      name,
+      isShown: this.isShown(name),
+      set: (isShown) => {
+        this.settings.Frames ??= { "All Enabled": true };
+        this.settings.Frames[name] = { Value: isShown };
+      },
+    }));
   }
 
   changed(path) {
@@ -107,8 +119,13 @@ export class TF extends Display {
 
   /** The arrow from a frame to its parent, of length 1. */
   makeArrow(scale) {
-    const shape = arrow(bodyMaterial(ARROW_COLORS[1]), { shaft: 1, shaftWidth: 0.01 * scale, head: 0, headWidth: 0.04 * scale });
-    shape.children[1].material = bodyMaterial(ARROW_COLORS[0]);
+    const shape = arrow(bodyMaterial(ARROW_COLORS[1]), {
+      shaft: 1,
+      shaftWidth: 0.01 * scale,
+      head: 0,
+      headWidth: 0.04 * scale,
+    });
+    /** @type {any} */ (shape.children[1]).material = bodyMaterial(ARROW_COLORS[0]);
     return shape;
   }
 
@@ -137,19 +154,40 @@ export class TF extends Display {
       label.isShown = isOn && isSeen && this.get("Show Names") !== false;
       label.place.copy(item.object.position);
       const parent = this.frames.get(frames.parent(name))?.item.object;
-      this.point(line.object, item.object.position, isSeen && parent?.visible && this.get("Show Arrows") !== false ? parent.position : null);
+      this.point(
+        line.object,
+        item.object.position,
+        isSeen && parent?.visible && this.get("Show Arrows") !== false ? parent.position : null,
+      );
     }
-    if (silent.length) this.setStatus("Timeout", 1, t("no transform for {time} s: {names}", { time: this.number("Frame Timeout", 15), names: someOf(silent, 5, ", ") }));
+    if (silent.length)
+      this.setStatus(
+        "Timeout",
+        1,
+        t("no transform for {time} s: {names}", {
+          time: this.number("Frame Timeout", 15),
+          names: someOf(silent, 5, ", "),
+        }),
+      );
     else this.clearStatus("Timeout");
     if (missing.length) this.setStatus("Transforms", 1, someOf(missing, 3, "; "));
     else if (names.size) this.setStatus("Transforms", 0, t("{count} frames", { count: names.size }));
   }
 
-  /** Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand still. */
+  /**
+   * Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand
+   * still.
+   */
   isSilent(name) {
     const edge = this.context.frames.edges.get(name);
     const timeout = this.number("Frame Timeout", 15) * 1000;
-    return Boolean(edge) && !edge.isStatic && timeout > 0 && this.context.link.time === null && performance.now() - edge.heard > timeout;
+    return (
+      Boolean(edge) &&
+      !edge.isStatic &&
+      timeout > 0 &&
+      this.context.link.time === null &&
+      performance.now() - edge.heard > timeout
+    );
   }
 
   point(shape, from, to) {

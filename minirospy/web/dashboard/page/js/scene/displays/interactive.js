@@ -1,4 +1,5 @@
-// Interactive markers of servers: shown with their handles and texts, moved by a person (grips.js), who is reported to the server.
+// Interactive markers of servers: shown with their handles and texts, moved by a person (grips.js), who is reported to
+// the server.
 
 import { Group, Matrix4, Quaternion, Vector3 } from "../../../vendor/three/three.min.js";
 import { complete, MAX_TEXT, rotationsOf, toMessage, VIEW_FACING } from "../handles.js";
@@ -13,7 +14,8 @@ import { makeMarker } from "./markers.js";
 export const [KEEP_ALIVE, POSE_UPDATE, MENU_SELECT, BUTTON_CLICK, MOUSE_DOWN, MOUSE_UP] = Array(6).keys();
 const TYPE = "visualization_msgs/InteractiveMarkerFeedback";
 const FEEDBACK = schema(
-  "Header header\nstring client_id\nstring marker_name\nstring control_name\nuint8 event_type\nPose pose\nuint32 menu_entry_id\nPoint mouse_point\nbool mouse_point_valid", "geometry_msgs/Pose");
+  "Header header\nstring client_id\nstring marker_name\nstring control_name\nuint8 event_type\nPose pose\nuint32 menu_entry_id\nPoint mouse_point\nbool mouse_point_valid",
+);
 const MOST = 1000; // interactive markers
 const MAX_STATUSES = 20; // of single markers
 const FETCH_MS = 1000; // between two requests for all markers
@@ -24,6 +26,9 @@ export class Shown {
   constructor(display) {
     this.display = display;
     this.object = new Group();
+    this.name = "";
+    this.description = "";
+    this.scale = 1; // metres
     this.controls = [];
     this.labels = []; // {label, control, anchor}
     this.held = null; // by a drag: {pose, header} that the server wants meanwhile
@@ -56,14 +61,23 @@ export class Shown {
   }
 
   write({ text, metres }) {
-    this.labels.push({ label: this.display.context.stage.labels.add({ text, kind: "marker", metres }), control: null, anchor: null });
+    this.labels.push({
+      label: this.display.context.stage.labels.add({ text, kind: "marker", metres }),
+      control: null,
+      anchor: null,
+    });
   }
 
   /** Return the pose of a shape in the marker, which may be given in a frame of its own. */
   inside({ header, pose }) {
     if (!header.frame_id) return pose;
-    const [outer, own] = [this.header.frame_id, header.frame_id].map((frame) => this.display.context.transformNow(frame));
-    if (!outer || !own) throw new Error(t("no transform from [{frame}] to [{other}]", { frame: header.frame_id, other: this.header.frame_id }));
+    const [outer, own] = [this.header.frame_id, header.frame_id].map((frame) =>
+      this.display.context.transformNow(frame),
+    );
+    if (!outer || !own)
+      throw new Error(
+        t("no transform from [{frame}] to [{other}]", { frame: header.frame_id, other: this.header.frame_id }),
+      );
     return toMessage(compose(invert(compose(outer, this.pose)), compose(own, fromMessage(pose))));
   }
 
@@ -79,7 +93,8 @@ export class Shown {
   /** The server moves the marker; while a person drags it, when that ends. */
   move({ pose, header }) {
     const found = fromMessage(pose);
-    if (![...found.p, ...found.q].every(Number.isFinite)) throw new Error(t("{name}: Pose contains invalid floats!", { name: this.name }));
+    if (![...found.p, ...found.q].every(Number.isFinite))
+      throw new Error(t("{name}: Pose contains invalid floats!", { name: this.name }));
     if (this.held) this.held = { pose: found, header };
     else {
       this.pose = found;
@@ -125,17 +140,20 @@ export class Shown {
     const { pose, display } = this;
     const view = this.controls.some(({ facing }) => facing === VIEW_FACING) ? this.viewed(camera) : null;
     this.axes.visible = display.get("Show Axes") === true;
-    for (const part of [this.axes, ...this.controls.map(({ group }) => group)]) part.position.set(...pose.p);
-    this.axes.quaternion.set(...pose.q);
+    for (const part of [this.axes, ...this.controls.map(({ group }) => group)]) part.position.fromArray(pose.p);
+    this.axes.quaternion.fromArray(pose.q);
     for (const control of this.controls) {
-      control.group.quaternion.set(...rotationsOf(control, pose.q, view).shapes);
+      control.group.quaternion.fromArray(rotationsOf(control, pose.q, view).shapes);
       control.group.visible = control.isAlways || display.context.isInteracting;
     }
     this.object.updateMatrixWorld(true);
     for (const { label, control, anchor } of this.labels) {
       label.isShown = this.isVisible && (control ? control.group.visible : display.get("Show Descriptions") !== false);
       if (anchor) label.place.setFromMatrixPosition(anchor.matrixWorld);
-      else label.place.set(...apply(this.outer, pose.p)).addScaledVector(new Vector3().setFromMatrixColumn(camera.matrixWorld, 1), 1.2 * this.scale);
+      else
+        label.place
+          .set(...apply(this.outer, pose.p))
+          .addScaledVector(new Vector3().setFromMatrixColumn(camera.matrixWorld, 1), 1.2 * this.scale);
     }
   }
 
@@ -166,12 +184,20 @@ export class InteractiveMarkers extends TopicDisplay {
     super.start();
     if (!this.topic) return;
     if (!this.topic.endsWith(SUFFIX)) {
-      this.setStatus("Topic", 2, t("Invalid topic name: {topic}: it does not end in {suffix}", { topic: this.topic, suffix: SUFFIX }));
+      this.setStatus(
+        "Topic",
+        2,
+        t("Invalid topic name: {topic}: it does not end in {suffix}", { topic: this.topic, suffix: SUFFIX }),
+      );
       return;
     }
     this.space = this.topic.slice(0, -SUFFIX.length);
     const { link } = this.context;
-    this.ends.push(() => this.endFetch?.(), link.watch(["state"], () => this.offer()), () => link.unpublish(`${this.space}/feedback`));
+    this.ends.push(
+      () => this.endFetch?.(),
+      link.watch(["state"], () => this.offer()),
+      () => link.unpublish(`${this.space}/feedback`),
+    );
     this.fetch();
   }
 
@@ -222,7 +248,9 @@ export class InteractiveMarkers extends TopicDisplay {
     for (const { server, isAll, markers, poses, erases } of changes) {
       const key = (name) => JSON.stringify([server, name]);
       const names = new Set(markers.map(({ name }) => key(name)));
-      if (isAll) for (const known of [...this.markers.keys()]) if (JSON.parse(known)[0] === server && !names.has(known)) this.drop(known);
+      if (isAll)
+        for (const known of [...this.markers.keys()])
+          if (JSON.parse(known)[0] === server && !names.has(known)) this.drop(known);
       for (const marker of markers) failed = this.show(key(marker.name), marker) ?? failed;
       for (const pose of poses) this.markers.get(key(pose.name))?.move(pose);
       for (const name of erases) this.drop(key(name));
@@ -238,7 +266,8 @@ export class InteractiveMarkers extends TopicDisplay {
     const shown = this.markers.get(key) ?? new Shown(this);
     const status = `Marker ${message.name.slice(0, MAX_TEXT)}`;
     try {
-      if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} interactive markers", { count: MOST }));
+      if (!this.markers.has(key) && this.markers.size >= MOST)
+        throw new Error(t("more than {count} interactive markers", { count: MOST }));
       shown.fill(message);
       this.markers.set(key, shown);
       this.clearStatus(status);
@@ -266,7 +295,8 @@ export class InteractiveMarkers extends TopicDisplay {
 
   /** Called before each picture. */
   face(camera) {
-    for (const shown of this.markers.values()) if (shown.isVisible) shown.face(camera);
+    for (const shown of this.markers.values())
+      if (shown.isVisible) shown.face(camera);
       else for (const { label } of shown.labels) label.isShown = false;
   }
 
@@ -274,7 +304,9 @@ export class InteractiveMarkers extends TopicDisplay {
 
   /** Return the groups of controls that can be under the mouse. */
   groups() {
-    return [...this.markers.values()].filter((shown) => shown.isVisible).flatMap(({ controls }) => controls.map(({ group }) => group).filter(({ visible }) => visible));
+    return [...this.markers.values()]
+      .filter((shown) => shown.isVisible)
+      .flatMap(({ controls }) => controls.map(({ group }) => group).filter(({ visible }) => visible));
   }
 
   /** Report an event to the server; `point` (in the fixed frame) is what is under the mouse. */
@@ -286,9 +318,20 @@ export class InteractiveMarkers extends TopicDisplay {
     const [x, y, z] = point === null ? [0, 0, 0] : isLocked ? apply(invert(outer), point) : point;
     try {
       await this.context.link.publish(`${this.space}/feedback`, TYPE, FEEDBACK, {
-        header: { seq: 0, stamp: isLocked ? { secs: 0, nsecs: 0 } : header.stamp, frame_id: isLocked ? header.frame_id : this.context.fixedFrame },
-        client_id: this.clientId, marker_name: name, control_name: event === MENU_SELECT ? "" : control.name, event_type: event, pose: toMessage(isLocked ? pose : compose(outer, pose)),
-        menu_entry_id: entry, mouse_point: { x, y, z }, mouse_point_valid: point !== null });
+        header: {
+          seq: 0,
+          stamp: isLocked ? { secs: 0, nsecs: 0 } : header.stamp,
+          frame_id: isLocked ? header.frame_id : this.context.fixedFrame,
+        },
+        client_id: this.clientId,
+        marker_name: name,
+        control_name: event === MENU_SELECT ? "" : control.name,
+        event_type: event,
+        pose: toMessage(isLocked ? pose : compose(outer, pose)),
+        menu_entry_id: entry,
+        mouse_point: { x, y, z },
+        mouse_point_valid: point !== null,
+      });
       this.clearStatus("Feedback");
     } catch (error) {
       this.setStatus("Feedback", 2, error.message);

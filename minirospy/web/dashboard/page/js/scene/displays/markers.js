@@ -2,13 +2,38 @@
 
 import { Group, Mesh, Vector3 } from "../../../vendor/three/three.min.js";
 import { loadMesh } from "../meshes.js";
-import { arrow, BALL, bodyMaterial, BOX, chain, directed, points as pointCloud, ROLL, segments, solids, triangles } from "../shapes.js";
+import {
+  arrow,
+  BALL,
+  bodyMaterial,
+  BOX,
+  chain,
+  directed,
+  points as pointCloud,
+  ROLL,
+  segments,
+  solids,
+  triangles,
+} from "../shapes.js";
 import { fromMessage, secondsOf } from "../transforms.js";
 import { t } from "../../texts.js";
 import { TopicDisplay } from "./display.js";
 
 const [ADD, DELETE, DELETE_ALL] = [0, 2, 3];
-const KINDS = ["Arrow", "Cube", "Sphere", "Cylinder", "Line Strip", "Line List", "Cube List", "Sphere List", "Points", "View Facing Text", "Mesh Resource", "Triangle List"];
+const KINDS = [
+  "Arrow",
+  "Cube",
+  "Sphere",
+  "Cylinder",
+  "Line Strip",
+  "Line List",
+  "Cube List",
+  "Sphere List",
+  "Points",
+  "View Facing Text",
+  "Mesh Resource",
+  "Triangle List",
+];
 const MOST = 10_000; // markers of a display
 const MAX_SPACES = 1000; // namespaces in the list of settings
 
@@ -29,7 +54,8 @@ export class Markers extends TopicDisplay {
     this.spaces = new Set();
     super.start();
     // Real RViz shows arrays with the suffix as well; a Marker display takes both types of topics.
-    if (this.topic && this.types.length === 1) this.ends.push(this.listen(`${this.topic}_array`, "all", (message) => this.received(message)));
+    if (this.topic && this.types.length === 1)
+      this.ends.push(this.listen(`${this.topic}_array`, "all", (message) => this.received(message)));
   }
 
   stop() {
@@ -66,7 +92,8 @@ export class Markers extends TopicDisplay {
       this.spaces.add(marker.ns);
       this.context.statusChanged();
     }
-    if (!this.markers.has(key) && this.markers.size >= MOST) throw new Error(t("more than {count} markers", { count: MOST }));
+    if (!this.markers.has(key) && this.markers.size >= MOST)
+      throw new Error(t("more than {count} markers", { count: MOST }));
 
     const made = makeMarker(marker, this);
     this.drop(key);
@@ -76,7 +103,12 @@ export class Markers extends TopicDisplay {
       item.follow = (matrix) => made.label.place.copy(made.offset).applyMatrix4(matrix);
       item.settled = -1;
     }
-    this.markers.set(key, { item, label: made.label, space: marker.ns, until: lifetime > 0 ? performance.now() + lifetime * 1000 : Infinity });
+    this.markers.set(key, {
+      item,
+      label: made.label,
+      space: marker.ns,
+      until: lifetime > 0 ? performance.now() + lifetime * 1000 : Infinity,
+    });
   }
 
   isShown(space) {
@@ -85,9 +117,13 @@ export class Markers extends TopicDisplay {
 
   /** Return the namespaces, for the list of settings. */
   parts() {
-    return [...this.spaces].sort().map((space) => ({ name: space || t("(no namespace)"), isShown: this.isShown(space), set: (isShown) => {
-      this.settings.Namespaces = { ...this.settings.Namespaces, [space]: isShown };
-    } }));
+    return [...this.spaces].sort().map((space) => ({
+      name: space || t("(no namespace)"),
+      isShown: this.isShown(space),
+      set: (isShown) => {
+        this.settings.Namespaces = { ...this.settings.Namespaces, [space]: isShown };
+      },
+    }));
   }
 
   changed(path) {
@@ -115,28 +151,37 @@ export class Markers extends TopicDisplay {
       if (label) label.isShown = item.object.visible;
     }
   }
-
 }
 
 /** Return {object, label, offset} of a marker; its frame's transform is applied around it. Throws Error. */
 export function makeMarker(marker, display) {
   const build = MAKERS[marker.type];
   if (!build) throw new Error(t("the marker type {type} is not known", { type: marker.type }));
-  const numbers = [...Object.values(marker.pose.position), ...Object.values(marker.pose.orientation), ...Object.values(marker.scale)];
-  if (!numbers.every(Number.isFinite)) throw new Error(t("Marker contained invalid floating point values (nans or infs)"));
+  const numbers = [
+    ...Object.values(marker.pose.position),
+    ...Object.values(marker.pose.orientation),
+    ...Object.values(marker.scale),
+  ];
+  if (!numbers.every(Number.isFinite))
+    throw new Error(t("Marker contained invalid floating point values (nans or infs)"));
   const group = new Group();
   const pose = fromMessage(marker.pose);
   const made = build(marker, display);
   group.userData.kind = KINDS[marker.type];
   if (made.text !== undefined) {
     const { r, g, b, a } = marker.color;
-    const label = display.context.stage.labels.add({ text: made.text, kind: "marker", metres: marker.scale.z, color: `rgb(${[r, g, b].map((part) => Math.round(part * 255)).join(" ")} / ${a})` });
+    const label = display.context.stage.labels.add({
+      text: made.text,
+      kind: "marker",
+      metres: marker.scale.z,
+      color: `rgb(${[r, g, b].map((part) => Math.round(part * 255)).join(" ")} / ${a})`,
+    });
     return { object: group, label, offset: new Vector3(...pose.p) };
   }
   const placed = new Group();
   placed.add(made);
-  placed.position.set(...pose.p);
-  placed.quaternion.set(...pose.q);
+  placed.position.fromArray(pose.p);
+  placed.quaternion.fromArray(pose.q);
   group.add(placed);
   return { object: group, label: null };
 }
@@ -151,7 +196,13 @@ function body(geometry) {
 
 function makeArrow({ points, scale, color }) {
   const material = bodyMaterial(rgbOf(color), color.a);
-  if (points.length === 0) return arrow(material, { shaft: scale.x * 0.77, shaftWidth: scale.y, head: scale.x * 0.23, headWidth: scale.y * 2 });
+  if (points.length === 0)
+    return arrow(material, {
+      shaft: scale.x * 0.77,
+      shaftWidth: scale.y,
+      head: scale.x * 0.23,
+      headWidth: scale.y * 2,
+    });
   if (points.length === 1) throw new Error(t("an arrow needs no points, or two"));
   const [from, to] = points.map(({ x, y, z }) => new Vector3(x, y, z));
   const length = from.distanceTo(to);
@@ -164,34 +215,55 @@ function makeLines(isStrip) {
   return ({ points, colors, scale, color }) => {
     if (!isStrip && points.length % 2) throw new Error(t("a line list needs an even number of points"));
     const positions = flat(points);
-    const own = colors.length === points.length && colors.length ? Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b])) : null;
-    return segments(isStrip ? chain(positions) : positions, { rgb: rgbOf(color), colors: own && isStrip ? chain(own) : own, alpha: own ? colors[0].a : color.a, metres: scale.x });
+    const own =
+      colors.length === points.length && colors.length
+        ? Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b]))
+        : null;
+    return segments(isStrip ? chain(positions) : positions, {
+      rgb: rgbOf(color),
+      colors: own && isStrip ? chain(own) : own,
+      alpha: own ? colors[0].a : color.a,
+      metres: scale.x,
+    });
   };
 }
 
 /** Return the colors of a marker's points as bytes, null where it has none for each. */
 const ownColors = ({ points, colors }) =>
-  (colors.length === points.length && colors.length ? Uint8Array.from(colors.flatMap(({ r, g, b }) => [r, g, b].map((part) => Math.min(Math.max(part, 0), 1) * 255))) : null);
+  colors.length === points.length && colors.length
+    ? Uint8Array.from(colors.flatMap(({ r, g, b }) => [r, g, b].map((part) => Math.min(Math.max(part, 0), 1) * 255)))
+    : null;
 
 function makeList(isRound) {
   return (marker) => {
     const { points, colors, scale, color } = marker;
     const own = ownColors(marker);
-    return solids(flat(points), own, { rgb: rgbOf(color), alpha: own ? colors[0].a : color.a, size: [scale.x, scale.y, scale.z], isRound });
+    return solids(flat(points), own, {
+      rgb: rgbOf(color),
+      alpha: own ? colors[0].a : color.a,
+      size: [scale.x, scale.y, scale.z],
+      isRound,
+    });
   };
 }
 
 function makePoints(marker) {
   const { points, colors, scale, color } = marker;
   const own = ownColors(marker);
-  return pointCloud(flat(points), own, { rgb: rgbOf(color), alpha: own ? colors[0].a : color.a, size: Math.max(scale.x, scale.y), isMetres: true });
+  return pointCloud(flat(points), own, {
+    rgb: rgbOf(color),
+    alpha: own ? colors[0].a : color.a,
+    size: Math.max(scale.x, scale.y),
+    isMetres: true,
+  });
 }
 
 function makeTriangles({ points, colors, scale, color }) {
   if (!points.length || points.length % 3) throw new Error(t("a triangle list needs three points for each triangle"));
   let own = null;
   if (colors.length === points.length) own = Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b]));
-  else if (colors.length === points.length / 3) own = Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b, r, g, b, r, g, b]));
+  else if (colors.length === points.length / 3)
+    own = Float32Array.from(colors.flatMap(({ r, g, b }) => [r, g, b, r, g, b, r, g, b]));
   const mesh = triangles(flat(points), own, rgbOf(color), own ? colors[0].a : color.a);
   mesh.scale.set(scale.x, scale.y, scale.z);
   return mesh;
@@ -201,13 +273,27 @@ function makeMesh({ mesh_resource: uri, mesh_use_embedded_materials: isOwn, scal
   const holder = new Group();
   holder.scale.set(scale.x, scale.y, scale.z);
   const usesOwn = isOwn && color.r + color.g + color.b + color.a === 0;
-  loadMesh(display.context.link, uri, usesOwn ? null : { rgb: rgbOf(color), alpha: color.a }).then((mesh) => {
-    holder.add(mesh);
-    display.context.stage.invalidate();
-  }, (error) => display.setStatus("Message", 2, error.message));
+  loadMesh(display.context.link, uri, usesOwn ? null : { rgb: rgbOf(color), alpha: color.a }).then(
+    (mesh) => {
+      holder.add(mesh);
+      display.context.stage.invalidate();
+    },
+    (error) => display.setStatus("Message", 2, error.message),
+  );
   return holder;
 }
 
 const MAKERS = [
-  makeArrow, body(BOX), body(BALL), body(ROLL), makeLines(true), makeLines(false), makeList(false), makeList(true), makePoints,
-  ({ text }) => ({ text }), makeMesh, makeTriangles];
+  makeArrow,
+  body(BOX),
+  body(BALL),
+  body(ROLL),
+  makeLines(true),
+  makeLines(false),
+  makeList(false),
+  makeList(true),
+  makePoints,
+  ({ text }) => ({ text }),
+  makeMesh,
+  makeTriangles,
+];

@@ -1,4 +1,5 @@
-// The robot: the links of its description at the frames of TF; where TF has none of them, by the positions of its joints.
+// The robot: the links of its description at the frames of TF; where TF has none of them, by the positions of its
+// joints.
 
 import { Group, Mesh } from "../../../vendor/three/three.min.js";
 import { loadMesh } from "../meshes.js";
@@ -18,7 +19,10 @@ export class RobotModel extends Display {
     this.positions = new Map();
     this.ends = [this.context.link.watch(["parameters", "state"], () => this.read())];
     const topic = String(this.get("Joint States") ?? "");
-    if (topic) this.ends.push(this.context.link.subscribe({ topic, mode: "latest" }, ({ message }) => message && this.moved(message)));
+    if (topic)
+      this.ends.push(
+        this.context.link.subscribe({ topic, mode: "latest" }, ({ message }) => message && this.moved(message)),
+      );
   }
 
   stop() {
@@ -58,7 +62,8 @@ export class RobotModel extends Display {
     this.poses = null;
     this.isLoading = 0;
     this.failed = [];
-    for (const link of this.robot.links.values()) this.links.set(link.name, this.add(this.build(link), this.frameOf(link.name), 0, true));
+    for (const link of this.robot.links.values())
+      this.links.set(link.name, this.add(this.build(link), this.frameOf(link.name), 0, true));
     this.context.received(this);
   }
 
@@ -69,11 +74,14 @@ export class RobotModel extends Display {
 
   build({ visuals, collisions }) {
     const group = new Group();
-    const shown = [...(this.get("Visual Enabled") === false ? [] : visuals), ...(this.get("Collision Enabled") === true ? collisions : [])];
+    const shown = [
+      ...(this.get("Visual Enabled") === false ? [] : visuals),
+      ...(this.get("Collision Enabled") === true ? collisions : []),
+    ];
     for (const { origin, geometry, color } of shown) {
       const holder = new Group();
-      holder.position.set(...origin.p);
-      holder.quaternion.set(...origin.q);
+      holder.position.fromArray(origin.p);
+      holder.quaternion.fromArray(origin.q);
       this.fill(holder, geometry, color);
       group.add(holder);
     }
@@ -85,20 +93,25 @@ export class RobotModel extends Display {
     const alpha = a * this.number("Alpha", 1);
     if (geometry.kind === "mesh") {
       this.isLoading += 1;
-      loadMesh(this.context.link, geometry.uri, { rgb: [r, g, b], alpha, isForced: Boolean(color) }).then((mesh) => {
-        mesh.scale.multiply({ x: geometry.scale[0], y: geometry.scale[1], z: geometry.scale[2] });
-        holder.add(mesh);
-      }, (error) => this.failed.push(error.message)).finally(() => {
-        this.isLoading -= 1;
-        this.context.stage.invalidate();
-        if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
-        else if (!this.isLoading) this.clearStatus("Meshes");
-      });
+      loadMesh(this.context.link, geometry.uri, { rgb: [r, g, b], alpha, isForced: Boolean(color) })
+        .then(
+          (mesh) => {
+            mesh.scale.multiply({ x: geometry.scale[0], y: geometry.scale[1], z: geometry.scale[2] });
+            holder.add(mesh);
+          },
+          (error) => this.failed.push(error.message),
+        )
+        .finally(() => {
+          this.isLoading -= 1;
+          this.context.stage.invalidate();
+          if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
+          else if (!this.isLoading) this.clearStatus("Meshes");
+        });
       return;
     }
     const material = bodyMaterial([r, g, b], alpha);
     const shape = new Mesh({ box: BOX, sphere: BALL, cylinder: ROLL }[geometry.kind], material);
-    if (geometry.kind === "box") shape.scale.set(...geometry.size);
+    if (geometry.kind === "box") shape.scale.fromArray(geometry.size);
     else if (geometry.kind === "sphere") shape.scale.setScalar(geometry.radius * 2);
     else shape.scale.set(geometry.radius * 2, geometry.radius * 2, geometry.length);
     holder.add(shape);
@@ -119,7 +132,12 @@ export class RobotModel extends Display {
     }
     if (missing.length) {
       const [[frame, error]] = missing;
-      this.setStatus("Transform", 2, missingText(frame, fixedFrame, error) + (missing.length > 1 ? t("; and {count} more links", { count: missing.length - 1 }) : ""));
+      this.setStatus(
+        "Transform",
+        2,
+        missingText(frame, fixedFrame, error) +
+          (missing.length > 1 ? t("; and {count} more links", { count: missing.length - 1 }) : ""),
+      );
     } else this.setStatus("Transform", 0, t("Transform OK"));
   }
 
@@ -130,7 +148,9 @@ export class RobotModel extends Display {
     const { frames, fixedFrame } = this.context;
     const root = this.frameOf(this.robot.root);
     // Without any tf data at all the robot is at the origin.
-    const base = this.context.transformNow(root) ?? (frames.known.size && fixedFrame !== root ? null : { p: [0, 0, 0], q: [0, 0, 0, 1] });
+    const base =
+      this.context.transformNow(root) ??
+      (frames.known.size && fixedFrame !== root ? null : { p: [0, 0, 0], q: [0, 0, 0, 1] });
     if (!base || !this.poses.has(name)) return false;
     this.context.put(item, compose(base, this.poses.get(name)));
     return true;

@@ -1,0 +1,3 @@
+// Types for tools/check_page.py.
+export const Graph: any;
+export const layout: any;
