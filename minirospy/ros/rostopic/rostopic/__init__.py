@@ -255,7 +255,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# Of ROS's private functions those that programs call.
+# Private functions of ROS that programs call.
 
 _rostopic_cmd_bw = _rostopic_cmd_delay = _rostopic_cmd_echo = _rostopic_cmd_find = _rostopic_cmd_hz = (
     rostopicmain
