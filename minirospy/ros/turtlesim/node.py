@@ -173,7 +173,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The same name in another form: /turtle1.
+                # The new name may be another form of an existing one: /turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 

@@ -68,13 +68,13 @@ class Reading(NamedTuple):
     pose: Pose
     linear: float  # metres per second
     angular: float  # radians per second
-    color: Color  # the colour of the canvas under the turtle, before it drew
+    color: Color  # colour of the canvas under the turtle, before the turtle drew on it
     warning: str  # log line about a wall that the turtle hit, or ""
 
 
 class _Teleport(NamedTuple):
     is_relative: bool
-    x: float  # or the distance forward
+    x: float  # the x coordinate; for a relative teleport, the distance forward
     y: float
     theta: float
 

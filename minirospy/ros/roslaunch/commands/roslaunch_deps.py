@@ -1,4 +1,4 @@
-"""`roslaunch-deps`: the packages that launch files need.
+"""`roslaunch-deps`: print the packages that launch files need.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """

@@ -14,7 +14,7 @@ __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """Return the spec of the files, and every error: in the files, missing programs, undeclared machines."""
+    """Return the spec of the files, and all problems: errors in the files, missing programs, undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():

@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An element with its substitutions made: returns its attributes as values, and errors with its line number."""
+    """An XML element with its substitutions made: returns its attributes as values, and errors with its line number."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element

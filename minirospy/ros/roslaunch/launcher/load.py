@@ -142,7 +142,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 class _File:
-    """Reads one file into the shared spec. ``problems`` collects the errors; None raises them."""
+    """Reads one file into the shared spec. ``problems``: list to which errors are appended; None: raise them."""
 
     def __init__(
         self,

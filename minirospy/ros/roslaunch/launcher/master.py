@@ -1,4 +1,4 @@
-"""The master of a launch: found or started, with /run_id and the parameters of the launch file."""
+"""Finds or starts the master of a launch, and sets /run_id and the parameters of the launch file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 __all__ = ["CORE_PARAMETERS", "LaunchMaster"]
 
 CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_VERSION}
-"""Set at each launch, as in ROS."""
+"""Parameters that every launch sets, as in ROS."""
 
 _START_SECONDS = 60.0
 
@@ -61,9 +61,9 @@ class LaunchMaster:
         self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
-        """Start a master on this machine. Raise MasterUnreachableError if its URI belongs to another one, MinirospyError."""
+        """Start a master on this machine. Raise MasterUnreachableError if its URI is another machine's, MinirospyError."""
         if not self._environment.master_is_local:
-            # Called for its error, which says why: an unknown host name, a suspended master.
+            # Called for its error, which gives the reason: an unknown host name, a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -122,7 +122,7 @@ class LaunchMaster:
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Run the <rosparam> commands, delete what clear_params names, then set the parameters. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):
                 self._proxy.delete_param(namespace)

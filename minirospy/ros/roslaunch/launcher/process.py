@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process; ``node`` is None for the master. ``starts`` counts its starts."""
+    """A started process; ``node`` is None for the master. ``starts``: how often it was started."""
 
     name: str
     command: Sequence[str]

@@ -49,7 +49,7 @@ Method = Callable[..., object]
 
 
 class Api:
-    """XML-RPC methods served in a thread: ``{name: function}``, run in workers; answers are wrapped as ROS does."""
+    """XML-RPC methods served in a thread: ``{name: function}``, run in workers; return values are wrapped as in ROS."""
 
     def __init__(self, environment: Environment, methods: Mapping[str, Method]) -> None:
         self._methods = dict(methods)
@@ -103,7 +103,7 @@ class _Child:
     has_registered: threading.Event = field(default_factory=threading.Event)
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
-    """Exited processes, which may be reported before the answer of ``launch`` says that they started."""
+    """Exited processes; a process may exit before ``launch`` has returned that it started."""
 
 
 class RemoteMachines:

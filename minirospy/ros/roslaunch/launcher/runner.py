@@ -141,7 +141,7 @@ class Launcher:
             self.start_node(node)
 
     def set_parameters(self) -> None:
-        """Run the <rosparam> commands, delete what clear_params names, then set the parameters. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
         self._master.set_parameters(self._spec)
 
     def process_name(self, node: NodeSpec) -> str:

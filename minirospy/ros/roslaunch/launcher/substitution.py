@@ -115,7 +115,7 @@ class Substitution:
         return self.environ.get(name, " ".join(default))
 
     def _optenv_value(self, name: str, default: object = "") -> object:
-        """Return the variable as a string for ``optenv()`` in an expression; else the default, which may be a number."""
+        """Return the value of ``optenv()`` in an expression: the variable, else the default, which may be a number."""
         return self.environ.get(name, default)
 
     def _anon(self, name: str) -> str:

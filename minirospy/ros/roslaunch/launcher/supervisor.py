@@ -89,7 +89,7 @@ class Supervisor:
         self._restarts: list[tuple[float, Process]] = []
 
         self.on_change: Callable[[], object] = lambda: None
-        """Called from any thread after a process has started, has exited, or is asked to exit."""
+        """Called from any thread after a process has started, has exited, or is requested to exit."""
         self.processes: list[Process] = []
         """The started nodes that are watched, including those that wait for a restart."""
         self.master: Process | None = None
@@ -162,7 +162,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Wait. Raise KeyboardInterrupt if stop() is called meanwhile."""
+        """Wait. Raise KeyboardInterrupt if stop() is called in the meantime."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:

@@ -198,7 +198,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return the function with which the program has replaced one in roslaunch's modules, else the original.
+    """Return the program's replacement for a function in roslaunch's modules, else the original.
 
     Programs disable roslaunch's signal handlers in this way (``roslaunch.pmon._init_signal_handlers = ...``).
     """

@@ -33,7 +33,7 @@ _VALID = ["find", "env", "optenv", "dirname", "anon", "arg"]
 _MODULE = "roslaunch.substitution_args"
 
 _rospack: RosPack | None = None
-"""Where packages are searched. Programs set it in ``_MODULE``, the module that they import."""
+"""Finds the packages of ``$(find ...)``. Programs set it in ``_MODULE``, the module that they import."""
 
 
 class SubstitutionException(Exception):

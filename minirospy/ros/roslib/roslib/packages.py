@@ -139,7 +139,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # A link to a parent folder.
+            # A link to a parent folder would never end.
             folders.clear()
             continue
         seen.add(real)

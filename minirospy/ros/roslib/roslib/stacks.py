@@ -100,7 +100,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search; None for those of this process."""
+    """Return the folders to search; None: use this process's."""
     return None if env is None else _folders(env)
 
 

@@ -1,4 +1,4 @@
-"""`roscore` and `minirospy master`: the master in the foreground, with the /rosout node.
+"""`roscore` and `minirospy master`: run the master in the foreground, with the /rosout node.
 
 Source: http://wiki.ros.org/roscore.
 """
@@ -189,7 +189,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Perhaps a variable that is not set: it must not open the master to every address.
+        # An empty value may come from an unset variable; it must not open the master to every address.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -327,7 +327,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master; for a rosmaster, the values of its API."""
+    """Print one line about the running master; for ROS's rosmaster, from the answers of its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")

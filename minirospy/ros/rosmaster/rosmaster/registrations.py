@@ -139,12 +139,12 @@ class NodeRef:
         return not any(map(self._names, range(1, 5)))
 
     def add(self, type_: int, key: str) -> None:
-        """Add a name to a table of Registrations' types. Raise InternalException for another type."""
+        """Add a name to the table ``type_``. Raise InternalException if there is no such table."""
         if key not in (names := self._names(type_)):
             names.append(key)
 
     def remove(self, type_: int, key: str) -> None:
-        """Remove a name from a table. Raise InternalException."""
+        """Remove a name from the table ``type_``. Raise InternalException if there is no such table."""
         if key in (names := self._names(type_)):
             names.remove(key)
 
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Request a node to shut down; if it does not answer, it has already exited."""
+    """Request a node to shut down; ignore a node that does not answer, as it has exited."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")

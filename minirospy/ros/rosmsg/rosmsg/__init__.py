@@ -87,7 +87,7 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the full names of the types with this name, which has no package."""
+    """Yield the full names of the types whose name without package is ``base_type``."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 

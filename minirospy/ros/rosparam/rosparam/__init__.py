@@ -222,7 +222,7 @@ def _fullusage() -> NoReturn:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return the global name of a parameter. An empty one would be the namespace, and so all parameters in it.
+    """Return the global name of a parameter. An empty name would mean the namespace, and so all parameters in it.
 
     A value that is not a string raises the same error as in ROS, which sends it to the master: TypeError if XML-RPC has
     no such type.

@@ -137,12 +137,12 @@ class ManifestManager:
             if each not in found:
                 found[each] = None
                 self._visit(each, found)
-                # Move it behind its dependencies.
+                # Move the package behind its dependencies.
                 found[each] = found.pop(each)
 
 
 class RosPack(ManifestManager):
-    """Packages."""
+    """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
         """Return a package's dependencies that are not packages; with ``implicit``, also those of its dependencies.
@@ -162,7 +162,7 @@ class RosPack(ManifestManager):
 
 
 class RosStack(ManifestManager):
-    """Metapackages."""
+    """Finds metapackages."""
 
     def packages_of(self, stack: str) -> Names:
         """Return the packages in a metapackage. Raise ResourceNotFound, InvalidManifest."""

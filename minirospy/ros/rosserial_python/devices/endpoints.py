@@ -89,7 +89,7 @@ class Subscriber:
 
 
 class _Service:
-    """A service's classes, and the id of the topic that the device receives its part of a call on. Raise EndpointError."""
+    """A service's classes, and the id of the topic on which the device receives its part of a call. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name

@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun; its old name."""
+    """Call rosrun. This is its old name."""
     rosrun(package, test_name, test, sysargs)
 
 
@@ -53,7 +53,7 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Call rosunit.unitrun; its old name."""
+    """Call rosunit.unitrun. This is its old name."""
     warnings.warn("rostest.unitrun is called rosunit.unitrun now", DeprecationWarning, stacklevel=2)
     unit.unitrun(package, test_name, test, sysargs, coverage_packages)
 

@@ -36,7 +36,7 @@ _CLASS = "rostest.runner.RosTest"
 
 @dataclass
 class RosTest:
-    """A launch file's tests. ``own``: the results of the runs themselves; ``results``: the results that the tests wrote.
+    """A launch file's tests. ``own``: whether each test could run; ``results``: the cases that the tests reported.
 
     ``text``: print everything and write no XML files. ``reuse_master``: use the running master instead of starting one;
     ``clear`` deletes all of its parameters. ``results_dir``: folder for the XML files.

@@ -229,7 +229,7 @@ class _Recorder(unittest.TestResult):
 
 
 def _case_of(test: unittest.TestCase) -> TestCaseResult:
-    # ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``.
+    # For example ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``.
     name, _, place = test.id().partition(" (")
     where, _, last = name.rpartition(".")
     case = TestCaseResult(last)

@@ -99,7 +99,7 @@ def _pub_parser() -> Parser:
     )
     add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
 
-    # The name of -s before Noetic.
+    # Before Noetic, the option -s was called -K.
     parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
     return parser
 

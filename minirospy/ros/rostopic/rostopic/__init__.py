@@ -82,7 +82,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return :func:`get_topic_type` with the message class as type. Raise ROSTopicException if it is not installed."""
+    """Return get_topic_type()'s result, with the message class as type. Raise ROSTopicException if it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -120,7 +120,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # A field name that cannot exist.
+        # Treat it as a field name, which no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def value(message: Message) -> object:

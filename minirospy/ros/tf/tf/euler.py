@@ -125,7 +125,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
 
 
 def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
-    """Return the rows of a quaternion's 3x3 matrix, whatever its length; for the zero quaternion, those of the identity."""
+    """Return the rows of the 3x3 matrix of a quaternion of any length; for the zero quaternion, the identity's."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
     if square < EPSILON:

@@ -182,7 +182,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return a uniformly distributed random rotation; ``rand``: three numbers from 0 to 1 to use instead of random ones."""
+    """Return a uniformly distributed random rotation; ``rand``: three numbers from 0 to 1 to compute it from."""
     import numpy
 
     numbers = numpy.random.rand(3) if rand is None else numpy.asarray(rand)

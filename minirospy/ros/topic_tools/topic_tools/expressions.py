@@ -153,7 +153,7 @@ def _compiled(expression: str) -> CodeType:
 
 
 def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
-    """Return the fields with their strings evaluated; a string that is not a valid expression stays."""
+    """Return the fields with their strings evaluated; keep a string that is not a valid expression."""
     found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):

@@ -21,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""The only behaviour since ROS Melodic."""
+"""Options that choose the only behaviour since ROS Melodic."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

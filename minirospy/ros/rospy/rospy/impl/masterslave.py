@@ -35,7 +35,7 @@ class ROSHandler(XmlRpcHandler):
 
     @classmethod
     def remappings(cls, methodName: str) -> list[int]:
-        """Return the positions of the arguments of a method that are names."""
+        """Return the positions of a method's arguments that are names."""
         return cls._remap_table.get(methodName, [])
 
     def getName(self, *args: object) -> Answer:

@@ -193,7 +193,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Child elements that occur any number of times, as a list in the object's attribute ``name`` + s."""
+    """Child elements that occur any number of times, stored as a list in the attribute that is called ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
