@@ -1,7 +1,7 @@
-"""The /rosout node: gathers the log lines of all nodes, republishes them on /rosout_agg and keeps them in a file.
+"""The /rosout node: collects the log messages of all nodes, republishes them on /rosout_agg and writes them to a file.
 
-As every node of ROS it lists its loggers and sets their levels: here those of the master, its process. Source:
-http://wiki.ros.org/rosout.
+Like every ROS node, it lists its loggers and sets their levels: here those of the master, which runs in the same process.
+Source: http://wiki.ros.org/rosout.
 """
 
 from __future__ import annotations
@@ -41,25 +41,24 @@ _log = logging.getLogger(__name__)
 _LOG_BYTES = 100 * 1024 * 1024
 
 _MAX_BYTES = 256 * 1024
-"""Longer messages are left out: a node that floods the topic must not fill the memory of the master's process."""
+"""Bytes; longer messages are dropped, so that no node can fill the memory of the master's process."""
 
 _MAX_SUBSCRIBERS = 200
-"""Of /rosout_agg: each may keep a message of that size waiting."""
+"""Maximum number of subscribers to /rosout_agg, as each may have a message of maximum size queued."""
 
 _LARGE, _MAX_LARGE = 16 * 1024, 100
-"""A subscriber that keeps so many messages waiting gets none that are larger than this, until it has read some."""
+"""Bytes, messages: a subscriber with this many queued messages receives no larger ones until it has read some."""
 
-_STEP_LETTERS = 1024
-"""Of a text that is written to the file: to escape one of them may take a microsecond."""
+_STEP_LETTERS = 1024  # characters of text that are written per step; escaping one may take a microsecond
 
 
 class RosoutNode:
-    """Runs on the loop that starts it; a message is republished as it came, bytes for bytes."""
+    """Runs on the loop that starts it; republishes each message with unchanged bytes."""
 
     def __init__(
         self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
     ) -> None:
-        """``omits_topics``: whether lines in the file leave out which topics the node publishes."""
+        """Create the node; ``omits_topics`` returns whether lines in the file omit the topics that the node publishes."""
         self.node = Node("/rosout", environment)
         self._log_file = log_file
         self._omits_topics = omits_topics
@@ -70,7 +69,7 @@ class RosoutNode:
         self._limited_log = RateLimitedLogger(_log)
 
     async def start(self) -> None:
-        """Join the graph. Raise OSError, MasterUnreachableError."""
+        """Register with the master. Raise OSError, MasterUnreachableError."""
         prefer_ros1()
         from rosgraph_msgs.msg import Log
 
@@ -96,9 +95,9 @@ class RosoutNode:
         await self._serve_loggers()
 
     async def close(self) -> None:
-        """Leave the graph. Idempotent."""
+        """Unregister from the master. Idempotent."""
         await self.node.close()
-        # What is being read ends with its connection.
+        # A read in progress ends when its connection is closed.
         while self._turns:
             await asyncio.sleep(0)
         self._limited_log.close()
@@ -148,7 +147,7 @@ class RosoutNode:
         for link in self._aggregated.links:
             if len(whole) <= _LARGE or link.waiting < _MAX_LARGE:
                 link.send(whole)
-            # There may be many, and a large message takes its time.
+            # Yield to the loop: there may be many messages, and a large one takes time.
             yield None
         if self._file:
             yield from self._write(self._file, body)
@@ -175,7 +174,7 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # A text may have several lines, as in the real file; nothing else may.
+        # A message may have several lines, as in the real file; the other fields may not.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
             for at in range(0, len(text), _STEP_LETTERS):
                 parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
@@ -191,7 +190,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Return the name of a Python logger here: ``ros`` and what is below it, as in the nodes of roscpp."""
+    """Return the ROS name of a Python logger: ``ros`` and its children, as in roscpp nodes."""
     return "ros" + name.removeprefix("minirospy")
 
 

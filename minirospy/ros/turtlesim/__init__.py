@@ -1,6 +1,9 @@
-"""Turtlesim: the window of turtles in pure Python, and its tutorials' programs. Source: http://wiki.ros.org/turtlesim."""
+"""Turtlesim in pure Python: the window with the turtles, and the programs of its tutorials.
+
+Source: http://wiki.ros.org/turtlesim.
+"""
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
+# The modules below import messages of ROS 1; if ROS 2 is sourced, its packages of the same names would come first.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""The paper under the turtles: strokes of pens -> pixels, and the colour of a pixel. Pure."""
+"""The canvas under the turtles: draws pen strokes, and returns the colour of a pixel. Pure."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = ["PIXELS", "Canvas", "Color"]
 
-PIXELS = 500
-"""Width and height of the paper."""
+PIXELS = 500  # width and height of the canvas
 
 
 class Color(NamedTuple):
@@ -23,20 +22,19 @@ class Color(NamedTuple):
 
 
 class Canvas:
-    """Pixels, of which (x, y) has its centre at that point; y grows downwards."""
+    """The pixels; (x, y) is the centre of a pixel, y grows downwards."""
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
-        """Colours by row and column."""
+        """The colours by row and column."""
         self.marks: NDArray[np.bool_] = np.empty((PIXELS, PIXELS), np.bool_)
-        """Where a pen has drawn, by row and column."""
+        """Whether a pen has drawn on a pixel, by row and column."""
         self.background = background
-        self.version = 0
-        """Grows with each change."""
+        self.version = 0  # incremented on each change
         self.fill(background)
 
     def fill(self, background: Color) -> None:
-        """Wipe everything out."""
+        """Fill the canvas, removing all lines."""
         self.background = background
         self.pixels[:] = background
         self.marks[:] = False
@@ -45,7 +43,7 @@ class Canvas:
     def stroke(
         self, start: tuple[float, float], end: tuple[float, float], color: Color, width: float
     ) -> None:
-        """Draw a straight line with square ends, half of ``width`` beyond its points; what is outside is cut off."""
+        """Draw a straight line with square ends that extend ``width`` / 2 beyond its points; clip it to the canvas."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)
@@ -67,14 +65,14 @@ class Canvas:
         self.version += 1
 
     def color_at(self, x: float, y: float) -> Color:
-        """Return the colour of the pixel that is nearest to a point of the paper."""
+        """Return the colour of the pixel that is nearest to a point."""
         column, row = (min(max(math.floor(value + 0.5), 0), PIXELS - 1) for value in (x, y))
         r, g, b = (int(value) for value in self.pixels[row, column])
         return Color(r, g, b)
 
 
 def _range(first: float, last: float) -> range:
-    """Return the pixels from ``first`` to ``last`` that are on the paper."""
+    """Return the pixels from ``first`` to ``last`` that are on the canvas."""
     return range(
         max(math.ceil(max(first, -1.0)), 0), min(math.floor(min(last, PIXELS + 1.0)), PIXELS - 1) + 1
     )

@@ -1,4 +1,7 @@
-"""draw_square: `turtle1/pose` -> `turtle1/cmd_vel`, so that turtle1 draws a square. Source: http://wiki.ros.org/turtlesim."""
+"""draw_square: reads `turtle1/pose` and publishes `turtle1/cmd_vel`, so that turtle1 draws a square.
+
+Source: http://wiki.ros.org/turtlesim.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Reset the turtles' world, where there is one, and draw until the node is shut down; return the exit status."""
+    """Reset turtlesim if it runs, and draw until the node is shut down; return the exit status."""
     rospy.init_node("draw_square")
     drawing = _Drawing()
     with contextlib.suppress(rospy.ServiceException):
@@ -28,7 +31,7 @@ def main() -> int:
 
 
 class _Drawing:
-    """The newest pose, and what to do at it."""
+    """The latest pose, and the next command."""
 
     def __init__(self) -> None:
         self._pose: PoseMessage | None = None
@@ -52,5 +55,5 @@ class _Drawing:
             twist = Twist()
             twist.linear.x, twist.angular.z = order
             with contextlib.suppress(rospy.ROSException):
-                # Raised where the node is being shut down.
+                # Raises if the node is shutting down.
                 self._publisher.publish(twist)

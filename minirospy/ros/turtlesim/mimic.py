@@ -1,6 +1,6 @@
-"""mimic: `input/pose` -> `output/cmd_vel`: a turtle does what another one does.
+"""mimic: reads `input/pose` and publishes `output/cmd_vel`, so that a turtle copies the motion of another.
 
-`input` and `output` are namespaces, to be remapped: `input:=turtlesim1/turtle1`. Source: http://wiki.ros.org/turtlesim.
+`input` and `output` are namespaces that you remap: `input:=turtlesim1/turtle1`. Source: http://wiki.ros.org/turtlesim.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def main() -> int:
         twist = Twist()
         twist.linear.x, twist.angular.z = pose.linear_velocity, pose.angular_velocity
         with contextlib.suppress(rospy.ROSException):
-            # Raised where the node is being shut down.
+            # Raises if the node is shutting down.
             publisher.publish(twist)
 
     subscriber = rospy.Subscriber(join(rospy.resolve_name("input"), "pose"), Pose, copy, queue_size=1)

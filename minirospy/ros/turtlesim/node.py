@@ -1,7 +1,7 @@
-"""turtlesim_node: velocities, services -> poses and colours of turtles, and their picture in a terminal.
+"""turtlesim_node: receives velocities and service calls, publishes the turtles' poses and colours, draws them in a terminal.
 
-Parameters: ~background_r, ~background_g, ~background_b (69, 86, 255; read when the paper is wiped out), ~headless (false: draw
-where standard input and output are a terminal). Source: http://wiki.ros.org/turtlesim.
+Parameters: ~background_r, ~background_g, ~background_b (69, 86, 255; read when the canvas is cleared), ~headless (false: draw
+if stdin and stdout are a terminal). Source: http://wiki.ros.org/turtlesim.
 """
 
 from __future__ import annotations
@@ -42,8 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2
-"""A node that was suspended for longer does not make up for it."""
+_LATE_SECONDS = 0.2  # seconds; a node that was suspended for longer skips the missed steps
 
 _T = TypeVar("_T")
 
@@ -67,13 +66,13 @@ def main() -> int:
 
 
 def _has_terminal() -> bool:
-    """Return whether there is a terminal to draw in; that of a launch file, whose nodes have no input, belongs to all of them."""
+    """Return whether stdin and stdout are a terminal. A launch file's nodes have no stdin, and share its terminal."""
     streams = sys.stdin, sys.stdout
     return all(stream is not None and stream.isatty() for stream in streams)
 
 
 def _background() -> Color:
-    """Return the background that the parameters set; where one is not an integer, ROS's own."""
+    """Return the background from the parameters; a value that is not an integer is replaced by ROS's default."""
     values = [rospy.get_param(f"~background_{part}", usual) for part, usual in BACKGROUND._asdict().items()]
     chosen = [
         value & 255 if isinstance(value, int) and not isinstance(value, bool) else usual
@@ -83,22 +82,21 @@ def _background() -> Color:
 
 
 class Simulator:
-    """The world as a node: services for all turtles, and what each turtle has."""
+    """The world as a node: the services for all turtles, and the topics and services of each turtle."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()
-        """Guards the world."""
+        self.lock = threading.Lock()  # guards the world
         for part, usual in BACKGROUND._asdict().items():
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # One change of the set of turtles at a time; the world goes on meanwhile.
+        # Serialises changes to the set of turtles; the world keeps stepping in the meantime.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
 
     def start(self) -> None:
-        """Offer the services, and add the first turtle."""
+        """Advertise the services, and add the first turtle."""
         self._services = [
             rospy.Service("clear", Empty, self._clear),
             rospy.Service("reset", Empty, self._reset),
@@ -114,7 +112,7 @@ class Simulator:
         due = time.monotonic()
         while not rospy.is_shutdown():
             with contextlib.suppress(rospy.ROSException):
-                # Raised where the node is being shut down.
+                # Raises if the node is shutting down.
                 self._step()
             due += STEP_SECONDS
             late = time.monotonic() - due
@@ -164,7 +162,7 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # The topics of a turtle that comes back stay: its subscribers miss nothing.
+            # Keep the topics of a turtle with the same name, so that its subscribers miss nothing.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)
@@ -175,7 +173,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The same name in other words: /turtle1.
+                # The new name may be another form of an existing one: /turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 
@@ -191,7 +189,7 @@ class Simulator:
 
 
 def refusing(request: Callable[[], _T]) -> _T:
-    """Return what a request to the world returns; log what it refuses, and raise ServiceException."""
+    """Return the result of a request to the world; if it is refused, log the error and raise ServiceException."""
     try:
         return request()
     except WorldError as error:
@@ -205,7 +203,7 @@ class _Ends:
     def __init__(self, name: str, simulator: Simulator) -> None:
         self._name = name
         self._world, self._lock = simulator.world, simulator.lock
-        # As a namespace, which remappings and ~ apply to.
+        # Resolve it as a namespace, so that remappings and ~ apply.
         space = rospy.resolve_name(name)
         self._poses = rospy.Publisher(join(space, "pose"), PoseMessage, queue_size=1)
         self._colors = rospy.Publisher(join(space, "color_sensor"), ColorMessage, queue_size=1)
@@ -217,7 +215,7 @@ class _Ends:
         ]
 
     def publish(self, reading: Reading) -> None:
-        """Publish pose and colour."""
+        """Publish the pose and colour."""
         x, y, theta = reading.pose
         self._poses.publish(PoseMessage(x, y, theta, reading.linear, reading.angular))
         self._colors.publish(ColorMessage(*reading.color))

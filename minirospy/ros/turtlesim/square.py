@@ -1,6 +1,6 @@
-"""A turtle on the sides of a square: poses -> velocities and log lines. Pure.
+"""Steers a turtle along the sides of a square: poses in, velocities and log lines out. Pure.
 
-Source: how turtlesim 0.10.2's draw_square behaves.
+Source: the behaviour of draw_square in turtlesim 0.10.2.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ __all__ = ["Order", "Square"]
 
 _SIDE_METRES = 2.0
 _NEAR_METRES, _NEAR_RADIANS = 0.1, 0.01
-_STILL = 0.0001
-"""Slower than this, in metres or radians a second, a turtle has stopped."""
+_STILL = 0.0001  # metres or radians per second; a slower turtle counts as stopped
 
 
 class Order(NamedTuple):
-    """Metres a second forward, radians a second to the left."""
+    """Velocities: metres per second forward, radians per second to the left."""
 
     linear: float = 0.0
     angular: float = 0.0
@@ -32,7 +31,7 @@ class _Phase(Enum):
 
 
 class Square:
-    """Goes to one goal after the other, each two metres ahead or a quarter turn to the left."""
+    """Moves to one goal after the other: each is two metres ahead, or a quarter turn to the left."""
 
     def __init__(self) -> None:
         self._goal: Pose | None = None
@@ -40,7 +39,7 @@ class Square:
         self._is_stopping = False
 
     def step(self, pose: Pose, linear: float, angular: float) -> tuple[Order | None, list[str]]:
-        """Return the order for a turtle at ``pose`` with its velocities, None for no new one, and the lines to log."""
+        """Return the velocity for a turtle at ``pose`` with these velocities (None: no change), and the lines to log."""
         if self._goal is None:
             self._goal, lines = _new_goal(_ahead(pose))
             return self._go(pose), lines

@@ -1,6 +1,7 @@
-"""turtle_teleop_key: arrow keys of a terminal -> `turtle1/cmd_vel`.
+"""turtle_teleop_key: publishes `turtle1/cmd_vel` from the arrow keys of a terminal.
 
-Parameters: scale_linear (2 m/s), scale_angular (2 rad/s), of the namespace and not private. Source: http://wiki.ros.org/turtlesim.
+Parameters: scale_linear (2 m/s), scale_angular (2 rad/s); they are in the node's namespace, not private. Source:
+http://wiki.ros.org/turtlesim.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _QUIT = "q"
 _USUAL_SCALE = 2.0
 
 DIRECTIONS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, 1.0), "right": (0.0, -1.0)}
-"""Signs of the motion forward and of the turn to the left, by key."""
+"""Key -> signs of (forward motion, turn to the left)."""
 
 
 def main() -> int:
@@ -38,10 +39,10 @@ def main() -> int:
         rospy.init_node("teleop_turtle")
         _run()
     except OSError:
-        # The terminal's window was closed: no key can come any more.
+        # The terminal's window was closed, so no more keys can arrive.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSException:
-        # The node is being shut down.
+        # The node is shutting down.
         pass
     return 0
 
@@ -49,7 +50,7 @@ def main() -> int:
 def _run() -> None:
     linear, angular = _scale("scale_linear"), _scale("scale_angular")
     publisher = rospy.Publisher("turtle1/cmd_vel", Twist, queue_size=1)
-    # The terminal is set up before the help is shown: what was typed until then is dropped.
+    # Set up the terminal before the help is shown: earlier input is discarded.
     with Keys(end=_QUIT) as keys:
         print(_HELP, flush=True)
         while not rospy.is_shutdown():

@@ -1,4 +1,4 @@
-"""The turtles' world as a picture of characters, live in a terminal."""
+"""Draws the turtles' world with characters, live in a terminal."""
 
 from __future__ import annotations
 
@@ -20,21 +20,20 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "Screen"]
 
 _PERIOD_SECONDS = 0.1
-_LINES_BESIDE = 4
-"""Lines of the terminal that the picture leaves to the log and its own frame."""
+_LINES_BESIDE = 4  # lines of the terminal that are left for the log and the picture's frame
 
 _ROWS = range(8, 41)
-"""Fewer show nothing, more cost more than they show."""
+"""Allowed number of rows: fewer show too little, more take too much CPU time."""
 
 _ARROWS, _ASCII_ARROWS = "→↗↑↖←↙↓↘", ">/^\\</v\\"
 _STYLES = ("bright_green", "bright_yellow", "bright_red", "bright_cyan", "bright_magenta", "bright_white")
 
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
-"""The bits of a character of Braille, four rows of two dots."""
+"""The bits of a Braille character: four rows of two dots."""
 
 
 class Picture:
-    """What a world looks like now, for rich: pens' lines as dots, turtles as arrows, each with its pose below."""
+    """The current picture of a world, for rich: pen lines as dots, turtles as arrows, each turtle's pose below."""
 
     def __init__(self, world: World) -> None:
         self._canvas = world.canvas
@@ -74,7 +73,7 @@ class Picture:
         )
 
     def _turtles(self, rows: int, *, is_ascii: bool) -> dict[tuple[int, int], tuple[str, str]]:
-        """Return the arrow and the style of each turtle by its row and column; the last of a place is seen."""
+        """Return the arrow and the style of each turtle by row and column; the last turtle in a cell wins."""
         arrows = _ASCII_ARROWS if is_ascii else _ARROWS
         found = {}
         for index, pose in enumerate(self._poses.values()):
@@ -85,7 +84,7 @@ class Picture:
 
 
 def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[str], list[list[Color]]]:
-    """Return the paper as ``rows`` lines of twice as many characters, and the mean colour of the lines in each."""
+    """Return the canvas as ``rows`` lines of 2 * ``rows`` characters, and the mean colour of the lines in each character."""
     dots = _blocks(canvas.marks, 4 * rows, 4 * rows) > 0
     # A character has four rows of two dots.
     dots = dots.reshape(rows, 4, 2 * rows, 2)
@@ -106,7 +105,7 @@ def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[st
 def _blocks(
     values: np.ndarray[tuple[int, ...], np.dtype[np.generic]], rows: int, columns: int
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Return the sums of ``values`` in each of ``rows`` times ``columns`` parts of the paper."""
+    """Return the sums of ``values`` over each of ``rows`` times ``columns`` blocks of the canvas."""
     starts = [-(-np.arange(count) * PIXELS // count) for count in (rows, columns)]
     sums = np.add.reduceat(values.astype(np.int64), starts[0], axis=0)
     return np.add.reduceat(sums, starts[1], axis=1)
@@ -129,9 +128,9 @@ def _rgb(color: Color) -> str:
 
 
 class Screen:
-    """Draws a world ten times a second while it changes, below the lines of the log. A context manager.
+    """Draws a world ten times a second while it changes, below the log lines. A context manager.
 
-    It has its own thread: a terminal that is stopped (Ctrl-S) or slow does not stop the turtles.
+    Drawing has its own thread, so that a stopped (Ctrl-S) or slow terminal does not stop the turtles.
     """
 
     def __init__(self, world: World, lock: threading.Lock) -> None:
@@ -145,7 +144,7 @@ class Screen:
 
         console = Console(file=own_output())
         if console.is_dumb_terminal:
-            # The cursor cannot go back.
+            # A dumb terminal cannot move the cursor back.
             self._ended.set()
         self._live = Live(console=console, auto_refresh=False)
         if not self._ended.is_set():
@@ -172,7 +171,7 @@ class Screen:
             self._ended.wait(_PERIOD_SECONDS)
 
     def _state(self) -> object:
-        """Return what a picture depends on."""
+        """Return the state on which the picture depends."""
         world = self._world
         poses = [(name, world.pose(name)) for name in world.names]
         return world.canvas.version, poses, shutil.get_terminal_size()

@@ -1,7 +1,7 @@
-"""The turtles' world: commands, teleports, pens -> poses, colours, walls. Pure: no socket, no clock.
+"""The turtles' world: commands, teleports and pens in; poses, colours and wall hits out. Pure: no sockets, no clock.
 
-Lengths are metres, angles radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and how turtlesim
-0.10.2 behaves.
+Lengths are in metres, angles in radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and the
+behaviour of turtlesim 0.10.2.
 """
 
 from __future__ import annotations
@@ -16,33 +16,30 @@ from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
 
 __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]
 
-BACKGROUND = Color(69, 86, 255)
-"""The background where no parameter sets another."""
+BACKGROUND = Color(69, 86, 255)  # used if no parameter sets another
 
-STEP_SECONDS = 0.016
-"""The time between two steps."""
+STEP_SECONDS = 0.016  # seconds between two steps
 
-_COMMAND_SECONDS = 1.0
-"""How long a velocity is obeyed."""
+_COMMAND_SECONDS = 1.0  # seconds for which a velocity command applies
 
 _PIXELS_PER_METRE = 45.0
 
 
 def _float32(value: float) -> float:
-    """Return the number that a field float32 has."""
+    """Return the number rounded to the precision of float32."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
-"""Width and height of the world, in metres: 11.088889."""
+"""The width and height of the world, in metres: 11.088889."""
 
 
 class WorldError(MinirospyError):
-    """A request that the world refuses."""
+    """The world refuses a request."""
 
 
 class Velocity(NamedTuple):
-    """Metres a second forward and to the left, radians a second to the left."""
+    """Metres per second forward and to the left, radians per second to the left."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -50,14 +47,14 @@ class Velocity(NamedTuple):
 
 
 class Pen(NamedTuple):
-    """What a turtle draws with; its width in pixels."""
+    """A turtle's pen; the width is in pixels."""
 
     color: Color = Color(179, 184, 255)
     width: int = 3
 
 
 class Pose(NamedTuple):
-    """Metres from the left and lower walls, and the direction: 0 to the right, pi / 2 up."""
+    """Metres from the left and lower walls, and the direction in radians: 0 is right, pi / 2 is up."""
 
     x: float
     y: float
@@ -65,30 +62,25 @@ class Pose(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What a turtle publishes after a step."""
+    """A turtle's data to publish after a step."""
 
     name: str
     pose: Pose
-    linear: float
-    """Metres a second."""
-    angular: float
-    """Radians a second."""
-    color: Color
-    """The colour of the paper under it, before it drew."""
-    warning: str
-    """The line about a wall that it hit, or ""."""
+    linear: float  # metres per second
+    angular: float  # radians per second
+    color: Color  # colour of the canvas under the turtle, before the turtle drew on it
+    warning: str  # log line about a wall that the turtle hit, or ""
 
 
 class _Teleport(NamedTuple):
     is_relative: bool
-    x: float
-    """Or the distance forward."""
+    x: float  # the x coordinate; for a relative teleport, the distance forward
     y: float
     theta: float
 
 
 class _Turtle:
-    """One turtle. Its ``y`` is the distance from the upper wall, as on the paper."""
+    """One turtle. Its ``y`` is the distance from the upper wall, as on the canvas."""
 
     def __init__(self, x: float, y: float, theta: float) -> None:
         self.x, self.y, self.theta = x, y, theta
@@ -111,17 +103,17 @@ class _Turtle:
             self.x, self.y, self.theta = target.x, max(0.0, SIZE - target.y), target.theta
 
     def move(self, seconds: float) -> None:
-        """Turn first, then go."""
+        """Turn, then move."""
         forward, left, turn = self.velocity
         self.theta += turn * seconds
-        # From -pi up to pi.
+        # Normalise to [-pi, pi).
         self.theta -= 2 * math.pi * math.floor((self.theta + math.pi) / (2 * math.pi))
         ahead, aside = math.cos(self.theta), math.sin(self.theta)
         self.x += (ahead * forward - aside * left) * seconds
         self.y -= (ahead * left + aside * forward) * seconds
 
     def stop_at_walls(self) -> str:
-        """Come back into the world; return the warning, or ""."""
+        """Clamp the position to the world; return the warning, or ""."""
         x, y = self.x, self.y
         self.x, self.y = (min(max(value, 0.0), SIZE) for value in (x, y))
         if (x, y) == (self.x, self.y):
@@ -130,7 +122,7 @@ class _Turtle:
 
 
 class World:
-    """Turtles by name, and the paper that they draw on. At first there is one, turtle1, in the middle."""
+    """The turtles by name, and their canvas. There are none at first."""
 
     def __init__(self, background: Color = BACKGROUND) -> None:
         self.canvas = Canvas(background)
@@ -139,24 +131,24 @@ class World:
 
     @property
     def names(self) -> list[str]:
-        """The turtles, by name."""
+        """The names of the turtles, sorted."""
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:
-        """Return where a turtle is. Raise WorldError if there is none."""
+        """Return the pose of a turtle. Raise WorldError if it does not exist."""
         return self._turtle(name).pose
 
     def clear(self, background: Color) -> None:
-        """Wipe the paper out; turtles stay."""
+        """Clear the canvas; turtles stay."""
         self.canvas.fill(background)
 
     def remove_all(self) -> None:
-        """Remove the turtles; the next one without a name is turtle1 again."""
+        """Remove all turtles; the next one without a name is turtle1 again."""
         self._turtles.clear()
         self._last_number = 0
 
     def spawn(self, name: str, x: float, y: float, theta: float) -> str:
-        """Add a turtle; return its name, a new one where it is empty. Raise WorldError on a name in use or not legal."""
+        """Add a turtle; return its name, a generated one if empty. Raise WorldError if the name is in use or invalid."""
         _check_finite(x=x, y=y, theta=theta)
         if not is_legal_name(name):
             raise WorldError(f"[{name}] is not a legal name of a turtle: letters, digits, _ and /")
@@ -173,36 +165,36 @@ class World:
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:
-        """Remove a turtle. Raise WorldError if there is none."""
+        """Remove a turtle. Raise WorldError if it does not exist."""
         if name not in self._turtles:
             raise WorldError(f"Tried to kill turtle [{name}], which does not exist")
         del self._turtles[name]
 
     def set_pen(self, name: str, color: Color, width: int, *, is_off: bool) -> None:
-        """Take another pen; 0 is the thinnest, one pixel wide. A pen that is off keeps what it was."""
+        """Set a turtle's pen; width 0 is drawn as one pixel. Turning a pen off keeps its colour and width."""
         turtle = self._turtle(name)
         turtle.is_drawing = not is_off
         if not is_off:
             turtle.pen = Pen(color, width or 1)
 
     def teleport_absolute(self, name: str, x: float, y: float, theta: float) -> None:
-        """Move a turtle with the next step; its pen draws."""
+        """Move a turtle at the next step; its pen draws the path."""
         _check_finite(x=x, y=y, theta=theta)
         self._turtle(name).teleports.append(_Teleport(False, x, y, theta))
 
     def teleport_relative(self, name: str, linear: float, angular: float) -> None:
-        """Turn a turtle and move it forward with the next step; its pen draws."""
+        """Turn a turtle and move it forward at the next step; its pen draws the path."""
         _check_finite(linear=linear, angular=angular)
         self._turtle(name).teleports.append(_Teleport(True, linear, 0.0, angular))
 
     def command(self, name: str, velocity: Velocity, now: float) -> None:
-        """Set a turtle's velocity for one second after ``now`` (seconds). Raise WorldError on one that is not finite."""
+        """Set a turtle's velocity for one second after ``now`` (seconds). Raise WorldError if it is not finite."""
         _check_finite(**velocity._asdict())
         turtle = self._turtle(name)
         turtle.velocity, turtle.command_time = velocity, now
 
     def step(self, now: float) -> list[Reading]:
-        """Let 16 ms pass; return what each turtle publishes, by name. ``now``: seconds on the clock of the commands."""
+        """Advance by 16 ms; return each turtle's data, sorted by name. ``now``: seconds on the clock of the commands."""
         return [self._step(name, self._turtles[name], now) for name in self.names]
 
     def _step(self, name: str, turtle: _Turtle, now: float) -> Reading:

@@ -4,7 +4,7 @@
 import os
 import sys
 
-# This folder is not to hide the package xacro.
+# Prevent this folder from hiding the package xacro.
 _HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:] = [folder for folder in sys.path if os.path.abspath(folder) != _HERE]
 

@@ -1,4 +1,4 @@
-"""`roslaunch`: run what a launch file says. Source: http://wiki.ros.org/roslaunch/Commandline%20Tools."""
+"""`roslaunch`: run launch files. Source: http://wiki.ros.org/roslaunch/Commandline%20Tools."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class LaunchOptions(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command, 1 also if a required node died of a fault."""
+    """Run the command; return the exit status as in minirospy.command.command, or 1 if a required node failed."""
     return COMMAND.main(argv)
 
 
@@ -297,7 +297,7 @@ def _seconds(text: str) -> float:
 
 
 def _warn_of_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Warn of arguments that no file declares: real roslaunch ignores them, most often they are typing errors."""
+    """Warn of arguments that no file declares: real roslaunch ignores them, but most are typing errors."""
     for name in args:
         if name not in spec.args:
             warn(_unknown(name, spec))
@@ -323,7 +323,7 @@ def _print_args(args: list[ArgDoc]) -> None:
 
 
 def _check(sources: list[LaunchSource], packages: Packages) -> int:
-    """Print every fault and warning of the files, in the order of their lines."""
+    """Print every error and warning of the files, sorted by line."""
     from minirospy.ros.roslaunch.launcher.check import find_problems, problem_line
 
     spec, problems = find_problems(sources, packages)
@@ -379,7 +379,7 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
     "dump_params": _show_params,
     "node_args": _show_command,
 }
-"""In this order, where several are asked for."""
+"""If several of these options are given, the first one in this table applies."""
 
 COMMAND = Command("roslaunch", _parser, _roslaunch)
 

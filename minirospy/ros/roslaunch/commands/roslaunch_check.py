@@ -1,4 +1,4 @@
-"""`rosrun roslaunch roslaunch-check`: whether launch files load, and what they run is there; as a test.
+"""`rosrun roslaunch roslaunch-check`: test that launch files load and that the programs they run exist.
 
 Source: http://wiki.ros.org/roslaunch/roslaunch-check, http://wiki.ros.org/roslaunch (roslaunch_add_file_check).
 """
@@ -23,7 +23,7 @@ _CLASS = "roslaunch.RoslaunchCheck"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 if all files are right, 1 where one is not."""
+    """Run the command; return 0 if all files are valid, else 1."""
     return COMMAND.main(argv)
 
 

@@ -1,4 +1,4 @@
-"""`roslaunch-deps`: the packages that launch files need.
+"""`roslaunch-deps`: print the packages that launch files need.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """
@@ -48,7 +48,7 @@ def _deps(files: Sequence[str], verbose: bool, warn: bool) -> int:
         _print_files(needs)
     own = package_of(files[0])
     wanted = {package for what in needs.values() for package in what.packages}
-    # Its own package is named where nothing else is.
+    # The files' own package is printed only if they need no other.
     print(" ".join(sorted(wanted - {own} or wanted)))
     if warn:
         print("\nMissing declarations:")

@@ -1,4 +1,4 @@
-"""`roslaunch-logs`: where the log files of the present run lie.
+"""`roslaunch-logs`: print the folder of the current run's log files.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-logs.
 """
@@ -18,12 +18,12 @@ __all__ = ["COMMAND", "get_run_id", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0, or 2 (as in ROS) where no master answers, and the folder of all runs is printed."""
+    """Run the command; return 0. If no master answers, print the folder of all runs and return 2, as ROS does."""
     return COMMAND.main(argv)
 
 
 def get_run_id() -> str | None:
-    """Return the id of the current run; None if no master answers, or it has none."""
+    """Return the id of the current run; None if no master answers or the master has no id."""
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
     try:
         return str(master.get_param("/run_id"))

@@ -1,1 +1,1 @@
-"""roslaunch: launch files in, running nodes out."""
+"""roslaunch: turns launch files into running nodes."""

@@ -1,4 +1,4 @@
-"""The arguments that a launch file declares, without loading what it includes."""
+"""The arguments that a launch file declares, read without loading the files that it includes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["describe_args", "resolved_arg_docs"]
 
 
 def describe_args(file: str) -> list[ArgDoc]:
-    """Return the arguments that a file declares, without loading what it includes. Raise LaunchError."""
+    """Return the arguments that a file declares, without loading the files that it includes. Raise LaunchError."""
     root = parse_document(read_launch_file(file), file)
     return [
         ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
@@ -26,9 +26,10 @@ def describe_args(file: str) -> list[ArgDoc]:
 
 
 def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
-    """Return the same as describe_args(), with the defaults' values where ``args`` are given, and without what does not apply.
+    """Return describe_args() with the defaults resolved for ``args``.
 
-    What cannot be resolved stays as it is written. Raise LaunchError.
+    Declarations that an ``if`` or ``unless`` excludes are left out.
+    A default that cannot be resolved is returned as written. Raise LaunchError.
     """
     substitution = Substitution(packages, os.environ, file, dict(args))
     found: dict[str, ArgDoc] = {}

@@ -1,4 +1,4 @@
-"""Errors of launch files, found without running them."""
+"""Errors in launch files, found without running the nodes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """Return the spec of the files, and every fault: theirs, missing programs, undeclared machines."""
+    """Return the spec of the files, and all problems: errors in the files, missing programs, undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():
@@ -27,9 +27,9 @@ def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[
 
 
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
-    """Return the faults of a launch file.
+    """Return the errors of a launch file.
 
-    With ``ignore_unset_args`` there are none where an arg has no value: what else is wrong may follow from that.
+    With ``ignore_unset_args``, return none if an arg has no value, because other errors may be its consequences.
     """
     _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)
@@ -37,6 +37,6 @@ def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False)
 
 
 def problem_line(problem: LaunchError, kind: str = "error") -> str:
-    """Return a fault as a line that editors know: FILE:LINE: KIND: TEXT."""
+    """Return an error in the format that editors parse: FILE:LINE: KIND: TEXT."""
     where = f"{problem.file}:{problem.line}" if problem.line else problem.file
     return f"{where}: {kind}: {problem.text}"

@@ -1,4 +1,4 @@
-"""The roslaunch on another machine: started by ssh, it runs what its parent sends, and ends with it.
+"""The roslaunch on another machine: started by ssh, it runs the nodes that its parent sends, and exits with its parent.
 
 Source: http://wiki.ros.org/roslaunch/Architecture.
 """
@@ -28,9 +28,9 @@ _MAX_MISSED = 3
 def run_child(
     name: str, parent: str, run_id: str, environment: Environment, packages: Packages, options: RunOptions
 ) -> int:
-    """Be the child ``name`` of the roslaunch at the URI ``parent``, until it or a signal ends it; return the exit status.
+    """Run as the child ``name`` of the roslaunch at the URI ``parent``; return the exit status.
 
-    Raise MinirospyError if the parent does not answer.
+    The parent or a signal stops it. Raise MinirospyError if the parent does not answer.
     """
 
     def listener(level: int, text: str) -> None:
@@ -65,7 +65,7 @@ class _Child(Launcher):
         self._parent = parent
 
     def methods(self) -> dict[str, Method]:
-        """Return the methods that the parent calls."""
+        """Return the XML-RPC methods that the parent calls."""
         return {
             "launch": self._launch,
             "shutdown": self._shutdown,
@@ -75,7 +75,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """End where the parent does not answer any more."""
+        """Poll the parent; stop the run if it no longer answers."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

@@ -1,4 +1,4 @@
-"""A node -> the command that runs it, its environment and its folder. Source: http://wiki.ros.org/roslaunch/XML/node."""
+"""A node's command, environment and working folder. Source: http://wiki.ros.org/roslaunch/XML/node."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
-    """Return the words that run a node's program, its path last. Raise MinirospyError."""
+    """Return the command that runs a node's program, without the node's arguments; the program's path is last.
+
+    Raise MinirospyError.
+    """
     try:
         return packages.find_executable(node.package, node.type)
     except (NotFoundError, NotExecutableError) as error:
@@ -37,7 +40,7 @@ def node_command(node: NodeSpec, packages: Packages) -> list[str]:
 def node_environment(
     node: NodeSpec, environment: Environment, environ: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Return the environment of a node's process."""
+    """Return the environment variables of a node's process."""
     variables = {**(os.environ if environ is None else environ), **dict(node.env)}
     variables["ROS_MASTER_URI"] = environment.master_uri
     export_local(variables)
@@ -50,12 +53,15 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the folder that a node's process starts in. Raise MinirospyError."""
+    """Return the working folder of a node's process. Raise MinirospyError."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """Return a node's command as `roslaunch --args` prints it, with the variables that it sets. Raise MinirospyError."""
+    """Return a node's command as `roslaunch --args` prints it, with the environment variables that it sets.
+
+    Raise MinirospyError.
+    """
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
     if not os.environ.get("ROS_MASTER_URI"):
@@ -65,6 +71,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """Return a fault of a node, with file and line where a launch file declares it."""
+    """Return an error about a node, with file and line if a launch file declares it."""
     message = f"node [{node.base_name}]: {text}"
     return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

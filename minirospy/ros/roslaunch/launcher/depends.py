@@ -1,4 +1,4 @@
-"""The dependencies of launch files: nodes, files and packages, and those that package.xml does not name.
+"""The dependencies of launch files: nodes, files and packages, and the packages that package.xml does not declare.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """
@@ -19,7 +19,7 @@ __all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
 
 
 class FileNeeds(NamedTuple):
-    """The dependencies of one launch file: the (package, program) of its nodes, the files that it includes, all packages."""
+    """The dependencies of one launch file: its nodes' (package, program), the files that it includes, and all packages."""
 
     nodes: tuple[tuple[str, str], ...]
     includes: tuple[str, ...]
@@ -29,9 +29,9 @@ class FileNeeds(NamedTuple):
 def file_needs(
     files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
 ) -> dict[str, FileNeeds]:
-    """Return the needs of each launch file, and of those that they include. Raise LaunchError.
+    """Return the dependencies of each launch file, and of each file that it includes. Raise LaunchError.
 
-    An arg without a value or a missing parameter file is not an error: they may be generated later. ``warn``
+    An arg without a value or a missing parameter file is not an error: it may be generated later. ``warn``
     is called for each file that cannot be included.
     """
     sources = []
@@ -55,9 +55,9 @@ def file_needs(
 
 
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
-    """Return the packages that launch files need and the package.xml of their package does not name, by package, sorted.
+    """Return the packages that launch files need but their package's package.xml does not declare: package -> sorted names.
 
-    ``tests``: what it names for tests counts, too. Raise ManifestError.
+    With ``tests``, test dependencies also count as declared. Raise ManifestError.
     """
     found: dict[str, set[str]] = {}
     for file, what in needs.items():
@@ -71,7 +71,7 @@ def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False)
 
 
 def package_of(file: str) -> str | None:
-    """Return the package that a file belongs to."""
+    """Return the package that contains a file."""
     folder = _package_folder(file)
     return package_name(folder) if folder else None
 

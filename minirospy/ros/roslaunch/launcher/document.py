@@ -1,4 +1,4 @@
-"""The text of a launch file -> its tags, each with its line. Pure.
+"""Parse the text of a launch file into tags with line numbers. Pure.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """
@@ -38,7 +38,7 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
         "master": ["auto", "type", "uri"],
     }.items()
 }
-"""Each tag, and the attributes that it may have."""
+"""Tag name -> the attributes that the tag may have."""
 
 _TRUTH = {"true": True, "false": False}
 _CONDITIONS = {**_TRUTH, "1": True, "0": False}
@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An element with its substitutions made: its attributes as values, its faults with their line."""
+    """An XML element with its substitutions made: returns its attributes as values, and errors with its line number."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -68,36 +68,36 @@ class Tag:
 
     @property
     def name(self) -> str:
-        """The name behind the ``<``."""
+        """The tag's name."""
         return self.element.tag
 
     @property
     def line(self) -> int:
-        """The line that it starts on."""
+        """The line on which the tag starts."""
         return self.element.line
 
     def children(self) -> Iterator[Tag]:
-        """Return the tags inside."""
+        """Yield the child tags."""
         return (Tag(child, self.file, self._substitution) for child in self.element.children)
 
     def has(self, key: str) -> bool:
-        """Return whether an attribute is there, empty or not."""
+        """Return whether the attribute exists, even if it is empty."""
         return key in self.element.attributes
 
     def resolve(self, text: str) -> str:
-        """Return a text with its substitutions made. Raise LaunchError."""
+        """Return a string with its substitutions made. Raise LaunchError."""
         try:
             return self._substitution.apply(text)
         except (SubstitutionError, NotFoundError) as error:
             raise self.error(str(error)) from error
 
     def optional(self, key: str) -> str | None:
-        """Return an attribute, substitutions made; None if it is not there. Raise LaunchError."""
+        """Return an attribute with its substitutions made; None if the tag does not have it. Raise LaunchError."""
         text = self.element.attributes.get(key)
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """Return an attribute that has to be there. Raise LaunchError."""
+        """Return a required attribute. Raise LaunchError."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -109,7 +109,7 @@ class Tag:
         return text
 
     def flag(self, key: str) -> bool:
-        """Return an attribute that is true or false (where it is not there). Raise LaunchError."""
+        """Return a boolean attribute; False if the tag does not have it. Raise LaunchError."""
         text = self.optional(key)
         if text is None:
             return False
@@ -119,7 +119,7 @@ class Tag:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """Return an attribute that is a number. Raise LaunchError."""
+        """Return a numeric attribute. Raise LaunchError."""
         text = self.optional(key)
         try:
             return default if text is None else float(text)
@@ -127,7 +127,7 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return an attribute that is a number of a kind; the default where it is empty. Raise LaunchError."""
+        """Return a numeric attribute of type ``kind``; the default if it is empty. Raise LaunchError."""
         text = self.optional(key)
         try:
             return kind(text) if text else default
@@ -135,14 +135,14 @@ class Tag:
             raise self.error(f"'{key}' must be a number: [{text}]") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Return an attribute that is one of ``choices`` (the first where it is not there). Raise LaunchError."""
+        """Return an attribute that is one of ``choices``; the first if the tag does not have it. Raise LaunchError."""
         text = self.optional(key)
         if text is not None and text not in choices:
             raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return the value of its ``if`` or ``unless``. Raise LaunchError."""
+        """Return whether the tag's ``if`` or ``unless`` lets it apply. Raise LaunchError."""
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
         for key in ("if", "unless"):
@@ -157,7 +157,7 @@ class Tag:
         return True
 
     def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
-        """Warn of each attribute that a tag of this name does not have: most often it is a typing error."""
+        """Warn of each attribute that this tag does not support: most are typing errors."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:
@@ -166,5 +166,5 @@ class Tag:
                 warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
 
     def error(self, text: str) -> LaunchError:
-        """Return a fault of this tag, to be raised."""
+        """Return an error for this tag, for the caller to raise."""
         return LaunchError(self.file, self.line, text)

@@ -1,4 +1,4 @@
-"""Launch files that a command line or an include names: where they are, and what is meant by one that is not there."""
+"""Find the launch files that a command line or an include names, and suggest similar ones for a missing file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = [
     "read_launch_file",
 ]
 
-_MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file of a hundred robots has some 100 kB
+_MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file for a hundred robots has about 100 kB
 
 
 class LaunchFileNotFoundError(MinirospyError):
-    """A command line names no launch file; ``ros_text`` is what ROS prints about it, ``hint`` what to do."""
+    """The launch file of a command line does not exist; ``ros_text`` is the message of ROS, ``hint`` a suggestion."""
 
     def __init__(self, ros_text: str, hint: str) -> None:
         super().__init__(ros_text, hint)
@@ -69,7 +69,10 @@ def read_launch_file(file: str) -> bytes:
 
 
 def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
-    """Return a file's bytes. Raise OSError, ValueError: for more than ``limit`` bytes, as a device such as /dev/zero has."""
+    """Return a file's bytes.
+
+    Raise OSError, or ValueError if it has more than ``limit`` bytes, as a device such as /dev/zero has.
+    """
     with open(file, "rb") as stream:
         data = stream.read(limit + 1)
     if len(data) > limit:
@@ -78,14 +81,14 @@ def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
 
 
 def near_files(file: str) -> str:
-    """Return the hint for a missing launch file: those of a similar name in its folder, else in its package."""
+    """Return the hint for a missing launch file: files with similar names in its folder, else in its package."""
     wanted = Path(file)
     with suppress(OSError, ValueError):
         if wanted.exists():
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Without their endings, in which all are alike.
+            # Compare names without their suffixes, which are the same for all of them.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
@@ -98,7 +101,7 @@ def near_files(file: str) -> str:
 
 
 def hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing in a package, where another one of its name has it."""
+    """Return the hint for a file that is missing in a package, if another package of the same name has it."""
     with suppress(OSError, ValueError):
         folder = _package_of(Path(file))
         if folder:
@@ -111,7 +114,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a package without a file: the launch files that it has."""
+    """Return the hint for a file that its package does not have: the launch files of the package."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:
@@ -120,7 +123,7 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _package_with(file: str, packages: Packages) -> str:
-    """Return the hint for a launch file whose package was not named, or is another one."""
+    """Return the hint for a launch file given without its package, or with the wrong one."""
     for package, folder in sorted(packages.folders().items()):
         if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
             return f"; did you mean `roslaunch {package} {file}`?"

@@ -1,10 +1,12 @@
-"""A process that outlives roslaunch by a moment: it ends the nodes that a killed roslaunch has left. A script.
+"""A script that outlives roslaunch briefly: if roslaunch is killed, it terminates the nodes that are left.
 
-From its input it reads a line for each process group: ``+PID NAME`` has started, a node; ``*PID`` has started and is to end
-last (the master); ``-PID`` has ended. Where the input ends, roslaunch has exited, for any reason: the groups that are left get
-SIGINT, SIGTERM, SIGKILL, and what their nodes leave registered with a master that goes on is unregistered. On Windows the
-system has ended them with roslaunch, and only the last is left to do. Nothing but the standard library is imported, and little of
-that: it starts while the first nodes do.
+It reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master has
+started, which
+is terminated last; ``-PID`` when a process has exited. At EOF, roslaunch has exited, for whatever reason: the remaining
+groups get
+SIGINT, SIGTERM, SIGKILL, and the registrations of their nodes are removed from a master that continues to run. On Windows, the
+system terminates the processes with roslaunch, so only the registrations are left to remove. The script imports only a few
+standard modules, because it starts at the same time as the first nodes.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last argument where the system ends the processes of a killed roslaunch, as Windows does."""
+"""The last argument if the system terminates the processes of a killed roslaunch, as Windows does."""
 
 
 def watch(
@@ -28,7 +30,7 @@ def watch(
     master_uri: str,
     end: Callable[[list[int], float, float], object],
 ) -> None:
-    """Keep a list of the groups until ``lines`` end; then ``end`` those that are left."""
+    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining ones."""
     nodes: dict[int, str] = {}
     masters: dict[int, str] = {}
     for line in lines:
@@ -50,7 +52,7 @@ def watch(
 
 
 def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: float) -> None:
-    """End process groups, step by step."""
+    """Terminate process groups with SIGINT, SIGTERM and SIGKILL, in this order."""
     left = group
     for name, seconds in (("SIGINT", interrupt_seconds), ("SIGTERM", terminate_seconds)):
         left = [pid for pid in left if send(pid, name)]
@@ -59,16 +61,16 @@ def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: fl
             time.sleep(0.02)
             left = [pid for pid in left if is_running(pid)]
     for pid in group:
-        # With what a node left behind in its group.
+        # Also kills the processes that a node left behind in its group.
         send(pid, "SIGKILL")
 
 
 def send(pid: int, name: str) -> bool:
-    """Send a signal to a process group; return whether there was one."""
+    """Send a signal to a process group; return whether the group exists."""
     if sys.platform == "win32":
         import subprocess
 
-        # No signal reaches a process of another console: it is ended, with all that it started.
+        # A process in another console receives no signals, so kill it with all of its descendants.
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
         return False
     try:
@@ -79,7 +81,7 @@ def send(pid: int, name: str) -> bool:
 
 
 def is_running(pid: int) -> bool:
-    """Return whether the first process of a group runs; a zombie does not."""
+    """Return whether the first process of a group runs; a zombie counts as exited."""
     try:
         os.kill(pid, 0)
         with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
@@ -87,7 +89,7 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        # No /proc (macOS), whose first process reaps zombies immediately.
+        # There is no /proc on macOS, but its first process reaps zombies immediately.
         return True
 
 
@@ -98,6 +100,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Their numbers may be other processes' already.
+        # Other processes may already have these process ids.
         (lambda *_: None) if leaves_them else end_groups,
     )

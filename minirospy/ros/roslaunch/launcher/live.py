@@ -1,4 +1,4 @@
-"""`roslaunch --ui`: the nodes in a table that is redrawn twice a second."""
+"""`roslaunch --ui`: shows the nodes in a table that is redrawn twice a second."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MEGABYTE = 1024 * 1024
 
 
 class Row(NamedTuple):
-    """A node as the table shows it: CPU in percent of one core, memory in bytes, both with all that it started."""
+    """A node's row in the table: CPU in percent of one core and memory in bytes, both including its child processes."""
 
     name: str
     state: str
@@ -41,7 +41,7 @@ class Row(NamedTuple):
 
 
 class LiveTable:
-    """A context manager that shows a launcher's nodes on the terminal while it lasts."""
+    """A context manager that shows a launcher's nodes as a table on the terminal."""
 
     def __init__(self, launcher: Launcher, console: Console | None = None) -> None:
         self._launcher = launcher
@@ -63,7 +63,7 @@ class LiveTable:
         self._live.__exit__(kind, value, trace)
 
     def rows(self) -> list[Row]:
-        """Return the nodes as they are now."""
+        """Return the current rows, one per node."""
         return [self._row(process) for process in tuple(self._launcher.processes)]
 
     def _row(self, process: Process) -> Row:
@@ -86,7 +86,7 @@ class LiveTable:
         with contextlib.suppress(psutil.Error):
             top = psutil.Process(pid)
             for each in (top, *top.children(recursive=True)):
-                # psutil reports the share since the last call: so it has to be the same object.
+                # psutil reports the CPU load since the previous call on the same object, so keep the object.
                 known = self._known.setdefault(each.pid, each)
                 with contextlib.suppress(psutil.Error):
                     cpu += known.cpu_percent()
@@ -111,7 +111,7 @@ class LiveTable:
 
 
 def last_line(file: Path | None) -> str:
-    """Return the last line of a file that is not empty."""
+    """Return the last non-empty line of a file."""
     if file is None:
         return ""
     try:
@@ -125,5 +125,5 @@ def last_line(file: Path | None) -> str:
 
 
 def _plain(text: str) -> str:
-    """Without what a terminal, or rich, would take for an order."""
+    """Return the text without control characters and with rich's markup escaped."""
     return "".join(each for each in text if each.isprintable()).replace("[", r"\[")

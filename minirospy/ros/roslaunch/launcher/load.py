@@ -1,4 +1,4 @@
-"""Launch files -> LaunchSpec. Reads files, runs nothing but ``<param command=...>``.
+"""Load launch files into a LaunchSpec. Reads files, but runs nothing except ``<param command=...>``.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """
@@ -40,18 +40,18 @@ __all__ = [
 STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
 _MAX_INCLUDES = (
-    10_000  # files that a launch loads; 26 files that include the next one twice would be 67,108,863
+    10_000  # files per launch; a chain of 26 files that each include the next one twice would load 67,108,863
 )
 
 Problems = list[LaunchError]
 
 
 class _TooManyIncludesError(LaunchError):
-    """A launch that loads files without end."""
+    """A launch that includes too many files."""
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its text (None: it is read), and what its args are given."""
+    """A launch file, its text (None: read the file), and the values of its args."""
 
     file: str
     text: bytes | None
@@ -60,9 +60,9 @@ class LaunchSource(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """The settings that a tag inherits from those around it. ``private``: parameters of every node that follows.
+    """The settings that a tag inherits from the tags around it. ``private``: parameters of every node that follows.
 
-    ``machine`` is the default one. It alone is passed on to what follows the group or include that declares it, too.
+    ``machine`` is the default machine. It is the only setting that also applies after the group or include that declares it.
     """
 
     namespace: str = "/"
@@ -74,7 +74,7 @@ class _Scope:
 
 @dataclass
 class _Args:
-    """The args of a file: ``given`` by name, or ``passed`` on by a file that hands on all its own."""
+    """The args of a file: ``given`` by name, or ``passed`` by a file that includes it with ``pass_all_args``."""
 
     given: dict[str, str]
     passed: dict[str, str] = field(default_factory=dict)
@@ -85,14 +85,14 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files one after another, with ``args`` as on the command line. Raise LaunchError."""
+    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load one launch file from its text, as from standard input. Raise LaunchError."""
+    """Load one launch file from its text, for example from standard input. Raise LaunchError."""
     return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
@@ -102,7 +102,7 @@ def load_sources(
     environ: Mapping[str, str] | None = None,
     problems: Problems | None = None,
 ) -> LaunchSpec:
-    """Load launch files one after another. Faults are raised (LaunchError), or, with ``problems``, all put there."""
+    """Load launch files one after another. Raise LaunchError, or append all errors to ``problems`` if it is given."""
     spec = LaunchSpec()
     anonymous: dict[str, str] = {}
     used: set[str] = set()
@@ -117,7 +117,7 @@ def load_sources(
             reader.report(error)
 
     for name in used:
-        # An arg that is used is known, though no <arg> declares it.
+        # A used arg counts as known, even if no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
 
     _check_names(spec, problems)
@@ -126,7 +126,7 @@ def load_sources(
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
-    # A <test> may be called as a node: it is one only where its program makes it one.
+    # A <test> may have the name of a node: they conflict only if the test's program registers under that name.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
@@ -142,7 +142,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 class _File:
-    """Reads one file into the spec that all share. ``problems``: where faults go that are not to be raised."""
+    """Reads one file into the shared spec. ``problems``: list to which errors are appended; None: raise them."""
 
     def __init__(
         self,
@@ -187,13 +187,13 @@ class _File:
         return scope
 
     def report(self, error: LaunchError) -> None:
-        """Raise a fault, or collect it where all are wanted."""
+        """Raise an error, or append it to the collected ones."""
         if self._problems is None:
             raise error
         self._problems.append(error)
 
     def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
-        """Read a tag; return the scope of those after it."""
+        """Read a tag; return the scope for the tags after it."""
         reader = self._tags.get(tag.name)
         if reader is None or (allowed is not None and tag.name not in allowed):
             near = [] if reader else nearest(tag.name, allowed or self._tags)
@@ -204,11 +204,11 @@ class _File:
         tag.warn_of_attributes(self._spec.warnings.append)
         try:
             if tag.name == "arg" and not self._depth:
-                # Known, whether its `if` lets it be or not.
+                # The arg is known even if its `if` excludes it.
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # It ends the load: each file that is open would report it once for each of its includes.
+            # Abort the load: otherwise every open file would report the error once for each of its includes.
             raise
         except LaunchError as error:
             self.report(error)
@@ -242,7 +242,7 @@ class _File:
     def _group(self, tag: Tag, scope: _Scope) -> _Scope:
         inner = self._below(tag, scope)
         self._clear(tag, inner)
-        # An arg that a group declares ends with it.
+        # An arg that is declared in a group is valid only in it.
         declared, args = set(self._args.declared), dict(self._substitution.args)
         for child in tag.children():
             inner = self._read(child, inner)
@@ -277,7 +277,7 @@ class _File:
                 if name in given and not hands_on_all:
                     raise child.error(f"arg '{name}' has already been declared")
                 if value is None:
-                    # The value that is handed on goes before a default.
+                    # A value that is passed on takes precedence over a default.
                     value = given.get(name, passed.get(name, default))
                 if value is None:
                     raise child.error(f'<arg name="{name}"> of an <include> needs a value')
@@ -303,7 +303,7 @@ class _File:
         for key, name in zip(("from", "to"), pair, strict=True):
             if not names.is_legal_name(names.canonicalize(name)):
                 raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
-        # The last value of a name counts, and comes last.
+        # The last remap of a name wins, and is placed last.
         others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
         return replace(scope, remaps=(*others, pair))
 
@@ -360,7 +360,7 @@ class _File:
         return scope
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """All names in a node are its own, whatever they start with."""
+        """Store a parameter of a node as private to it, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -432,7 +432,7 @@ class _File:
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
-        """Return the attributes that ``<node>`` and ``<test>`` have in common."""
+        """Read the attributes that ``<node>`` and ``<test>`` share."""
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
             raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
@@ -501,11 +501,11 @@ class _File:
 
 
 def _folder(tag: Tag) -> str:
-    """Return the ``cwd`` of a node; "" where it is not there. Raise LaunchError."""
+    """Return the ``cwd`` of a node; "" if it is not set. Raise LaunchError."""
     text = tag.optional("cwd")
     if text is None:
         return ""
-    # ROS knows this one in lower case, too.
+    # ROS also accepts this value in lower case.
     return "ROS_HOME" if text == "ros_home" else tag.choice("cwd", ("ROS_HOME", "node"))
 
 

@@ -1,4 +1,4 @@
-"""The master of a launch: found or started, with its /run_id and the parameters of the launch file."""
+"""Finds or starts the master of a launch, and sets /run_id and the parameters of the launch file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 __all__ = ["CORE_PARAMETERS", "LaunchMaster"]
 
 CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_VERSION}
-"""Set at each launch, as in ROS."""
+"""Parameters that every launch sets, as in ROS."""
 
 _START_SECONDS = 60.0
 
@@ -28,7 +28,7 @@ _START_SECONDS = 60.0
 class LaunchMaster:
     """The master that the nodes of a launch use.
 
-    ``pause(seconds)`` waits, and raises KeyboardInterrupt if the run has been stopped meanwhile.
+    ``pause(seconds)`` waits, and raises KeyboardInterrupt if the run is stopped in the meantime.
     """
 
     def __init__(self, environment: Environment, output: Output, pause: Callable[[float], None]) -> None:
@@ -37,13 +37,12 @@ class LaunchMaster:
         self._pause = pause
         self._proxy = MasterProxy(environment.master_uri, "/roslaunch")
         self.run_id = ""
-        """The folder of the log files, and /run_id at the master."""
-        self.has_logs = True
-        """Whether log files can be written."""
+        """The name of the run's log folder, and the value of /run_id at the master."""
+        self.has_logs = True  # whether log files can be written
 
     @property
     def log_folder(self) -> Path:
-        """Where the log files of this run are."""
+        """The folder of this run's log files."""
         return self._environment.log_dir / self.run_id
 
     def is_online(self) -> bool:
@@ -55,16 +54,16 @@ class LaunchMaster:
         self._proxy.close()
 
     def wait(self) -> None:
-        """Wait until a master answers."""
+        """Wait until the master answers."""
         self._output.print("roscore/master is not yet running, will wait for it to start")
         while not self.is_online():
             self._pause(0.1)
         self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
-        """Start a master on this machine. Raise MasterUnreachableError if it belongs on another, MinirospyError."""
+        """Start a master on this machine. Raise MasterUnreachableError if its URI is another machine's, MinirospyError."""
         if not self._environment.master_is_local:
-            # Its error names what is wrong: a name without an address, a master that is suspended.
+            # Called for its error, which gives the reason: an unknown host name, a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -81,7 +80,7 @@ class LaunchMaster:
         return start_process("master", command, environ=os.environ)
 
     def wait_for_start(self, process: Process) -> None:
-        """Wait until a master that was started answers, and set its /run_id. Raise MinirospyError."""
+        """Wait until the started master answers, then set its /run_id. Raise MinirospyError."""
         end = time.monotonic() + _START_SECONDS
         while not self.is_online():
             if not process.is_running:
@@ -91,13 +90,13 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # That of a program that launches: the folder of its log files is named by it.
+            # The run id is given if a program launches: it names the folder of the log files.
             self._proxy.set_param("/run_id", self.run_id)
-        # A master that cannot write its log has said so itself.
+        # A master that cannot write its log has already printed a warning.
         self.find_run_id(warns=False)
 
     def find_run_id(self, *, warns: bool = True) -> None:
-        """Take over the master's /run_id, or set one, and open the log of roslaunch."""
+        """Use the master's /run_id, or set a new one, and open roslaunch's log file."""
         try:
             found = self._proxy.get_param("/run_id")
         except RpcError:
@@ -116,14 +115,14 @@ class LaunchMaster:
         try:
             self._output.print(f"... logging to {self._output.log_to(self.log_folder)}")
         except OSError as error:
-            # A disk that is full or read-only must not stop the nodes.
+            # A full or read-only disk must not stop the nodes.
             self.has_logs = False
             if warns:
                 why = error.strerror or error
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Set the parameters, after what <rosparam> commands and clear_params delete. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):
                 self._proxy.delete_param(namespace)

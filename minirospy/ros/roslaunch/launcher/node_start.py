@@ -1,4 +1,4 @@
-"""A NodeSpec -> the process of that node: its command, environment, working folder and log files."""
+"""Starts the process of a node from its NodeSpec: its command, environment, working folder and log files."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class NodeStarter:
         environ = node_environment(node, self._environment)
         screen = self._uses_screen(node)
         if not screen or not sys.stdout.isatty():
-            # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
-            # writes whole lines, which those of another node do not cut in two.
+            # Make a node's output appear immediately. On a terminal, Python flushes each line by itself, and writes
+            # whole lines, which the lines of other nodes do not interrupt.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 
@@ -56,7 +56,7 @@ class NodeStarter:
         return process
 
     def _made(self, folder: Path) -> Path:
-        """Return a node's folder, which is made; where ROS_HOME cannot be written to, the folder of temporary files."""
+        """Create a node's working folder and return it; return the temporary folder if ROS_HOME is not writable."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -72,7 +72,7 @@ class NodeStarter:
         return folder
 
     def _uses_screen(self, node: NodeSpec) -> bool:
-        """Return whether a node prints to the terminal instead of a file."""
+        """Return whether a node's output goes to the terminal instead of a file."""
         if not self._master.has_logs:
             return True
         return (self._options.screen or node.output == "screen") and not self._options.log

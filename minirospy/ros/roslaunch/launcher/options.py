@@ -13,9 +13,9 @@ __all__ = ["RunOptions"]
 class RunOptions:
     """The options for running a spec.
 
-    ``screen``, ``log``: where all output goes, in place of the file's settings; ``log_errors``: what nodes write to standard
-    error goes to their log file, too. ``required``: every node is. ``local``: nodes of other machines are not run.
-    ``strict``: a node that cannot be started ends it all. ``watch``: a node whose file changes is started again.
+    ``screen``, ``log``: send the output of all nodes there, whatever the launch file sets; ``log_errors``: also log the nodes'
+    stderr. ``required``: treat every node as required. ``local``: skip the nodes of other machines.
+    ``strict``: stop the launch if a node cannot be started. ``watch``: restart a node if its files change.
     ``name`` is shown in the terminal's title.
     """
 

@@ -1,4 +1,4 @@
-"""The lines of roslaunch itself: on the terminal with ROS's colours, and in its log file."""
+"""The messages of roslaunch: on the terminal in ROS's colours, and in its log file."""
 
 from __future__ import annotations
 
@@ -18,19 +18,18 @@ __all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
 _LARGE = 1024**3
-INFO, ERROR = 2, 8
-"""Levels as in rosgraph_msgs/Log."""
+INFO, ERROR = 2, 8  # levels of rosgraph_msgs/Log
 
 
 class Output:
-    """Prints lines on standard output and error; colours and titles where that is a terminal.
+    """Prints lines to stdout and stderr; adds colours and titles on a terminal.
 
-    ``listener`` gets (level, text) of each line, too: a roslaunch on another machine passes them to the one that
-    started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when a line is printed.
+    ``listener`` also receives (level, text) of each line: a child roslaunch sends them to its parent.
+    ``title``: whether the terminal's title may be set. ``has_color`` is decided when a line is printed.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """Functions of programs that get (level, text) of each line."""
+    """Functions of the user's program that receive (level, text) of each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -39,11 +38,11 @@ class Output:
         self._unlogged: list[str] = []
 
     def print(self, text: str = "", *, bold: bool = False) -> None:
-        """Print a line on standard output."""
+        """Print a line to stdout."""
         self._write(text, _BOLD if bold else "", INFO)
 
     def warn(self, text: str) -> None:
-        """Print a line on standard error, in red."""
+        """Print a line to stderr, in red."""
         self._write(text, _RED, ERROR)
 
     def title(self, text: str) -> None:
@@ -52,7 +51,7 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all lines, those before, too, into roslaunch-HOST-PID.log of ``folder``; its path. Raise OSError."""
+        """Write all lines, including earlier ones, to roslaunch-HOST-PID.log in ``folder``; return its path. Raise OSError."""
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -65,9 +64,9 @@ class Output:
 
     def _write(self, text: str, colour: str, level: int) -> None:
         stream = sys.stderr if level == ERROR else sys.stdout
-        # One write: nodes write to the same terminal.
+        # One write per line, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # The reader (`| head`) may have exited; the nodes are ended in order all the same.
+        # The reader (`| head`) may have exited; the nodes are still terminated in order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()
@@ -87,7 +86,7 @@ class Output:
 
 
 def warn_of_large_logs(folder: Path, output: Output) -> None:
-    """Say so where the log folder holds more than a gigabyte; it is looked at meanwhile, nothing waits for it."""
+    """Warn if the log folder has more than a gigabyte; its size is measured in the background."""
 
     def look() -> None:
         size = 0

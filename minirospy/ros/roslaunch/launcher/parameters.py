@@ -1,4 +1,4 @@
-"""``<param>`` and ``<rosparam>`` -> values. Reads files, and runs what ``<param command=...>`` says.
+"""Evaluate ``<param>`` and ``<rosparam>``. Reads files, and runs the commands of ``<param command=...>``.
 
 Source: http://wiki.ros.org/roslaunch/XML/param, http://wiki.ros.org/roslaunch/XML/rosparam.
 """
@@ -27,13 +27,11 @@ from minirospy.workspace.packages import Packages, built_in_roots, is_python
 __all__ = ["param_value", "rosparam_values"]
 
 _XACRO = ("xacro", "xacro.py")
-_STYLE = re.compile(r"\x1b\[[0-9;]*m")
-"""Colours of a terminal."""
+_STYLE = re.compile(r"\x1b\[[0-9;]*m")  # colours of a terminal
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-_ERRORS_KEPT = 65_536
-"""Bytes of a command's standard error in which the reason is looked for."""
+_ERRORS_KEPT = 65_536  # bytes at the end of a command's stderr in which the reason is searched
 _ERRORS_SECONDS = 1.0
-_MAX_VALUE = 64 * 1024 * 1024  # bytes of a file or a command's output: the master accepts no larger request
+_MAX_VALUE = 64 * 1024 * 1024  # bytes of a file or a command's output; the master accepts no larger request
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
@@ -64,7 +62,7 @@ def param_value(tag: Tag) -> object:
 
 
 def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, object]]:
-    """Return each single parameter that a ``<rosparam>`` loads, and its value. Raise LaunchError."""
+    """Yield each parameter that a ``<rosparam>`` loads, with its value. Raise LaunchError."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
     if tag.flag("subst_value"):
@@ -106,7 +104,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 
 
 def _output_of(tag: Tag, command: str) -> str:
-    """Return the output of a command, which is run without a shell."""
+    """Run a command without a shell; return its output."""
     try:
         status, output, reason = _run(_command_words(shlex.split(command)))
     except ValueError as error:
@@ -122,9 +120,9 @@ def _output_of(tag: Tag, command: str) -> str:
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:
-    """Run a command; return its status and output, and the line of its standard error that gives the reason.
+    """Run a command; return its status, its output, and the line of its stderr that gives the reason.
 
-    Standard error is passed on as it comes. A command that writes more than _MAX_VALUE bytes is killed.
+    Its stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
     end = bytearray()
     reading, writing = os.pipe()
@@ -140,42 +138,42 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
                 process.kill()
             status = process.wait()
         except BaseException:
-            # Ctrl-C, which the command may ignore.
+            # The command may ignore a Ctrl-C.
             process.kill()
             process.wait()
             raise
         finally:
-            # What the command has left running gets a broken pipe.
+            # Processes that the command left running get a broken pipe.
             process.stdout.close()
     finally:
         os.close(writing)
-        # What the command has left running may keep its end open.
+        # Processes that the command left running may keep the pipe open.
         reader.join(_ERRORS_SECONDS)
     return status, output, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
 
 
 def _reason(errors: str) -> str:
-    """Return the first line that says that it is an error, as xacro's do; else the last, as that of a traceback."""
+    """Return the first line with "error" in it, as xacro prints; else the last line, as of a traceback."""
     lines = [line.strip() for line in errors.splitlines() if line.strip()]
     return next((line for line in lines if _ERROR.search(line)), lines[-1] if lines else "")
 
 
 def _pass_on(reading: int, end: bytearray) -> None:
-    """Copy what comes to standard error, until it is closed; keep its ``end``."""
+    """Copy the pipe to stderr until it is closed; keep the last bytes in ``end``."""
     with open(reading, "rb", buffering=0) as pipe:
         while chunk := pipe.read(_ERRORS_KEPT):
             end += chunk
             del end[:-_ERRORS_KEPT]
-            # Without a standard error, another file may have its number.
+            # Without stderr, another file may use descriptor 2.
             if sys.__stderr__ is not None:
                 with contextlib.suppress(OSError), open(2, "wb", closefd=False) as errors:
                     errors.write(chunk)
 
 
 def _command_words(words: list[str]) -> list[str]:
-    """Return the words that run a command: a package's Python program by this interpreter, as its nodes are; xacro as ours.
+    """Return the command to run: this interpreter for a package's Python program, as for nodes; minirospy's xacro for xacro.
 
-    So a launch file finds xacro also if no virtual environment is active, and never that of ROS 2.
+    So a launch file finds xacro even if no virtual environment is active, and never the xacro of ROS 2.
     """
     if not words:
         return words

@@ -1,4 +1,4 @@
-"""Processes that roslaunch starts: in separate process groups, terminated step by step, and never left behind."""
+"""The processes that roslaunch starts: in separate process groups, terminated in steps, and never left behind."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WINDOWS = sys.platform == "win32"
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Seconds that a process has to end after SIGINT, and then after SIGTERM."""
+    """Seconds to wait for a process to exit after SIGINT, and then after SIGTERM."""
 
     interrupt: float = 15.0
     terminate: float = 2.0
@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A process that was started, for ``node`` where it is one. ``starts``: how often it was started."""
+    """A started process; ``node`` is None for the master. ``starts``: how often it was started."""
 
     name: str
     command: Sequence[str]
@@ -45,11 +45,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False
-    """It was ended on request: its exit is not reported."""
+    is_ending: bool = False  # its exit was requested, so it is not reported
 
-    is_restarting: bool = False
-    """It is to be started again when it has ended, because its file changed."""
+    is_restarting: bool = False  # it is restarted after its exit, because its file changed
 
     @property
     def pid(self) -> int:
@@ -58,12 +56,12 @@ class Process:
 
     @property
     def exit_code(self) -> int | None:
-        """The exit status, as in subprocess; None while it runs."""
+        """The exit status, as in subprocess; None while the process runs."""
         return self.popen.poll()
 
     @property
     def is_running(self) -> bool:
-        """Return whether it has not exited."""
+        """Return whether the process runs."""
         return self.popen.poll() is None
 
 
@@ -75,10 +73,10 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Is notified of each process that starts and ends; where this process is killed, it ends those that are left.
+    """Is notified when processes start and exit; if roslaunch is killed, it terminates the remaining ones.
 
-    On Windows the system ends them (`minirospy.base.child_lifetime`). There a guardian only unregisters nodes, from a master that
-    this launch has not started, and else no process is started for it.
+    On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
+    master that this launch did not start; otherwise its process is not started.
     """
 
     def __init__(self, timeouts: Timeouts, master_uri: str) -> None:
@@ -90,7 +88,7 @@ class Guardian:
         self._popen = None if self._children.is_guarded else self._start()
 
     def add(self, process: Process) -> None:
-        """Report a process that has started."""
+        """Report the start of a process."""
         if process.node is None:
             self._has_master = True
         elif self._popen is None and not self._has_master:
@@ -98,11 +96,11 @@ class Guardian:
         self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
-        """Report a process that has exited."""
+        """Report the exit of a process."""
         self._write(f"-{process.pid}\n")
 
     def close(self) -> None:
-        """End the guardian: no process is left. Idempotent."""
+        """Stop the guardian after all processes have exited. Idempotent."""
         if self._popen:
             with self._guard, contextlib.suppress(OSError):
                 if self._popen.stdin:
@@ -111,7 +109,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A process that is killed just while it starts one outside of its job leaves that one behind, suspended.
+        # A process that is killed while it starts a process outside its job leaves that one behind, suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -123,7 +121,7 @@ class Guardian:
     def _write(self, line: str) -> None:
         if self._popen is None:
             return
-        # Without a guardian (it was killed) all goes on.
+        # If the guardian was killed, the launch continues without it.
         with self._guard, contextlib.suppress(OSError, ValueError):
             assert self._popen.stdin
             self._popen.stdin.write(line.encode())
@@ -141,7 +139,7 @@ def start_process(
     stdin: int | None = subprocess.DEVNULL,
     stdout: int | None = None,
 ) -> Process:
-    """Start a process. Its output goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
+    """Start a process. Its stdout (and its stderr, with ``log_errors``) goes to ``stdout_file``, or is inherited.
 
     Raise MinirospyError.
     """
@@ -164,7 +162,7 @@ def start_process(
 def end_processes(
     processes: Sequence[Process], timeouts: Timeouts, warn: Callable[[str], None]
 ) -> list[Process]:
-    """Send SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; return those that SIGKILL ended."""
+    """Send SIGINT, then SIGTERM, then SIGKILL, until all have exited; return the processes that needed SIGKILL."""
     steps = (
         (_interrupt, timeouts.interrupt, ""),
         (_terminate, timeouts.terminate, "escalating to SIGTERM"),
@@ -181,7 +179,7 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # It fails where the process has exited, or on Windows without a console: there is nothing to wait for.
+            # Fails if the process has exited, or on Windows without a console: then there is nothing to wait for.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -192,14 +190,14 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Processes that a node started and left behind, in its group.
+            # Kills the processes that a node left behind in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed
 
 
 def _own_group() -> _Group:
-    """Return the options of a process that a Ctrl-C in the terminal does not reach: roslaunch ends its nodes in order."""
+    """Return options that shield a process from Ctrl-C in the terminal: roslaunch terminates its nodes in order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}
@@ -234,7 +232,7 @@ def _terminate(popen: subprocess.Popen[bytes]) -> None:
 
 
 def _kill(popen: subprocess.Popen[bytes]) -> None:
-    """Kill the process and all that it started."""
+    """Kill the process and its descendants."""
     import psutil
 
     with contextlib.suppress(psutil.Error):

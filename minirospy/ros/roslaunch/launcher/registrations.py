@@ -1,7 +1,7 @@
-"""Registrations that dead nodes leave with the master: removed by the roslaunch that ran them.
+"""Removes the registrations that exited nodes leave at the master.
 
-A program, too: ``python -m minirospy.ros.roslaunch.launcher.registrations MASTER_URI NODE ...``, for the
-guardian of a killed roslaunch.
+Also a program, for the guardian of a killed roslaunch:
+``python -m minirospy.ros.roslaunch.launcher.registrations MASTER_URI NODE ...``.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-_ANSWER_SECONDS = 5.0
-"""A process of this machine that has exited refuses immediately: only one that hangs takes this long."""
+_ANSWER_SECONDS = 5.0  # seconds; an exited process on this machine refuses immediately, so only a hanging one takes this long
 
 _AT_ONCE = 16
 
 
 class DeadNodes:
-    """Unregisters nodes whose processes have exited, in a thread: one pass for all that exited meanwhile."""
+    """Unregisters nodes whose processes have exited, in a thread; one pass handles all that exited since the last."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -35,14 +34,14 @@ class DeadNodes:
         self._thread: threading.Thread | None = None
 
     def add(self, node: str) -> None:
-        """Unregister a node (global name) soon."""
+        """Schedule a node (global name) to be unregistered."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="dead-nodes", daemon=True)
             self._thread.start()
         self._exited.put(node)
 
     def close(self) -> None:
-        """Return when the nodes added so far are unregistered, or the master does not answer. Idempotent."""
+        """Wait until the added nodes are unregistered, or the master does not answer. Idempotent."""
         if self._thread:
             self._exited.put(None)
             self._thread.join()
@@ -60,10 +59,10 @@ class DeadNodes:
 
 
 def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
-    """Unregister those of ``nodes`` (global names) that have exited; their names.
+    """Unregister those of ``nodes`` (global names) that have exited; return their names.
 
-    A new node of one of the names, and a node that lives or hangs, keep their registrations. A master that does not
-    answer is left alone.
+    A new node with one of these names, and a node that runs or hangs, keep their registrations. If the master does not
+    answer, nothing is changed.
     """
     if not nodes:
         return []
@@ -79,7 +78,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Unregister; ``argv``: the master's URI, and the names of the nodes."""
+    """Unregister nodes; ``argv`` has the master's URI and the nodes' names."""
     unregister_dead(argv[0], argv[1:])
     return 0
 

@@ -1,7 +1,7 @@
-"""Nodes on other machines: a roslaunch there for each, started by ssh, that runs its part and reports what happens.
+"""Nodes on other machines: ssh starts a roslaunch on each machine, which runs its nodes and reports events.
 
-The calls between the two are those of ROS 1, so that either end may be a real roslaunch: the child calls
-``register``, ``log`` and ``process_died`` of the parent, the parent ``launch`` and ``shutdown`` of the child.
+The calls between the two are those of ROS 1, so either of them may be a real roslaunch: the child calls
+``register``, ``log`` and ``process_died`` of the parent; the parent calls ``launch`` and ``shutdown`` of the child.
 Source: http://wiki.ros.org/roslaunch/Architecture, http://wiki.ros.org/roslaunch/XML/machine.
 """
 
@@ -36,10 +36,10 @@ _SHUTDOWN_SECONDS = 5.0
 
 
 class Monitor(Protocol):
-    """The services that the remote part needs of the launcher."""
+    """The part of the launcher that the remote machines use."""
 
     def guard(self, process: Process) -> None:
-        """Have a process ended where this one is killed."""
+        """Terminate a process if roslaunch is killed."""
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
         """Report that a process on another machine has exited."""
@@ -49,7 +49,7 @@ Method = Callable[..., object]
 
 
 class Api:
-    """XML-RPC methods served in a thread: ``{name: function}``, run in workers; answers are wrapped as ROS does."""
+    """XML-RPC methods served in a thread: ``{name: function}``, run in workers; return values are wrapped as in ROS."""
 
     def __init__(self, environment: Environment, methods: Mapping[str, Method]) -> None:
         self._methods = dict(methods)
@@ -64,7 +64,7 @@ class Api:
         self.uri = f"http://{environment.uri_host}:{self._server.port}/"
 
     def close(self) -> None:
-        """Stop answering. Idempotent."""
+        """Stop the server. Idempotent."""
         with contextlib.suppress(TimeoutError, RuntimeError):
             self._loop.run(self._server.close(), 2.0)
         self._loop.close()
@@ -103,7 +103,7 @@ class _Child:
     has_registered: threading.Event = field(default_factory=threading.Event)
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
-    """Processes that have ended: perhaps before it was known that they had started."""
+    """Exited processes; a process may exit before ``launch`` has returned that it started."""
 
 
 class RemoteMachines:
@@ -122,7 +122,7 @@ class RemoteMachines:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a node of another machine runs."""
+        """Return whether a node runs on another machine."""
         return any(child.running and child.ssh.is_running for child in self._children.values())
 
     def start(self, nodes: Sequence[tuple[NodeSpec, MachineSpec]]) -> None:
@@ -161,7 +161,7 @@ class RemoteMachines:
             self._launch(child)
 
     def close(self) -> None:
-        """End the nodes and the roslaunches of the other machines. Idempotent."""
+        """Terminate the nodes and the roslaunches on the other machines. Idempotent."""
         for child in self._children.values():
             self._output.print(f"[{child.name}] killing on exit")
         threads = [
@@ -236,7 +236,7 @@ class RemoteMachines:
         except (RpcError, ValueError) as error:
             text = f"remote roslaunch child [{child.name}] cannot launch its nodes: {error}"
             raise LaunchError(machine.file, machine.line, text) from None
-        # As "Process<name-1>" of a real roslaunch.
+        # A real roslaunch answers "Process<name-1>".
         child.running |= {name.removeprefix("Process<").removesuffix(">") for name in succeeded}
         child.running -= child.ended
         for name in failed:

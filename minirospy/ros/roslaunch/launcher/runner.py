@@ -1,7 +1,7 @@
-"""A LaunchSpec -> running nodes: starts them, watches them, ends them.
+"""Runs a LaunchSpec: starts, watches and terminates its nodes.
 
 The parts are in separate files: the master (``master.py``), the process of a node (``node_start.py``), the run
-(``supervisor.py``), other machines (``remote.py``), the end (``process.py``, ``registrations.py``).
+(``supervisor.py``), other machines (``remote.py``), termination (``process.py``, ``registrations.py``).
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/roslaunch/Architecture.
 """
 
@@ -38,10 +38,10 @@ __all__ = ["Launcher", "RunOptions"]
 
 
 class Launcher:
-    """Runs what a spec says until all nodes have exited or a caller stops it."""
+    """Runs the nodes of a spec until all have exited or a caller stops them."""
 
     _numbers: ClassVar[Iterator[int]] = itertools.count(1)
-    """Of the processes, so that no two that one program launches have a name, and log files, in common."""
+    """Numbers the processes of all launches of this program, so that their names and log files are unique."""
 
     def __init__(
         self,
@@ -79,12 +79,12 @@ class Launcher:
 
     @property
     def processes(self) -> list[Process]:
-        """The nodes that were started and are watched, those that wait to be started again included."""
+        """The started nodes that are watched, including those that wait for a restart."""
         return self.supervisor.processes
 
     @property
     def run_id(self) -> str:
-        """The folder of the log files, and /run_id at the master."""
+        """The name of the run's log folder, and the value of /run_id at the master."""
         return self._master.run_id
 
     @run_id.setter
@@ -92,7 +92,7 @@ class Launcher:
         self._master.run_id = run_id
 
     def run(self, *, wait: bool = False) -> int:
-        """Run until the end; return the exit status: 0, or 1 where a required node died of a fault.
+        """Run until the launch is over; return the exit status: 0, or 1 if a required node failed.
 
         ``wait``: wait for a master instead of starting one. Raise LaunchError, MasterUnreachableError.
         """
@@ -110,7 +110,7 @@ class Launcher:
     def start(self, *, wait: bool = False) -> None:
         """Show the summary, find or start a master, set the parameters, start the nodes.
 
-        Raise LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt where it was stopped meanwhile.
+        Raise LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt if it is stopped in the meantime.
         """
         here, elsewhere = self._nodes()
         self._check(here, elsewhere)
@@ -131,7 +131,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # As in ROS, where /rosout is the first process of a master that roslaunch started.
+            # In ROS, the first process of a master that roslaunch started is /rosout.
             next(self._numbers)
 
         self.set_parameters()
@@ -141,15 +141,15 @@ class Launcher:
             self.start_node(node)
 
     def set_parameters(self) -> None:
-        """Set the parameters, after what <rosparam> commands and clear_params delete. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
         self._master.set_parameters(self._spec)
 
     def process_name(self, node: NodeSpec) -> str:
-        """Return a new name for a process of a node: that of the node, and a number."""
+        """Return a new process name for a node: the node's name and a number."""
         return f"{node.name.lstrip('/')}-{next(self._numbers)}"
 
     def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
-        """Start a node, as the process ``name`` (a new one, if empty); None, and a warning, where that fails."""
+        """Start a node as the process ``name`` (empty: a new name); warn and return None if that fails."""
         self._has_run = True
         try:
             process = self._start_process(node, name or self.process_name(node))
@@ -163,7 +163,7 @@ class Launcher:
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
-        """Return the nodes of this machine, and those of others. Raise LaunchError on an unknown machine."""
+        """Return the nodes of this machine and those of other machines. Raise LaunchError on an unknown machine."""
         here: list[NodeSpec] = []
         elsewhere: list[NodeSpec] = []
         for node in self._spec.nodes:
@@ -205,7 +205,7 @@ class Launcher:
                 self._output.warn(f"WARNING: {why}")
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the programs of nodes, but for those that are missing, which is reported when they are started."""
+        """Yield the programs of nodes, except missing ones, which are reported when the node is started."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])
@@ -238,11 +238,11 @@ class Launcher:
         return process
 
     def guard(self, process: Process) -> None:
-        """Have a process ended where this one is killed."""
+        """Terminate a process if roslaunch is killed."""
         self._ready_guardian().add(process)
 
     def _ready_guardian(self) -> Guardian:
-        """Return the guardian; called before a process starts, too, so that it is there from the first moment on."""
+        """Return the guardian. Called before a process starts, so that the guardian covers it from the beginning."""
         if self._guardian is None:
             self._guardian = Guardian(self._options.timeouts, self._environment.master_uri)
         return self._guardian
@@ -251,13 +251,13 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """The signal, or who called stop(), that ended the run; empty if the nodes ended it."""
+        """The signal or caller of stop() that stopped the run; empty if the nodes exited by themselves."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch the nodes until they, or a required one, have exited, or stop() was called; return the exit status.
+        """Watch the nodes until all, or a required one, have exited, or stop() was called; return the exit status.
 
-        ``forever``: also if no node is left.
+        ``forever``: continue even if no node is left.
         """
         if not forever and not self.supervisor.is_anything_left:
             self._output.print("No processes to monitor", bold=True)
@@ -269,11 +269,11 @@ class Launcher:
         return 0
 
     def stop(self, why: str) -> None:
-        """End the run; from any thread."""
+        """Stop the run; may be called from any thread."""
         self.supervisor.stop(why)
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """Report that a process on another machine has exited; from any thread."""
+        """Report that a process on another machine has exited; may be called from any thread."""
         self.supervisor.remote_ended(node, name, code)
 
     def _process_exited(self, process: Process) -> None:
@@ -284,12 +284,12 @@ class Launcher:
             self._on_end(process)
 
     def _on_end(self, process: Process) -> None:
-        """React to a node that has exited: for subclasses."""
+        """React to a node's exit; a hook for subclasses."""
 
     # --- ending
 
     def close(self) -> None:
-        """End all processes: the nodes, the last one first, then the master. Idempotent."""
+        """Terminate all processes: the nodes in reverse order, then the master. Idempotent."""
         if self._remote:
             self._remote.close()
             self._remote = None
@@ -323,13 +323,13 @@ class Launcher:
         self._master.close()
 
     def _end(self, processes: list[Process]) -> list[Process]:
-        """End processes; return those that needed SIGKILL."""
+        """Terminate processes; return those that needed SIGKILL."""
         for process in processes:
             self._output.print(f"[{process.name}] killing on exit")
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Unregister what nodes have left, unless the master ends with them."""
+        """Remove the registrations that nodes left, unless the master exits with them."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
@@ -337,7 +337,7 @@ class Launcher:
 
     @contextlib.contextmanager
     def signals(self) -> Iterator[None]:
-        """Let SIGINT, SIGTERM and SIGHUP stop the run, meanwhile (in the main thread)."""
+        """Let SIGINT, SIGTERM and SIGHUP stop the run inside the ``with`` block (main thread only)."""
 
         def on_signal(number: int, _: FrameType | None) -> None:
             self.stop(signal.Signals(number).name)
@@ -352,7 +352,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Return whether a machine is this one, and its user the present one."""
+    """Return whether a machine is this one, and its user the current one."""
     if machine.user:
         import getpass
 

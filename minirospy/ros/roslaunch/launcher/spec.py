@@ -13,10 +13,11 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` hold those of the groups around it too.
+    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of the enclosing groups.
 
-    ``name`` ends in a slash where a ``<test>`` has none: its parameters are in the namespace, and it is ``named()`` when it runs.
-    ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and ``ROS_HOME``.
+    ``name`` ends with a slash if a ``<test>`` has no name: its parameters are set in that namespace, and ``named()``
+    names it when
+    it runs. ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and ``ROS_HOME``.
     """
 
     name: str
@@ -42,19 +43,19 @@ class NodeSpec:
 
     @property
     def namespace(self) -> str:
-        """The namespace, with a slash at its end."""
+        """The namespace, with a trailing slash."""
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
-        """Return the node, with a generated unique name where it has none."""
+        """Return the node with a name: a generated unique one if it has none."""
         if self.base_name:
             return self
         base = "".join(c if c.isalnum() else "_" for c in self.type)
         return replace(self, name=f"{self.namespace}{anonymous_name(base)}")
 
     def to_xml(self) -> str:
-        """Return the equivalent ``<node>`` of a launch file; its machine is left out."""
-        # Not above: it costs more than all else that this room imports.
+        """Return the equivalent ``<node>`` of a launch file, without its machine."""
+        # Imported here because it takes longer to import than all other modules of roslaunch together.
         from xml.sax.saxutils import quoteattr
 
         attributes = {
@@ -79,7 +80,7 @@ class NodeSpec:
 
 @dataclass(frozen=True)
 class TestSpec:
-    """A ``<test>``, which rostest runs: its name in the results, its node, its limit in seconds, further tries."""
+    """A ``<test>`` for rostest: its name in the results, its node, its time limit in seconds, and its number of retries."""
 
     test_name: str
     node: NodeSpec
@@ -89,7 +90,7 @@ class TestSpec:
 
 @dataclass(frozen=True)
 class MachineSpec:
-    """A ``<machine>`` that nodes run on: where ssh finds it, and what sets up ROS there (``env_loader``)."""
+    """A ``<machine>`` on which nodes run: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
 
     name: str
     address: str
@@ -104,7 +105,7 @@ class MachineSpec:
 
 @dataclass(frozen=True)
 class ParameterCommand:
-    """A ``<rosparam>`` that deletes ``name`` (global) at the master, or dumps what is below it into ``file``."""
+    """A ``<rosparam>`` that deletes ``name`` (global) at the master, or dumps its namespace into ``file``."""
 
     name: str
     file: str | None = None
@@ -112,7 +113,7 @@ class ParameterCommand:
 
 @dataclass(frozen=True)
 class ArgDoc:
-    """An ``<arg>`` of the first file: its default (None if it is required), and its doc."""
+    """An ``<arg>`` of the first file: its default (None if it is required) and its doc."""
 
     name: str
     default: str | None
@@ -121,11 +122,11 @@ class ArgDoc:
 
 @dataclass
 class LaunchSpec:
-    """Everything that the files say together.
+    """The combined content of all files.
 
-    ``params``: name -> value; ``clear``: namespaces to delete; ``commands``: what is done at the parameter server
-    before the parameters are set; ``files``: those that were read, each once; ``includes``: (file, file that it
-    includes); ``args``: what the first file declares; ``machines``: by name; ``warnings``: what was passed over.
+    ``params``: name -> value; ``clear``: namespaces to delete; ``commands``: run at the parameter server
+    before the parameters are set; ``files``: the files that were read, each once; ``includes``: (file, included
+    file); ``args``: declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
     """
 
     nodes: list[NodeSpec] = field(default_factory=list)
@@ -140,16 +141,16 @@ class LaunchSpec:
     warnings: list[LaunchError] = field(default_factory=list)
 
     def runnables(self) -> Iterator[NodeSpec]:
-        """Return the nodes, and those that are tests."""
+        """Yield the nodes, then the nodes of tests."""
         yield from self.nodes
         yield from (test.node for test in self.tests)
 
     def named_runnables(self) -> Iterator[NodeSpec]:
-        """Return those that have a name before they run."""
+        """Yield the runnables that have a name before they run."""
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine that a node is to run on; None is this one. Raise LaunchError."""
+        """Return the machine on which the node runs; None means this one. Raise LaunchError."""
         name = node.machine
         if name in ("", "localhost"):
             return None

@@ -1,4 +1,4 @@
-"""Substitution arguments: ``$(find pkg)``, ``$(arg name)``, ``$(env VAR)`` and their kin; and values from texts.
+"""Substitution arguments such as ``$(find pkg)``, ``$(arg name)`` and ``$(env VAR)``; conversion of strings to values.
 
 Source: http://wiki.ros.org/roslaunch/XML#substitution_args.
 """
@@ -26,21 +26,21 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters that the substitutions of a load give; args of args double
-_MAX_SHOWN = 200  # characters of a text that an error shows
+_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters per load; args that repeat other args double the size
+_MAX_SHOWN = 200  # characters of a string that an error shows
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
 class SubstitutionError(ValueError):
-    """A substitution that cannot be made; the text says why."""
+    """A substitution that cannot be made; the message gives the reason."""
 
 
 @dataclass
 class Substitution:
-    """The values of the substitutions of one file.
+    """The values for the substitutions of one file.
 
-    ``used``: every arg that was used, in any file. ``unset``: args that are declared without a value, and why
-    that is an error where they are used.
+    ``used``: every arg that was used, in any file. ``unset``: args that are declared without a value, with the error
+    message for their use.
     """
 
     packages: Packages
@@ -51,10 +51,10 @@ class Substitution:
     used: set[str] = field(default_factory=set)
     unset: dict[str, str] = field(default_factory=dict)
     given: list[int] = field(default_factory=lambda: [0])
-    """The characters that substitutions have given so far, in all files of a load."""
+    """The number of characters that substitutions have produced, in all files of a load."""
 
     def apply(self, text: str) -> str:
-        """``text`` with every substitution made. Raise SubstitutionError, NotFoundError."""
+        """Return ``text`` with every substitution made. Raise SubstitutionError, NotFoundError."""
         if "$(" not in text:
             return text
         whole = _EVAL.match(text)
@@ -115,7 +115,7 @@ class Substitution:
         return self.environ.get(name, " ".join(default))
 
     def _optenv_value(self, name: str, default: object = "") -> object:
-        """Return what ``optenv()`` of an expression is: the variable's text, else the default itself, which may be a number."""
+        """Return the value of ``optenv()`` in an expression: the variable, else the default, which may be a number."""
         return self.environ.get(name, default)
 
     def _anon(self, name: str) -> str:
@@ -125,7 +125,10 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Return the text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
+        """Return the value of a Python expression as a string.
+
+        It runs any Python code, as ``<param command=...>`` runs any program.
+        """
         if "__" in expression:
             raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
 
@@ -155,7 +158,7 @@ def _shown(text: str) -> str:
 
 
 class _Names(dict[str, object]):
-    """The names of an expression: Python's, those of ``math``, then the args as values."""
+    """The names in an expression: Python's and those of ``math``, then the args' values."""
 
     def __init__(self, substitution: Substitution, known: dict[str, object]) -> None:
         super().__init__(known)
@@ -168,7 +171,7 @@ class _Names(dict[str, object]):
 
 
 def convert(text: str, type_: str) -> object:
-    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
     kind = type_.lower()
     if kind in ("", "auto"):
         return _guess(text)
@@ -200,7 +203,7 @@ def _guess(text: str) -> object:
     try:
         if "." in text:
             return float(text)
-        # As ROS has it: an int has no underscores, though Python's may.
+        # ROS rejects underscores in an int, although Python accepts them.
         if "_" not in text:
             return int(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The summary that roslaunch shows before it starts anything."""
+"""The summary that roslaunch prints before it starts any process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LONGEST = 20
 
 
 def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iterable[str]) -> str:
-    """Return the text between SUMMARY and the first process."""
+    """Return the text from SUMMARY up to the first process."""
     lines = ["", "SUMMARY", "========", ""]
     cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
     if cleared:

@@ -1,4 +1,4 @@
-"""The processes of a launch that run: watched, started again where they respawn, until the run is over."""
+"""Watches the processes of a launch, and restarts those with respawn, until the run is over."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1
-"""Shortest time between two starts of a node that exits immediately."""
+_RESPAWN_SECONDS = 0.1  # shortest interval between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds. The main thread, where signals arrive, waits in slices: one that arrives just before the wait starts, and on Windows
-any, is noticed only after it. Changed files and the processes on other machines are looked after in between."""
+"""Seconds. The main thread, where signals arrive, waits in slices: a signal just before the wait, and any signal on Windows,
+is noticed only after a slice. Changed files and processes on other machines are checked between slices.
+"""
 
 _BAR = "=" * 80
 
@@ -53,17 +53,17 @@ class _Stop(NamedTuple):
 
 
 class _NoMoreNodes(NamedTuple):
-    """No further node will be started: the run ends with those that there are."""
+    """No more nodes will be started: the run ends when the current ones have exited."""
 
 
 _Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
 
 
 class Supervisor:
-    """Watches processes. ``start(node, name)`` starts one again; ``on_exit(process)`` is called when one has exited.
+    """Watches processes. ``start(node, name)`` restarts one; ``on_exit(process)`` is called when one has exited.
 
-    ``files`` finds the nodes whose programs have changed, which are started again. ``is_remote_running()``: whether a
-    process on another machine runs. ``clock`` gives seconds.
+    ``files`` detects nodes whose programs have changed, to restart them. ``is_remote_running()`` returns whether a process
+    on another machine runs. ``clock`` returns seconds.
     """
 
     def __init__(
@@ -89,17 +89,17 @@ class Supervisor:
         self._restarts: list[tuple[float, Process]] = []
 
         self.on_change: Callable[[], object] = lambda: None
-        """Called from any thread after a process was started, has exited, or is being ended."""
+        """Called from any thread after a process has started, has exited, or is requested to exit."""
         self.processes: list[Process] = []
-        """The nodes that were started and are watched, those that wait to be started again included."""
+        """The started nodes that are watched, including those that wait for a restart."""
         self.master: Process | None = None
-        """The master, where this launch has started one."""
+        """The master, if this launch has started one."""
         self.stopped_by = ""
-        """The signal, or who called stop(), that ended the run; empty if the nodes ended it."""
+        """The signal or caller of stop() that stopped the run; empty if the nodes exited by themselves."""
 
     @property
     def is_anything_left(self) -> bool:
-        """Return whether a process runs, or waits to be started again."""
+        """Return whether a process runs or waits for a restart."""
         return bool(self.processes) or self.master is not None or self._is_remote_running()
 
     def add(self, process: Process) -> None:
@@ -109,12 +109,12 @@ class Supervisor:
         self.on_change()
 
     def add_master(self, process: Process) -> None:
-        """Watch a master: when it exits, the run is over."""
+        """Watch a master: the run is over when it exits."""
         self.master = process
         self._attend(process)
 
     def clear(self) -> None:
-        """Watch nothing any more."""
+        """Stop watching all processes."""
         self.processes.clear()
         self._restarts.clear()
         self.master = None
@@ -122,11 +122,11 @@ class Supervisor:
     # --- from any thread
 
     def stop(self, why: str) -> None:
-        """End the run."""
+        """Stop the run."""
         self._events.put(_Stop(why))
 
     def end_with_nodes(self) -> None:
-        """Have a watch(forever=True) end with the last node after all."""
+        """Make watch(forever=True) return after the last node."""
         self._events.put(_NoMoreNodes())
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
@@ -138,7 +138,7 @@ class Supervisor:
     def watch(self, *, forever: bool = False) -> int | None:
         """Watch until all processes, or a required one, have exited, or stop() was called.
 
-        Return the exit status; None if no process is left. ``forever``: go on where no process is left.
+        Return the exit status; None if no process is left. ``forever``: continue even if no process is left.
         """
         while forever or self.is_anything_left:
             event = self._next_event()
@@ -162,7 +162,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Wait. Raise KeyboardInterrupt if stop() is called meanwhile."""
+        """Wait. Raise KeyboardInterrupt if stop() is called in the meantime."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:
@@ -173,7 +173,7 @@ class Supervisor:
             raise KeyboardInterrupt
 
     def end_process(self, process: Process) -> None:
-        """End one process, and wait for that; it is not started again, unless its file has changed."""
+        """Terminate one process and wait for its exit; it is restarted only if its file has changed."""
         process.is_ending = True
         self.on_change()
         end_processes([process], self._timeouts, self._output.warn)
@@ -182,7 +182,7 @@ class Supervisor:
     # --- helpers
 
     def _attend(self, process: Process) -> None:
-        """Put an event when a process exits."""
+        """Wait in a thread for a process to exit, then put an event into the queue."""
 
         def wait() -> None:
             process.popen.wait()
@@ -191,7 +191,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return what happened; None after a while without events, when restarts and files have been looked after."""
+        """Return the next event; None after a slice without events, when due restarts and changed files have been handled."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))
@@ -208,7 +208,7 @@ class Supervisor:
         return None
 
     def _exited(self, process: Process) -> int | None:
-        """React to a process that has exited; return a status where the run is over."""
+        """React to the exit of a process; return an exit status if the run is over."""
         self._on_exit(process)
         if process is self.master:
             self.master = None
@@ -252,14 +252,14 @@ class Supervisor:
         return 0 if event.code == 0 else 1
 
     def _forget_restart(self, process: Process) -> None:
-        """Watch a process that has been ended, and waits to be started again, no more."""
+        """Stop watching a process that was terminated while it waited for a restart."""
         others = [each for each in self._restarts if each[1] is not process]
         if len(others) < len(self._restarts) and not process.is_restarting:
             self._restarts = others
             self.processes.remove(process)
 
     def _restart(self, process: Process) -> None:
-        """Start a node that has exited again, in its place among the others."""
+        """Restart an exited node, at its place in the list of processes."""
         node = process.node
         assert node
         if process.is_ending and not process.is_restarting:

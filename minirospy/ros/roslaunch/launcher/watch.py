@@ -1,4 +1,4 @@
-"""Which nodes' files have changed: of `roslaunch --watch`."""
+"""Detect changed files of nodes, for `roslaunch --watch`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["FileWatch"]
 
 
 class FileWatch:
-    """Looks at a node's program, and at the Python modules in ``src`` of its package."""
+    """Checks a node's program, and the Python modules in ``src`` of its package."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
@@ -27,7 +27,7 @@ class FileWatch:
         """Return a file that has changed since the node was added, or since the last call."""
         before, now = self._seen.get(node.name, {}), self._times(node)
         self._seen[node.name] = now
-        # A file that is missing is most often being rewritten.
+        # A missing file is most likely being rewritten, so it does not count as changed.
         return next((path for path, when in now.items() if before.get(path) != when), None)
 
     def _times(self, node: NodeSpec) -> dict[Path, int]:

@@ -1,4 +1,4 @@
-"""Launch files as programs see them: the classes of roslaunch.core and roslaunch.config, over a LaunchSpec.
+"""The classes of roslaunch.core and roslaunch.config, which give programs the content of launch files from a LaunchSpec.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 LaunchFile = str | tuple[str, Sequence[str]]
-"""A launch file, or one with its arguments ``["name:=value", ...]``."""
+"""A launch file, or a launch file with its arguments ``["name:=value", ...]``."""
 
 
 class ROSLaunchConfig:
@@ -57,7 +57,7 @@ class ROSLaunchConfig:
         return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
-        """Add a node. Raise RLException if there is one of its name."""
+        """Add a node. Raise RLException if its name is already used."""
         if node.name and node.spec.name in self.resolved_node_names:
             raise RLException(
                 f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
@@ -71,16 +71,16 @@ class ROSLaunchConfig:
         self.tests.append(test)
 
     def add_roslaunch_file(self, f: str) -> None:
-        """Add a file to those that were read."""
+        """Add a file to the list of files that were read."""
         if f not in self.roslaunch_files:
             self.roslaunch_files.append(f)
 
     def set_master(self, m: Master) -> None:
-        """Set the master that nodes are started with."""
+        """Set the master for the nodes."""
         self.master = m
 
     def assign_machines(self) -> None:
-        """Set ``machine`` of each node to the one of its ``machine_name``. Raise RLException."""
+        """Set each node's ``machine`` from its ``machine_name``. Raise RLException."""
         spec = self.spec
         for node in (*self.nodes, *self.tests):
             try:
@@ -90,29 +90,29 @@ class ROSLaunchConfig:
             node.machine = self.machines[found.name if found else ""]
 
     def has_remote_nodes(self) -> bool:
-        """Return whether a node runs on another machine, as assign_machines() found."""
+        """Return whether a node runs on another machine, as found by assign_machines()."""
         nodes = (*self.nodes, *self.tests)
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """Return what roslaunch shows before it starts anything."""
+        """Return the summary that roslaunch prints before it starts any process."""
         return summary(
             self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.spec.clear
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
-        """Add a parameter; one below another is an error of the configuration."""
+        """Add a parameter; a parameter below another one is a configuration error."""
         for parent in namespaces_of(p.key):
             if parent in self.params:
                 self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
         self.params[p.key] = p
 
     def add_clear_param(self, param: str) -> None:
-        """Delete a namespace before the parameters are set."""
+        """Add a namespace that is deleted before the parameters are set."""
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> bool:
-        """Add a machine; False if the same is there already. Raise RLException if another of its name is."""
+        """Add a machine; return False if it was already added. Raise RLException if another has its name."""
         if m.name not in self.machines:
             self.machines[m.name] = m
             return True
@@ -121,7 +121,7 @@ class ROSLaunchConfig:
         return False
 
     def add_config_error(self, msg: str) -> None:
-        """Add a warning."""
+        """Add a configuration error, which is printed as a warning."""
         self.config_errors.append(msg)
 
     def add(self, spec: LaunchSpec) -> None:
@@ -143,7 +143,7 @@ class ROSLaunchConfig:
 
     @property
     def spec(self) -> LaunchSpec:
-        """All of it, as it is run."""
+        """The whole configuration as a LaunchSpec, for running."""
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
             params={name: _as_sent(param.value) for name, param in self.params.items()},
@@ -164,7 +164,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """Return the configuration of launch files and texts together. Raise RLException."""
+    """Return the combined configuration of launch files and strings. Raise RLException."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()
@@ -185,12 +185,12 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """Return the launch file of the master's own nodes: None, as there are none."""
+    """Return the launch file of the master's own nodes: always None, as there are none."""
     return None
 
 
 def _as_read(value: object) -> object:
-    """Return a parameter's value as programs see it: the content of a file is an xmlrpc.client.Binary."""
+    """Return a parameter's value as programs see it: a file's content becomes an xmlrpc.client.Binary."""
     if not isinstance(value, bytes):
         return value
     from xmlrpc.client import Binary

@@ -48,8 +48,7 @@ __all__ = [
 
 PHASE_SETUP, PHASE_RUN, PHASE_TEARDOWN = "setup", "run", "teardown"
 
-TEST_TIME_LIMIT_DEFAULT = 60
-"""Seconds that a <test> has."""
+TEST_TIME_LIMIT_DEFAULT = 60  # seconds, for a <test> without a time limit
 
 
 class RLException(Exception):
@@ -57,7 +56,7 @@ class RLException(Exception):
 
 
 class Master:
-    """The master that nodes are started with; ``uri`` is that of the environment where none is given."""
+    """The master for the nodes; ``uri`` defaults to the environment's."""
 
     ROSMASTER = "rosmaster"
 
@@ -68,19 +67,19 @@ class Master:
 
     @property
     def environment(self) -> Environment:
-        """The environment with this master."""
+        """The environment with this master's URI."""
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the host of its URI. Raise ValueError on one that is not a URL."""
+        """Return the host of the URI. Raise ValueError if it is not a URL."""
         return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the port of its URI, 80 where it has none. Raise ValueError on one that is not a URL."""
+        """Return the port of the URI; 80 if it has none. Raise ValueError if it is not a URL."""
         return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
-        """Return an xmlrpc.client.ServerProxy for its calls."""
+        """Return an xmlrpc.client.ServerProxy for the master."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.uri)
@@ -92,7 +91,7 @@ class Master:
         return MultiCall(self.get())
 
     def is_running(self) -> bool:
-        """Return whether it answers."""
+        """Return whether the master answers."""
         with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
             return proxy.is_online()
 
@@ -147,21 +146,21 @@ class Machine:
 
     @property
     def spec(self) -> MachineSpec:
-        """As a launch file says it."""
+        """Return the machine as a launch file declares it."""
         return MachineSpec(
             self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
             self.timeout,
         )  # fmt: skip
 
     def config_key(self) -> str:
-        """Return a text that is the same for machines that are reached and set up alike."""
+        """Return a key that is equal for machines with the same address and setup."""
         return (
             f"Machine(address[{self.address}] env_loader[{self.env_loader}] ssh_port[{self.ssh_port}] "
             f"user[{self.user or ''}] password[{self.password or ''}] timeout[{self.timeout}])"
         )
 
     def config_equals(self, m2: object) -> bool:
-        """Return whether another machine is reached and set up alike, whatever its name."""
+        """Return whether another machine has the same address and setup, whatever its name."""
         return isinstance(m2, Machine) and self.config_key() == m2.config_key()
 
     def __eq__(self, other: object) -> bool:
@@ -183,12 +182,12 @@ class Machine:
 
 @functools.cache
 def local_machine() -> Machine:
-    """Return this machine, the same object each time."""
+    """Return this machine; always the same object."""
     return Machine("", "localhost")
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raise RLException on an address that is not found."""
+    """Return whether a machine is this one. Raise RLException if its address cannot be resolved."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:
@@ -197,7 +196,7 @@ def is_machine_local(machine: Machine) -> bool:
 
 
 class Node:
-    """A node to be launched. One without a ``name`` gets a new one when it is."""
+    """A node to launch. A node without a ``name`` gets a generated one when it is launched."""
 
     def __init__(
         self,
@@ -254,7 +253,7 @@ class Node:
 
     @classmethod
     def of(cls, spec: NodeSpec) -> Node:
-        """Return the node of a launch file."""
+        """Return the node that a launch file declares."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
             spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
@@ -262,15 +261,15 @@ class Node:
         )  # fmt: skip
 
     def give_name(self) -> None:
-        """Generate a unique name, where it has none."""
+        """Generate a unique name if the node has none."""
         self.name = self.spec.named().base_name
 
     def xmltype(self) -> str:
-        """Return the name of its tag."""
+        """Return the tag's name."""
         return "node"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) of its tag's attributes, those that are unset with None."""
+        """Return (name, value) of the tag's attributes; None for unset ones."""
         return [
             *self._placed(),
             ("respawn", self.respawn),
@@ -279,11 +278,11 @@ class Node:
         ]
 
     def to_xml(self) -> str:
-        """Return the node as the text of a launch file."""
+        """Return the node in launch-file syntax."""
         return self._as_tag(self.xmlattrs())
 
     def to_remote_xml(self) -> str:
-        """Return the same without its machine."""
+        """Return the node in launch-file syntax, without its machine."""
         return self._as_tag([each for each in self.xmlattrs() if each[0] != "machine"])
 
     def _placed(self) -> list[tuple[str, object]]:
@@ -306,7 +305,7 @@ class Node:
 
     @property
     def spec(self) -> NodeSpec:
-        """As a launch file says it."""
+        """Return the node as a launch file declares it."""
         return NodeSpec(
             name=f"{self.namespace}{self.name or ''}",
             package=self.package,
@@ -360,11 +359,11 @@ class Test(Node):
         self.retry = retry or 0
 
     def xmltype(self) -> str:
-        """Return the name of its tag."""
+        """Return the tag's name."""
         return "test"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) of its tag's attributes: retry and time-limit where they are not the default."""
+        """Return (name, value) of the tag's attributes, with retry and time-limit if they are not the default."""
         attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
         if self.retry:
             attributes.append(("retry", str(self.retry)))
@@ -374,7 +373,7 @@ class Test(Node):
 
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
-        """Return the test of a launch file."""
+        """Return the test that a launch file declares."""
         node = spec.node
         return cls(
             spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
@@ -394,7 +393,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Receives the lines of one kind: errors, or all others."""
+    """Receives the lines of one kind: either errors or all others."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function
@@ -406,22 +405,22 @@ class _Handler:
 
 
 def add_printlog_handler(h: Callable[[str], object]) -> None:
-    """Call a function with each line that roslaunch writes to standard output."""
+    """Add a function that is called with each line that roslaunch writes to stdout."""
     Output.handlers.append(_Handler(h, errors=False))
 
 
 def add_printerrlog_handler(h: Callable[[str], object]) -> None:
-    """Call a function with each line that roslaunch writes to standard error."""
+    """Add a function that is called with each line that roslaunch writes to stderr."""
     Output.handlers.append(_Handler(h, errors=True))
 
 
 def clear_printlog_handlers() -> None:
-    """Forget the functions of add_printlog_handler()."""
+    """Remove the functions of add_printlog_handler()."""
     _clear(errors=False)
 
 
 def clear_printerrlog_handlers() -> None:
-    """Forget the functions of add_printerrlog_handler()."""
+    """Remove the functions of add_printerrlog_handler()."""
     _clear(errors=True)
 
 
@@ -431,30 +430,30 @@ def generate_run_id() -> str:
 
 
 def get_master_uri_env() -> str:
-    """Return the master's URI, as the environment has it."""
+    """Return the master's URI from the environment."""
     return Environment.read().master_uri
 
 
 def setup_env(
     node: Node | None, machine: Machine, master_uri: str, env: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Return the environment of a node's process, on ``env`` (of this process, where none is given)."""
+    """Return the environment of a node's process, based on ``env`` (default: this process's)."""
     environment = Environment.read()._replace(master_uri=master_uri)
     return node_environment((node or Node("p", "t", "n")).spec, environment, env)
 
 
 def printlog(msg: str) -> None:
-    """Print a line to standard output."""
+    """Print a line to stdout."""
     Output().print(msg)
 
 
 def printlog_bold(msg: str) -> None:
-    """Print a line to standard output, bold on a terminal."""
+    """Print a line to stdout, bold on a terminal."""
     Output().print(msg, bold=True)
 
 
 def printerrlog(msg: str) -> None:
-    """Print a line to standard error, red on a terminal."""
+    """Print a line to stderr, red on a terminal."""
     Output().warn(msg)
 
 

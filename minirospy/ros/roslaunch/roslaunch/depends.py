@@ -1,4 +1,4 @@
-"""roslaunch.depends: what launch files need."""
+"""roslaunch.depends: the dependencies of launch files."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """Return the package of the first file, what each file needs, and the packages that no package.xml names, by package.
+    """Return the first file's package, each file's dependencies, and, by package, those that its package.xml does not declare.
 
     Raise RoslaunchDepsException.
     """

@@ -1,4 +1,4 @@
-"""roslaunch.launch: run a configuration that the program has made."""
+"""roslaunch.launch: run a configuration that a program has built."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 class RLTestTimeoutException(RLException):
-    """A test has taken longer than its time limit."""
+    """A test has exceeded its time limit."""
 
 
 class ROSLaunchRunner:
-    """Runs a configuration while the program goes on. Errors are RLException."""
+    """Runs a configuration in the background. Errors are RLException."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class ROSLaunchRunner:
         self.pm: ProcessMonitor | None = ProcessMonitor(self._launcher)
 
     def launch(self) -> tuple[list[str], list[str]]:
-        """Start everything; the names of the processes that were started, and those of the nodes that were not.
+        """Start everything; return the names of the started processes and of the nodes that failed to start.
 
         Raise RLException.
         """
@@ -101,12 +101,12 @@ class ROSLaunchRunner:
             monitor.close()
             raise
         monitor.watch()
-        # Where the program ends without stop(), what it launched ends in order.
+        # If the program exits without stop(), the launched processes still terminate in order.
         atexit.register(self._end_with_program)
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start one more node: (its process, True), or (its name, False) where that cannot be. Raise RLException."""
+        """Start another node: return (its process, True), or (its name, False) if that fails. Raise RLException."""
         if self._monitor().done:
             raise RLException(f"cannot add process [{node.name}] after process monitor has been shut down")
         node.give_name()
@@ -116,7 +116,7 @@ class ROSLaunchRunner:
     def run_test(self, test: Test) -> bool:
         """Start a test and wait until it exits; return whether its status is 0.
 
-        Raise RLTestTimeoutException if it takes longer than its time limit, after which it is ended; RLException where
+        Raise RLTestTimeoutException if it exceeds its time limit, after it was terminated; RLException if
         it cannot be started.
         """
         process, has_started = self.launch_node(test)
@@ -132,18 +132,18 @@ class ROSLaunchRunner:
         return process.exit_code == 0
 
     def is_node_running(self, node: Node) -> bool:
-        """Return whether a node was started here, and runs."""
+        """Return whether a node was started by this runner and still runs."""
         name = node.spec.name
         return any(
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Notify a listener of each process that exits."""
+        """Notify a listener when a process exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
-        """Wait until all nodes have ended, or a signal came; then end what is left. Without a node it does not wait."""
+        """Wait until all nodes have exited or a signal arrives; then terminate the rest. Return immediately without nodes."""
         monitor = self._monitor()
         try:
             if self._launcher.supervisor.is_anything_left:
@@ -151,17 +151,17 @@ class ROSLaunchRunner:
             elif not monitor.done:
                 Output(title=False).print("No processes to monitor", bold=True)
         except KeyboardInterrupt:
-            # As in ROS, where it ends the nodes, and not the program.
+            # As in ROS, the signal terminates the nodes, but not the program.
             pass
         finally:
             self.stop()
 
     def spin_once(self) -> bool:
-        """Return whether it runs on; signals are heard meanwhile."""
+        """Return whether the run continues; handles signals that have arrived."""
         return self.pm is not None and self.pm.mainthread_spin_once()
 
     def stop(self) -> None:
-        """End all, and wait for that. Idempotent."""
+        """Terminate all processes and wait for their exit. Idempotent."""
         monitor, self.pm = self.pm, None
         if monitor is None:
             return
@@ -173,7 +173,7 @@ class ROSLaunchRunner:
             monitor.close()
 
     def _end_with_program(self) -> None:
-        # A child that the program has forked ends alone.
+        # A forked child of the program must not stop the nodes when it exits.
         if os.getpid() == self._pid:
             self.stop()
 
@@ -183,7 +183,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Set the parameters, and nothing else. Raise RLException."""
+        """Set only the parameters. Raise RLException."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:
@@ -191,23 +191,23 @@ class ROSLaunchRunner:
 
 
 def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str, ...]:
-    """Return the options of a master that is started."""
+    """Return the options for starting a master."""
     options: list[str] = ["--timeout", str(timeout)] if timeout is not None else []
     options += ["--master-logger-level", str(logger_level)] if logger_level else []
     return tuple(options)
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return what the program has put in place of a function of roslaunch's modules, or the function.
+    """Return the program's replacement for a function in roslaunch's modules, else the original.
 
-    Programs silence roslaunch's signal handlers like this (``roslaunch.pmon._init_signal_handlers = ...``).
+    Programs disable roslaunch's signal handlers in this way (``roslaunch.pmon._init_signal_handlers = ...``).
     """
     function: Function = getattr(sys.modules.get(module), name, ours)
     return function
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, each with a slash at its end, without those that lie in another."""
+    """Return the namespaces to delete, each with a trailing slash, without those inside another."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

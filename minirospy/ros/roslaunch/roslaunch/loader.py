@@ -8,5 +8,5 @@ __all__ = ["convert_value"]
 
 
 def convert_value(value: str, type_: str) -> object:
-    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
     return substitution.convert(value, type_)

@@ -29,7 +29,7 @@ def get_node_list(config: ROSLaunchConfig) -> list[str]:
 
 
 def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list[str]:
-    """Return the command of a node, the variables of its environment in front. Raise NodeParamsException."""
+    """Return a node's command, prefixed with its environment variables. Raise NodeParamsException."""
     spec = _find(node_name, roslaunch_files).spec
     environment = node_environment(spec, Environment.read(), {})
     environment.pop("ROS_MASTER_URI")
@@ -37,7 +37,7 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list
 
 
 def create_local_process_args(node: Node, machine: Machine | None, env: object = None) -> list[str]:
-    """Return the command of a node. Raise NodeParamsException."""
+    """Return a node's command. Raise NodeParamsException."""
     node.give_name()
     return _command(node.spec)
 
@@ -48,12 +48,12 @@ def print_node_list(roslaunch_files: Sequence[LaunchFile]) -> None:
 
 
 def print_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the command of a node."""
+    """Print a node's command."""
     print(" ".join(get_node_args(node_name, roslaunch_files)))
 
 
 def print_node_filename(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the launch file that a node is in."""
+    """Print the launch file that declares a node."""
     print(_find(node_name, roslaunch_files).filename)
 
 
@@ -73,4 +73,4 @@ def _find(name: str, files: Sequence[LaunchFile]) -> Node:
 
 
 class NodeParamsException(Exception):
-    """The command of a node cannot be made."""
+    """A node's command cannot be built."""

@@ -22,7 +22,7 @@ __all__ = ["ROSLaunchParent"]
 
 
 class ROSLaunchParent:
-    """Runs launch files (paths, or paths with arguments) while the program goes on. Errors are RLException."""
+    """Runs launch files (paths, or paths with arguments) in the background. Errors are RLException."""
 
     def __init__(
         self,
@@ -71,9 +71,9 @@ class ROSLaunchParent:
         self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything, and return when all nodes were started. Raise RLException.
+        """Start everything; return when all nodes were started. Raise RLException.
 
-        Without ``auto_terminate`` it does not end with the last node.
+        Without ``auto_terminate``, the run continues after the last node has exited.
         """
         if self.runner is not None:
             raise RLException("this roslaunch instance has been started before: make another one")
@@ -87,25 +87,25 @@ class ROSLaunchParent:
         try:
             runner.launch()
         except RLException:
-            # So that it may be tried again.
+            # Allow another attempt.
             self.runner = None
             raise
         if auto_terminate and self.pm:
             self.pm.registrations_complete()
 
     def spin(self) -> None:
-        """Wait until all nodes have ended, or a signal came; then end what is left."""
+        """Wait until all nodes have exited or a signal arrives; then terminate the rest."""
         if self.runner is None:
             raise RLException("parent not started yet")
         if self.runner.pm:
             self.runner.spin()
 
     def spin_once(self) -> bool:
-        """Return whether it runs on; signals are heard meanwhile."""
+        """Return whether the run continues; handles signals that have arrived."""
         return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:
-        """End all, and wait for that. Idempotent."""
+        """Terminate all processes and wait for their exit. Idempotent."""
         if self.runner:
             self.runner.stop()
 

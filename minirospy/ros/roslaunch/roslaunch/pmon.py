@@ -43,14 +43,14 @@ __all__ = [
 
 
 class ProcessListener:
-    """Is notified of the exit of processes."""
+    """Is notified when processes exit."""
 
     def process_died(self, process_name: str, exit_code: int) -> None:
-        """Handle the exit of a process; called in a thread of roslaunch."""
+        """Handle the exit of a process; called in one of roslaunch's threads."""
 
 
 class ApiLauncher(Launcher):
-    """A launcher that notifies listeners, and keeps the Process of each node that it started."""
+    """A launcher that notifies listeners and keeps a Process for each node that it started."""
 
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
@@ -65,12 +65,12 @@ class ApiLauncher(Launcher):
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
-        """Return the environment of a node's process."""
+        """Return the environment variables of a node's process."""
         return node_environment(node, self._environment)
 
     @property
     def log_folder(self) -> str:
-        """The folder of its nodes' log files."""
+        """The folder of the nodes' log files."""
         return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -87,7 +87,7 @@ class ApiLauncher(Launcher):
 
 
 class Process:
-    """A process of a node: a running one, or (of create_node_process) one for start()."""
+    """A node's process: running, or created by create_node_process() and waiting for start()."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         self.name = name
@@ -101,8 +101,7 @@ class Process:
         self.log_dir = launcher.log_folder
         self._launcher = launcher
         self._node = node
-        self.process: processes.Process | None = None
-        """As it was last started."""
+        self.process: processes.Process | None = None  # the process of the last start
 
     def __str__(self) -> str:
         return f"Process<{self.name}>"
@@ -114,45 +113,45 @@ class Process:
 
     @property
     def stopped(self) -> bool:
-        """Return whether its end was requested."""
+        """Return whether its termination was requested."""
         return self.process is not None and self.process.is_ending
 
     @property
     def popen(self) -> subprocess.Popen[bytes] | None:
-        """The process as Python has it."""
+        """The process as a subprocess.Popen."""
         return self.process.popen if self.process else None
 
     @property
     def pid(self) -> int:
-        """The process id; -1 before the start."""
+        """The process id; -1 before it is started."""
         return self.process.pid if self.process else -1
 
     @property
     def args(self) -> list[str]:
-        """The command."""
+        """The node's command."""
         return list(self.process.command if self.process else self._launcher.command(self._node))
 
     @property
     def env(self) -> dict[str, str]:
-        """The variables of its environment."""
+        """The node's environment variables."""
         return self._launcher.variables(self._node)
 
     @property
     def spawn_count(self) -> int:
-        """Return the number of its starts."""
+        """Return how often the process was started."""
         return self.process.starts if self.process else 0
 
     @property
     def exit_code(self) -> int | None:
-        """Its exit status; None while it runs."""
+        """The exit status; None while the process runs."""
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
-        """Return whether it runs. As in ROS, one that was not started yet counts as alive."""
+        """Return whether the process runs. As in ROS, a process that was not started yet counts as alive."""
         return self.process is None or self.process.is_running
 
     def start(self) -> bool:
-        """Start it, or start it again where it has ended; whether it runs."""
+        """Start the process, or restart it after its exit; return whether it runs."""
         before = self.process
         if before and before.is_running:
             return True
@@ -164,12 +163,12 @@ class Process:
         return True
 
     def stop(self, errors: list[str] | None = None) -> None:
-        """End it, and wait for that; it is not started again."""
+        """Terminate the process and wait for its exit; it is not restarted."""
         if self.process:
             self._launcher.supervisor.end_process(self.process)
 
     def get_info(self) -> dict[str, object]:
-        """Return pid, exit code and other facts about it."""
+        """Return the process id, exit status and other facts."""
         keys = [
             "package",
             "name",
@@ -188,7 +187,7 @@ class Process:
         return info
 
     def get_exit_description(self) -> str:
-        """Return how it exited."""
+        """Return a description of how the process exited."""
         files = f"log file: {os.path.join(self.log_dir, self.name.replace('/', '-'))}*.log"
         if self.exit_code == 0:
             return f"process has finished cleanly\n{files}"
@@ -198,7 +197,7 @@ class Process:
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Have it watched by another launcher, from its start on."""
+        """Let another launcher watch the process once it has started."""
         self._launcher = launcher
 
 
@@ -206,19 +205,18 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """Those that a signal ends."""
+    """The monitors whose processes a signal terminates."""
 
     def __init__(self, launcher: ApiLauncher) -> None:
         self._launcher = launcher
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self.is_watching = False
-        """Whether watch() was called."""
+        self.is_watching = False  # whether watch() was called
         self._living.add(self)
 
     @property
     def done(self) -> bool:
-        """Return whether all has ended."""
+        """Return whether all processes have exited."""
         return self._ended.is_set()
 
     @property
@@ -228,33 +226,33 @@ class ProcessMonitor:
 
     @property
     def procs(self) -> list[Process]:
-        """Those that are watched."""
+        """The watched processes."""
         return [self._launcher.known[process.name] for process in tuple(self._launcher.processes)]
 
     @property
     def dead_list(self) -> list[Process]:
-        """Those that have ended."""
+        """The exited processes."""
         watched = self.get_active_names()
         return [each for each in self._launcher.known.values() if each.started and each.name not in watched]
 
     def get_active_names(self) -> list[str]:
-        """Return the names of those that are watched."""
+        """Return the names of the watched processes."""
         return [process.name for process in self.procs]
 
     def get_process_names_with_spawn_count(self) -> list[list[tuple[str, int]]]:
-        """Return the names of those that are watched, and of those that exited, each with its number of starts."""
+        """Return the names of the watched and of the exited processes, each with its number of starts."""
         return [[(each.name, each.spawn_count) for each in some] for some in (self.procs, self.dead_list)]
 
     def has_process(self, name: str) -> bool:
-        """Return whether one of this name is watched."""
+        """Return whether a watched process has this name."""
         return name in self.get_active_names()
 
     def get_process(self, name: str) -> Process | None:
-        """Return the process of this name, or None."""
+        """Return the process with this name, or None."""
         return next((process for process in self.procs if process.name == name), None)
 
     def kill_process(self, name: str) -> bool:
-        """End the one of this name; whether there was one."""
+        """Terminate the process with this name; return whether it exists."""
         if not isinstance(name, str):
             raise RLException(f"kill_process takes in a process name but was given: {name}")
         process = self.get_process(name)
@@ -263,23 +261,23 @@ class ProcessMonitor:
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process of create_node_process(); call it before its start()."""
+        """Watch a process of create_node_process(); call this before its start()."""
         if self.done:
             raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
         p.register(self._launcher)
 
     def registrations_complete(self) -> None:
-        """Let the monitor end with the last process, as no further one will be registered."""
+        """Let the monitor stop after the last process, as no more will be registered."""
         self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Notify a listener of each process that exits."""
+        """Notify a listener when a process exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread, and stop them in the end.
+        """Watch the processes in a thread, and terminate them when it stops.
 
-        It ends when it is stopped, or when registrations_complete() was called and all processes have exited.
+        It stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
 
         def watch() -> None:
@@ -288,44 +286,44 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, so is this thread; then the guardian stops the nodes.
+        # If the program is killed, so is this thread; then the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
 
     def close(self) -> None:
-        """End what is left, here and now."""
+        """Terminate the remaining processes in the calling thread."""
         self._launcher.close()
         self._ended.set()
 
     def is_alive(self) -> bool:
-        """Return whether it watches."""
+        """Return whether the monitor is watching."""
         return self.is_watching and not self.done
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait until all has ended, ``timeout`` seconds at most. A listener, in whose thread that is done, cannot wait."""
+        """Wait up to ``timeout`` seconds until all processes have exited. Returns immediately in a listener's thread."""
         if threading.current_thread() is self._thread:
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
-        # In slices: on Windows a wait without timeout ignores signals.
+        # Wait in slices: on Windows a wait without timeout ignores signals.
         while not self.done and (left := end - time.monotonic()) > 0:
             self._ended.wait(min(0.5, left))
 
     def mainthread_spin(self) -> None:
-        """Wait until all has ended."""
+        """Wait until all processes have exited."""
         self.join()
 
     def mainthread_spin_once(self) -> bool:
-        """Return whether it watches on; signals are heard meanwhile."""
+        """Return whether the monitor is still watching; handles signals that have arrived."""
         return not self._ended.wait(0.01)
 
     def shutdown(self) -> None:
-        """End all, without waiting for it."""
+        """Terminate all processes without waiting for their exit."""
         self._launcher.stop("shutdown")
 
     @classmethod
     def living(cls) -> list[ProcessMonitor]:
-        """Return all monitors that have not ended."""
+        """Return all monitors that are not done."""
         return [monitor for monitor in cls._living if not monitor.done]
 
 
@@ -337,7 +335,7 @@ def start_process_monitor() -> ProcessMonitor:
 
 
 def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
-    """End all that a monitor watches, and wait for that; whether there was a monitor."""
+    """Terminate all processes of a monitor and wait for their exit; return whether there was a monitor."""
     if process_monitor is None:
         return False
     process_monitor.shutdown()
@@ -347,7 +345,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """Return a process for a node, to be started with its start(). Raise NodeParamsException if it has no program."""
+    """Return a process for a node, not started yet. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -360,7 +358,7 @@ def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Proc
 
 
 def pmon_shutdown() -> None:
-    """End all that this program launched, and wait for that."""
+    """Terminate all processes that this program launched, and wait for their exit."""
     monitors = ProcessMonitor.living()
     for monitor in monitors:
         monitor.shutdown()
@@ -384,7 +382,7 @@ class _Handler:
 
 
 def init_signal_handlers() -> None:
-    """Have SIGINT, SIGTERM and SIGHUP end all that this program launches, too; in the main thread alone."""
+    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes; only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         return
     numbers: Sequence[signal.Signals | None] = [

@@ -29,12 +29,12 @@ __all__ = [
 
 
 def check_log_disk_usage() -> None:
-    """Warn where the log folder holds more than a gigabyte."""
+    """Warn if the log folder has more than a gigabyte."""
     warn_of_large_logs(Environment.read().log_dir, Output())
 
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
-    """Return what is wrong with a launch file: all faults and programs that are missing, a line for each; None: nothing."""
+    """Return the errors of a launch file, including missing programs, one per line; None if there are none."""
     return "\n".join(map(str, faults_of(f, chosen_packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
@@ -54,7 +54,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """Return the run id: the given one, that of the master, or (where none answers) a new one."""
+    """Return the run id: the given one, the master's, or a new one if no master answers."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")

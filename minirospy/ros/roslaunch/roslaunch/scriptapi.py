@@ -20,15 +20,15 @@ class ROSLaunch:
         self.started = False
 
     def load(self, f: str) -> None:
-        """Let start() also run a launch file."""
+        """Make start() also run a launch file."""
         XmlLoader().load(f, self._config)
 
     def load_str(self, s: str) -> None:
-        """Let start() also run the text of a launch file."""
+        """Make start() also run a launch file given as a string."""
         XmlLoader().load_string(s, self._config)
 
     def start(self) -> None:
-        """Start; nodes can now be launched."""
+        """Start the launch, so that nodes can be launched."""
         self.parent.start(auto_terminate=False)
         self.started = True
 
@@ -44,15 +44,15 @@ class ROSLaunch:
         return process
 
     def spin(self) -> None:
-        """Wait for the end."""
+        """Wait until the run is over."""
         self.parent.spin()
 
     def spin_once(self) -> bool:
-        """Return whether it runs on."""
+        """Return whether the run continues."""
         return self.parent.spin_once()
 
     def stop(self) -> None:
-        """End all."""
+        """Terminate all processes."""
         self.parent.shutdown()
 
     @property

@@ -1,7 +1,8 @@
 """roslaunch.substitution_args: `$(find ...)` and the other substitution arguments, one by one.
 
-Programs that read launch files by themselves use the steps, too: they collect the arguments of a text, resolve some kinds of
-them, or set ``_rospack`` so that ``$(find ...)`` searches other folders. Source: http://wiki.ros.org/roslaunch/XML#substitution_args.
+Programs that parse launch files themselves also use the single steps: they collect the arguments of a string, resolve
+some kinds of them, or set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
+http://wiki.ros.org/roslaunch/XML#substitution_args.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from minirospy.workspace.packages import Packages
 __all__ = ["ArgException", "SubstitutionException", "chosen_packages", "resolve_args"]
 
 Context: TypeAlias = dict[str, dict[str, str]]
-"""The values of args and of anonymous names, by the keys ``arg`` and ``anon``; ``filename`` is the launch file."""
+"""The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""
 
 Command: TypeAlias = Callable[[str, str, list[str], Context], str]
-"""What resolves one kind: (text, the argument in it, its words, context) -> text."""
+"""Resolves one kind of argument: (text, the argument in it, its words, context) -> text."""
 
 _VALID = ["find", "env", "optenv", "dirname", "anon", "arg"]
 _MODULE = "roslaunch.substitution_args"
 
 _rospack: RosPack | None = None
-"""Where packages are searched. A program sets that of ``_MODULE``, the module that it imports."""
+"""Finds the packages of ``$(find ...)``. Programs set it in ``_MODULE``, the module that they import."""
 
 
 class SubstitutionException(Exception):
@@ -49,10 +50,10 @@ def resolve_args(
     resolve_anon: bool = True,
     filename: str | None = None,
 ) -> str:
-    """Return a text with its substitution arguments resolved; ``context`` may hold the args as ``{"arg": {name: value}}``.
+    """Return a string with its substitution arguments resolved; ``context`` may have the args as ``{"arg": {name: value}}``.
 
-    Raise SubstitutionException, ArgException if an arg is not set, rospkg.ResourceNotFound where a package is not found,
-    and what the expression of an ``$(eval ...)`` raises.
+    Raise SubstitutionException, ArgException if an arg is not set, rospkg.ResourceNotFound if a package is not found,
+    and any exception that the expression of an ``$(eval ...)`` raises.
     """
     context = {} if context is None else context
     if filename:
@@ -70,18 +71,18 @@ def resolve_args(
         "arg": _arg,
     }
     resolved = _resolve_args(arg_str, context, resolve_anon, first)
-    # A package's file may be named by what the others are resolved to.
+    # The path after $(find ...) may contain the results of the other arguments.
     return _resolve_args(resolved, context, resolve_anon, {"find": _find})
 
 
 def chosen_packages() -> Packages:
-    """Return the packages that ``$(find ...)`` knows: those of ``_rospack`` where a program has set it, else all."""
+    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if a program has set it, else all."""
     rospack = getattr(sys.modules.get(_MODULE), "_rospack", None)
     return Packages() if rospack is None else Packages.below(*map(Path, rospack.get_ros_paths()))
 
 
 def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: Mapping[str, Command]) -> str:
-    """Return a text, of whose substitution arguments those of ``commands`` are resolved. Raise SubstitutionException."""
+    """Resolve the substitution arguments of the kinds in ``commands``; return the string. Raise SubstitutionException."""
     resolved = arg_str
     for each in _collect_args(arg_str):
         verb, *words = [word for word in each.split(" ") if word] or [""]
@@ -93,7 +94,7 @@ def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: 
 
 
 def _collect_args(arg_str: str) -> list[str]:
-    """Return the substitution arguments of a text, without ``$(`` and ``)``. Raise SubstitutionException."""
+    """Return the substitution arguments of a string, without ``$(`` and ``)``. Raise SubstitutionException."""
     found = []
     for match in re.finditer(r"\$\(([^)]*)(\)?)", arg_str):
         inside, is_closed = match.groups()
@@ -184,7 +185,7 @@ def _eval_find(pkg: str) -> str:
 
 
 def _find(resolved: str, a: str, args: list[str], context: Context) -> str:
-    """Resolve ``$(find PKG)``, and a path behind it to the program or file of the package that it names, where that exists."""
+    """Resolve ``$(find PKG)``; a path after it becomes the package's program or file of that name, if there is one."""
     if len(args) != 1:
         raise SubstitutionException(f"$(find pkg) command only accepts one argument [{a}]")
     before, after = _split_command(resolved, a)
@@ -260,11 +261,11 @@ _eval_dict: dict[str, object] = {
     "optenv": _eval_optenv,
     "find": _eval_find,
 }
-"""What an ``$(eval ...)`` knows, besides its args."""
+"""The names in an ``$(eval ...)``, besides its args."""
 
 
 class _DictWrapper:
-    """The names of an expression: functions first, then args as values."""
+    """The names in an expression: functions first, then the args' values."""
 
     def __init__(self, args: Mapping[str, str], functions: Mapping[str, object]) -> None:
         self._args = args
@@ -275,7 +276,7 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Return the text of a Python expression's value. Raise SubstitutionException, and what the expression raises."""
+    """Return the value of a Python expression as a string. Raise SubstitutionException, or any exception of the expression."""
     anons, args = context.setdefault("anon", {}), context.setdefault("arg", {})
     functions: dict[str, object] = {
         "anon": lambda id: _eval_anon(id, anons),

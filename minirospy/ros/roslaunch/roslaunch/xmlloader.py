@@ -1,4 +1,4 @@
-"""roslaunch.xmlloader: launch files into a configuration."""
+"""roslaunch.xmlloader: load launch files into a configuration."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """The object that launch files are loaded into: a ROSLaunchConfig."""
+    """The object into which launch files are loaded: a ROSLaunchConfig."""
 
     def add(self, spec: LaunchSpec) -> None:
         """Add the content of launch files."""
@@ -48,7 +48,7 @@ class XmlLoader:
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
-        """Load a text. Raise XmlParseException."""
+        """Load a launch file given as a string. Raise XmlParseException."""
         self._load(LaunchSource(STDIN, xml_text.encode(), {}), ros_config)
 
     def _load(self, source: LaunchSource, config: Configuration) -> None:

@@ -1,7 +1,7 @@
-"""roslib.exceptions."""
+"""roslib.exceptions: the base class of roslib's errors."""
 
 __all__ = ["ROSLibException"]
 
 
 class ROSLibException(Exception):
-    """The root of roslib's errors."""
+    """The base class of roslib's errors."""

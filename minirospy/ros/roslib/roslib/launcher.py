@@ -1,4 +1,4 @@
-"""roslib.launcher: a package and what it needs on sys.path."""
+"""roslib.launcher: adds a package and its dependencies to sys.path."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["load_manifest"]
 
 
 def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
-    """Add the ``src`` folders of a package and of all that it needs to sys.path, unless it can be imported already.
+    """Add the ``src`` folders of a package and its dependencies to sys.path, unless it is already importable.
 
-    The package that contains the script, or one that can be imported, need not be on ROS_PACKAGE_PATH.
+    The package that contains the script, or one that is importable, need not be on ROS_PACKAGE_PATH.
     Raise ResourceNotFound.
     """
     rospack = RosPack()
@@ -35,13 +35,13 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     for folder in folders:
         source = str(folder / "src")
         modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
-        # Last, and only if a module is missing: a devel folder that is sourced also has the package's messages.
+        # Append it only if a module is missing: a sourced devel folder also has the package's messages.
         if source not in sys.path and not all(map(_is_importable, modules)):
             sys.path.append(source)
 
 
 def _folder_of_script(package: str) -> Path | None:
-    """Return the folder of the package that contains the running script, if it has this name."""
+    """Return the package folder that contains the running script, if the package has this name."""
     script: Sequence[str] = sys.argv[:1]
     if not script or not script[0]:
         return None

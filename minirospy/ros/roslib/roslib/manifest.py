@@ -1,6 +1,6 @@
-"""roslib.manifest: the manifest.xml of packages of rosbuild, the build system before catkin.
+"""roslib.manifest: reads the manifest.xml of packages of rosbuild, the build system before catkin.
 
-A package.xml has rospkg.RosPack().get_manifest(). Source: http://wiki.ros.org/Manifest.
+For a package.xml, use rospkg.RosPack().get_manifest(). Source: http://wiki.ros.org/Manifest.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ class Depend(NamedTuple):
 
 
 class VersionControl(NamedTuple):
-    """Where the sources are."""
+    """The location of the source repository."""
 
     type: str
     url: str
 
 
 class Manifest:
-    """What a manifest.xml says; empty as it is made."""
+    """The content of a manifest.xml; a new object is empty."""
 
     def __init__(self) -> None:
         self.description = self.brief = self.license = self.author = self.url = self.status = self.notes = ""
@@ -67,12 +67,12 @@ class Manifest:
         self.versioncontrol: VersionControl | None = None
 
     def get_export(self, tag: str, attr: str) -> list[str | None]:
-        """Return the values of an attribute of the exports of a tag."""
+        """Return the values of an attribute of the exports with this tag."""
         return [export.get(attr) for export in self.exports if export.tag == tag and attr in export.attrs]
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below a path that have a manifest of this name; it does not look below a manifest."""
+    """Yield the folders below a path that have a manifest of this name; skip folders below a manifest."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder
@@ -86,7 +86,7 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 
 
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
-    """Return the path of a package's manifest.xml, not ``required`` also if it has none.
+    """Return the path of a package's manifest.xml; if not ``required``, the file need not exist.
 
     Raise InvalidROSPkgException.
     """
@@ -107,7 +107,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError if there is none, ManifestException."""
+    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -117,7 +117,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a text. Raise ManifestException."""
+    """Return the manifest in a string. Raise ManifestException."""
     from xml.dom.minidom import parseString
 
     try:

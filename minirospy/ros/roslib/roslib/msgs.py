@@ -10,9 +10,9 @@ SEP = "/"
 
 
 class MsgSpecException(Exception):
-    """A definition that cannot be read."""
+    """A definition cannot be read."""
 
 
 def list_msg_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of the message files of a package, without it; ``include_depends`` is of rosbuild."""
+    """Return the names of a package's message files, without the package; ``include_depends`` is for rosbuild."""
     return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))

@@ -1,4 +1,4 @@
-"""roslib.names: rosgraph's names, and those of resources (``package/name``)."""
+"""roslib.names: the names of rosgraph, and resource names (``package/name``)."""
 
 import re
 
@@ -17,17 +17,17 @@ PRN_SEPARATOR = TYPE_SEPARATOR = "/"
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """Return ``package/name``, or the name alone in the package itself."""
+    """Return ``package/name``, or only the name if the package is ``my_pkg``."""
     return name if res_pkg_name == my_pkg else res_pkg_name + PRN_SEPARATOR + name
 
 
 def resource_name_base(name: str) -> str:
-    """Return the name without its package."""
+    """Return a resource name without its package."""
     return name.rpartition(PRN_SEPARATOR)[2]
 
 
 def resource_name_package(name: str) -> str | None:
-    """Return the package of a name, or None."""
+    """Return the package of a resource name, or None."""
     return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
 
 
@@ -42,10 +42,10 @@ def package_resource_name(name: str) -> tuple[str, str]:
 
 
 def is_legal_resource_name(name: str) -> bool:
-    """Return whether a name is one of a resource, with or without its package."""
+    """Return whether a name is a valid resource name, with or without its package."""
     return name is not None and bool(re.match(r"^[A-Za-z][\w/]*\Z", name, re.ASCII)) and "//" not in name
 
 
 def is_legal_resource_base_name(name: str) -> bool:
-    """Return whether a name is one of a resource without its package."""
+    """Return whether a name is a valid resource name without a package."""
     return name is not None and bool(re.match(r"^[A-Za-z]\w*\Z", name, re.ASCII))

@@ -1,4 +1,4 @@
-"""roslib's functions about packages, over rospkg's; `import roslib` re-exports them.
+"""roslib's functions for packages, implemented with rospkg; `import roslib` re-exports them.
 
 Source: http://wiki.ros.org/roslib, http://docs.ros.org/api/roslib/html/python/.
 """
@@ -39,17 +39,17 @@ class ROSPkgException(Exception):
 
 
 class InvalidROSPkgException(ROSPkgException):
-    """No package of a name."""
+    """There is no package of this name."""
 
 
 class MultipleNodesException(ROSPkgException):
-    """Several nodes of a name in a package."""
+    """A package has several nodes of this name."""
 
 
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """Return the folder of a package. Raise InvalidROSPkgException if there is none and ``required``; else None."""
+    """Return the folder of a package. If there is none, raise InvalidROSPkgException if ``required``, else return None."""
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:
@@ -61,7 +61,7 @@ def get_pkg_dir(
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return (folder, name) of the package that contains a path; (None, None) where none does."""
+    """Return (folder, name) of the package that contains a path; (None, None) if there is none."""
     name = get_package_name(d)
     place = Path(d).absolute()
     folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)
@@ -71,7 +71,10 @@ def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
 def get_pkg_subdir(
     package: str, subdir: str, required: bool = True, env: dict[str, str] | None = None
 ) -> str | None:
-    """Return a folder in a package, made where it is not there if ``required``; else None. Raise InvalidROSPkgException."""
+    """Return a folder in a package.
+
+    If it is missing, create it if ``required``, else return None. Raise InvalidROSPkgException.
+    """
     folder = get_pkg_dir(package, required)
     if folder is None:
         return None
@@ -82,12 +85,12 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path that a file in a folder of a package has, or would have. Raise InvalidROSPkgException."""
+    """Return the path of a file in a package's folder, whether it exists or not. Raise InvalidROSPkgException."""
     return os.path.join(str(get_pkg_dir(package)), subdir, resource_name)
 
 
 def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[str]:
-    """Return the programs of a name in a package. Raise ResourceNotFound."""
+    """Return the programs of this name in a package. Raise ResourceNotFound."""
     return find_resource(pkg, node_type, _is_program, rospack)
 
 
@@ -97,7 +100,7 @@ def find_resource(
     filter_fn: Callable[[str], bool] | None = None,
     rospack: RosPack | None = None,
 ) -> list[str]:
-    """Return the files of a name in a package, and where its workspace puts what it builds. Raise ResourceNotFound."""
+    """Return the files of this name in a package and in its workspace's build output. Raise ResourceNotFound."""
     folder = Path((rospack or RosPack()).get_path(pkg))
     if len(Path(resource_name).parts) > 1:
         found: Iterator[Path] = filter(Path.is_file, [folder / resource_name])
@@ -112,7 +115,7 @@ def list_pkgs_by_path(
     cache: dict[str, str] | None = None,
     env: dict[str, str] | None = None,
 ) -> list[str]:
-    """Return the packages below a folder, added to ``packages``."""
+    """Append the packages below a folder to ``packages``; return ``packages``."""
     found = [] if packages is None else packages
     found += [name for name in RosPack([path]).list() if name not in found]
     return found
@@ -127,8 +130,8 @@ def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
 
 
 def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] | None = None) -> list[str]:
-    """Return the files of a name below a folder, links followed, folders with a dot in front left out."""
-    # On Windows a program may be named without its suffix, in any case of letters.
+    """Return the files of this name below a folder; follow links, and skip folders whose name starts with a dot."""
+    # On Windows, programs may be named without suffix, and case is ignored.
     suffixes = ("", ".exe", ".bat", ".py") if os.name == "nt" else ("",)
     wanted = [os.path.normcase(resource_name + suffix) for suffix in suffixes]
     found, seen = [], set()
@@ -136,7 +139,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # A link that leads back.
+            # A link to a parent folder would never end.
             folders.clear()
             continue
         seen.add(real)
@@ -149,7 +152,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder of a package by the package's path, made where it is not there if ``required``. Raise OSError."""
+    """Return a folder of a package, given the package's path; create it if it is missing and ``required``. Raise OSError."""
     path = os.path.join(package_dir, subdir)
     if required:
         os.makedirs(path, exist_ok=True)

@@ -1,4 +1,4 @@
-"""roslib.rosenv: values of the environment, with roslib's former names."""
+"""roslib.rosenv: reads environment variables, under roslib's former function names."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ ROS_LOG_DIR = "ROS_LOG_DIR"
 
 
 class ROSEnvException(ROSLibException):
-    """A variable that is needed is not set."""
+    """A required variable is not set."""
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT. Raise ROSEnvException if it is not set, if ``required``."""
+    """Return ROS_ROOT. Raise ROSEnvException if it is ``required`` and not set."""
     return _variable(ROS_ROOT, required, env)
 
 
 def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_PACKAGE_PATH. Raise ROSEnvException if it is not set, if ``required``."""
+    """Return ROS_PACKAGE_PATH. Raise ROSEnvException if it is ``required`` and not set."""
     return _variable(ROS_PACKAGE_PATH, required, env)
 
 
 def get_master_uri(
     required: bool = True, env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
-    """Return the URI of the master that the command line or the environment names."""
+    """Return the master's URI from the command line or the environment."""
     return rosenv.get_master_uri(env, argv)
 
 
 def get_ros_home(env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of ROS's own files: ROS_HOME, or ~/.ros."""
+    """Return ROS's folder for its own files: ROS_HOME, or ~/.ros."""
     return environment.get_ros_home(env)
 
 
@@ -67,7 +67,7 @@ def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Make a folder and those above it."""
+    """Create a folder and its parents."""
     os.makedirs(p, exist_ok=True)
 
 

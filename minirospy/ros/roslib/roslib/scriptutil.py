@@ -1,4 +1,4 @@
-"""roslib.scriptutil: the master, as old scripts get it."""
+"""roslib.scriptutil: the master's proxy for old scripts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ __all__ = ["get_master", "get_param_server"]
 
 
 def get_master() -> ServerProxy:
-    """Return the master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
+    """Return the master from the environment.
+
+    Each method's first argument is the caller id; it returns (code, status message, value).
+    """
     return ServerProxy(get_master_uri())
 
 

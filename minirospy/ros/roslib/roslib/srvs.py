@@ -30,7 +30,7 @@ VERBOSE = False
 
 
 class SrvSpecException(MsgSpecException):
-    """A definition that cannot be read."""
+    """A definition cannot be read."""
 
 
 class _Verbosity:
@@ -38,28 +38,28 @@ class _Verbosity:
 
 
 def is_verbose() -> bool:
-    """Return what :func:`set_verbose` was given."""
+    """Return the value set by :func:`set_verbose`."""
     return _Verbosity.is_on
 
 
 def set_verbose(v: bool) -> None:
-    """Keep a choice for :func:`is_verbose`; nothing is printed here."""
+    """Store a value for :func:`is_verbose`; nothing is printed here."""
     _Verbosity.is_on = bool(v)
 
 
 def list_srv_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of the service files of a package, without it; ``include_depends`` is of rosbuild."""
+    """Return the names of a package's service files, without the package; ``include_depends`` is for rosbuild."""
     folder = Path(packages.get_pkg_dir(package) or "", "srv")
     return sorted(path.stem for path in folder.glob(f"*{EXT}"))
 
 
 def srv_file(package: str, type_: str) -> str:
-    """Return the path of a service's definition, whether it exists or not. Raise InvalidROSPkgException."""
+    """Return the path of a service's definition file, whether it exists or not. Raise InvalidROSPkgException."""
     return packages.resource_file(package, "srv", type_ + EXT)
 
 
 def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str]]:
-    """Return the services of a package with their names, and the names of those that cannot be read."""
+    """Return a package's services with their names, and the names of the files that cannot be read."""
     found, failed = [], []
     for name in list_srv_types(package, False):
         try:
@@ -72,14 +72,14 @@ def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str
 def load_from_string(
     text: str, package_context: str = "", full_name: str = "", short_name: str = ""
 ) -> SrvSpec:
-    """Return the service of a definition's text. Raise genmsg.InvalidMsgSpec."""
+    """Return the service spec from a definition's text. Raise genmsg.InvalidMsgSpec."""
     return load_srv_from_string(
         MsgContext.create_default(), text, full_name or f"{package_context}/{short_name}"
     )
 
 
 def load_from_file(file_name: str, package_context: str = "") -> tuple[str, SrvSpec]:
-    """Return the full name and the service of a definition's file. Raise genmsg.InvalidMsgSpec, OSError."""
+    """Return the full name and spec of a service from its definition file. Raise genmsg.InvalidMsgSpec, OSError."""
     short_name = Path(file_name).stem
     full_name = f"{package_context}/{short_name}" if package_context else short_name
     text = Path(file_name).read_text(encoding="utf-8")

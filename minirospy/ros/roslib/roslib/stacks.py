@@ -1,4 +1,4 @@
-"""roslib.stacks: the stacks of rosbuild, folders with a stack.xml; catkin has metapackages instead.
+"""roslib.stacks: the stacks of rosbuild, which are folders with a stack.xml; catkin has metapackages instead.
 
 Source: http://wiki.ros.org/Stacks.
 """
@@ -33,13 +33,13 @@ class ROSStackException(Exception):
 
 
 class InvalidROSStackException(ROSStackException):
-    """No stack of a name."""
+    """There is no stack of this name."""
 
 
 def list_stacks_by_path(
     path: str, stacks: list[str] | None = None, cache: dict[str, str] | None = None
 ) -> list[str]:
-    """Return the stacks below a folder, added to ``stacks``; their folders go into ``cache``."""
+    """Append the stacks below a folder to ``stacks``, and store their folders in ``cache``; return ``stacks``."""
     found = [] if stacks is None else stacks
     for folder in folders_with(STACK_FILE, path):
         if (name := os.path.basename(folder)) not in found:
@@ -66,7 +66,7 @@ def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
 
 
 def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the version of a metapackage; None of a stack, which has none. Raise ResourceNotFound."""
+    """Return the version of a metapackage; None for a stack, which has no version. Raise ResourceNotFound."""
     return None if stack in _stacks(env) else RosStack(_paths(env)).get_stack_version(stack)
 
 
@@ -83,7 +83,7 @@ def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
 def expand_to_packages(
     names: Sequence[str], env: Mapping[str, str] | None = None
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names): names of stacks and metapackages become those of their packages."""
+    """Return (packages, unknown names); stacks and metapackages are replaced by their packages."""
     stacks, known = _stacks(env), _packages(env)
     packages: list[str] = []
     unknown = []
@@ -100,7 +100,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to look into; None for those of this process."""
+    """Return the folders to search; None: use this process's."""
     return None if env is None else _folders(env)
 
 
@@ -117,6 +117,6 @@ def _stacks(env: Mapping[str, str] | None) -> dict[str, str]:
 
 
 def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the folders of the packages of rosbuild."""
+    """Return the folders of rosbuild packages."""
     folders = (folder for path in _folders(env) for folder in folders_with(MANIFEST_FILE, path))
     return {os.path.basename(folder): folder for folder in folders}

@@ -1,4 +1,4 @@
-"""`roscore` and `minirospy master`: the master in the foreground, with the /rosout node.
+"""`roscore` and `minirospy master`: run the master in the foreground, with the /rosout node.
 
 Source: http://wiki.ros.org/roscore.
 """
@@ -41,11 +41,11 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 _LOG_BYTES = 10 * 1024 * 1024
 
 _ANSWER_SECONDS = 4.0
-"""Within this a master answers, also on a busy machine; one that recovers for longer holds the lock of its journal."""
+"""Seconds within which a master answers on a busy machine. One that recovers for longer holds its journal's lock."""
 
 
 class _Options(NamedTuple):
-    """The options of a master that is started."""
+    """The options for starting a master."""
 
     verbose: bool
     quiet: bool
@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class _MasterParser(Parser):
-    """Leaves out the remapping arguments that a launch file may add."""
+    """Ignores the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raise CommandLineError."""
@@ -92,7 +92,7 @@ def _parser(name: str) -> Parser:
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
 
-    # One loop serves every client, in one process.
+    # Accepted without effect: one loop in one process serves every client.
     parser.accept(
         "-w",
         "--numworkers",
@@ -189,7 +189,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Perhaps a variable that is not set: it must not open the master to everybody.
+        # An empty value may come from an unset variable; it must not open the master to every address.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -205,7 +205,7 @@ def _master(
 
 
 def _environment(*, local: bool) -> Environment:
-    """Return the environment of a master; a ROS_MASTER_URI of another machine only gives it the port."""
+    """Return the environment of a master; only the port of a remote ROS_MASTER_URI is used."""
     environ = dict(os.environ)
     local = is_local(environ) or local
     environ.pop("MINIROSPY_LOCAL", None)
@@ -214,7 +214,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """Name, in one line, the options and variables for other machines, which have no effect in a local master."""
+    """Warn, in one line, of options and variables for other machines, which have no effect on a local master."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -263,7 +263,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         _announce(master, where, log_file, quiet=options.quiet)
         _warn_of_host(environment)
         if not options.quiet and name != "rosmaster":
-            # In a thread: a name server that is out of reach must not delay the start.
+            # In a thread, so that an unreachable name server does not delay the start.
             threading.Thread(target=_warn_of_uri, args=(environment, master), daemon=True).start()
 
         rosout = None
@@ -275,7 +275,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # While this master has the port: right after, the file may be that of the next one.
+        # Remove the file while this master still has the port: afterwards it may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -286,7 +286,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
 
 
 def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, quiet: bool) -> None:
-    """Print and log where the master listens, what it recovered, and where its log is."""
+    """Print and log the master's URI, the state that it recovered, and the path of its log."""
     listening, *warnings = where
     if not quiet:
         logs = f"log file {log_file}" if log_file else "no log file"
@@ -301,7 +301,7 @@ def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, qu
 
 
 def _write_pid(path: Path) -> None:
-    """Write the pid to the file where scripts look for it, as in ROS."""
+    """Write the process id to the file that scripts read, as in ROS."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:
@@ -327,7 +327,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the master that is running; for rosmaster, what its API returns."""
+    """Print one line about the running master; for ROS's rosmaster, from the answers of its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -361,14 +361,14 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if no node can reach ROS_IP: most often it is an address of another network."""
+    """Warn if no node can reach ROS_IP: usually it is an address in another network."""
     why = wrong_address(environment)
     if why:
         warn(f"{why} (`minirospy doctor` shows more)")
 
 
 def _warn_of_uri(environment: Environment, master: Master) -> None:
-    """Warn if ROS_MASTER_URI, by which nodes started from this terminal find the master, names another one."""
+    """Warn if ROS_MASTER_URI, which nodes started from this terminal use, is the URI of another master."""
     host, port = environment.master_address
     if port != master.port:
         what = f"port [{port}] does not match this roscore [{master.port}]"
@@ -380,7 +380,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """Raise the limit of open files; return how many clients it allows, less some for other use."""
+    """Raise the limit of open files; return the number of clients that it allows, with a reserve for other files."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -405,7 +405,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # Windows: the handler runs in the main thread, which is the loop's, at its next wakeup.
+            # On Windows the handler runs in the main thread, which is also the loop's, when the loop next wakes up.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -440,7 +440,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # It is alive, and holds the lock of its journal all the while.
+        # The master is running, as it still holds its journal's lock.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -451,7 +451,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
 
 
 def _holder(path: Path) -> int | None:
-    """Return the pid of the master that holds a journal, 0 if it is not known, None if no master does."""
+    """Return the pid of the master that has locked a journal: 0 if the pid is unknown, None if no master has."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():
@@ -480,9 +480,9 @@ class _Shown(logging.Handler):
 
 
 def _show(line: str) -> None:
-    """Print a line; a reader that disconnected (`roscore -v | head`) must not stop the master."""
+    """Print a line; a closed stdout (`roscore -v | head`) must not stop the master."""
     with contextlib.suppress(OSError):
-        # One write: the warning about ROS_MASTER_URI comes from a thread.
+        # A single write, because the warning about ROS_MASTER_URI comes from a thread.
         print(f"{line}\n", end="", flush=True)
 
 
@@ -491,7 +491,7 @@ def _log_to_file(
 ) -> tuple[Path | None, Callable[[str], object]]:
     """Log to ``folder``/master.log; ``latest`` next to the folder links to it where links are supported.
 
-    Return the file, and the function for lines about registrations. If no file can be written, the master runs without.
+    Return the file, and the function that logs registrations. If the file cannot be written, the master runs without it.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")

@@ -23,7 +23,7 @@ __getattr__ = on_first_use(
 
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; ``argv`` starts with its name. Return its exit status when it ends."""
+    """Run the command; ``argv`` starts with its name. Return its exit status."""
     from minirospy.ros.rosmaster.commands.master import rosmaster
 
     return rosmaster(list(sys.argv if argv is None else argv)[1:])

@@ -4,4 +4,4 @@ __all__ = ["InternalException"]
 
 
 class InternalException(Exception):
-    """A fault of the master itself."""
+    """An internal error of the master."""

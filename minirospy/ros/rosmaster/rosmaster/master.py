@@ -1,4 +1,4 @@
-"""rosmaster.master: a master inside a program, as tests start one."""
+"""rosmaster.master: a master inside a program, for example for tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Master"]
 
 
 class Master:
-    """A master that listens on ``port`` from :meth:`start` to :meth:`stop`; ``uri`` says where. It keeps nothing in files."""
+    """A master that listens on ``port`` from :meth:`start` to :meth:`stop`, at the URI ``uri``. It stores nothing in files."""
 
     def __init__(self, port: int = DEFAULT_MASTER_PORT, num_workers: int = 3) -> None:
         self.port = port
@@ -16,7 +16,7 @@ class Master:
         self.uri: str | None = None
 
     def start(self) -> None:
-        """Serve from a thread. Raise OSError if the port is taken."""
+        """Start serving in a thread. Raise OSError if the port is in use."""
         from minirospy.runtime.master.master import Master as Serving
         from minirospy.runtime.transport.access import Access
         from minirospy.runtime.transport.loop import LoopThread
@@ -41,11 +41,11 @@ class Master:
         self.uri = f"http://{environment.uri_host}:{self.port}/"
 
     def ok(self) -> bool:
-        """Return whether it serves."""
+        """Return whether the master is serving."""
         return self.uri is not None
 
     def stop(self) -> None:
-        """End it. Idempotent."""
+        """Stop the master. Idempotent."""
         if self.uri is not None:
             self.uri = None
             self._loop.run(self._serving.close(), 5.0)

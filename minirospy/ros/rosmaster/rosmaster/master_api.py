@@ -1,4 +1,4 @@
-"""rosmaster.master_api: the Master API as an object with a method for each call, which a program may serve or call itself.
+"""rosmaster.master_api: the Master API as an object with one method per call, for programs to serve or call.
 
 The answers are those of ``core/graph/master_api.py``. Nodes are notified from a thread of this object.
 Source: http://wiki.ros.org/ROS/Master_API.
@@ -29,7 +29,7 @@ _CALLER_ID = "/master"
 
 
 class _Api(MasterApi):
-    """The tables and their answers; what is to be sent to nodes goes to ``notices``."""
+    """The tables and their answers; notifications for nodes are put into ``notices``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -39,28 +39,28 @@ class _Api(MasterApi):
 
     @property
     def uri(self) -> str:
-        """Return the address that :meth:`ROSMasterHandler._ready` was given."""
+        """Return the URI that was passed to :meth:`ROSMasterHandler._ready`."""
         return self.where
 
     def notify(self, action: Notice) -> None:
-        """Pass a notice on to the thread that sends it."""
+        """Queue a notification for the thread that sends it."""
         self.notices.put(action)
 
     def defer(self, uri: str, topic: str) -> None:
-        """Hold nothing back: a notice carries the state of the moment in which it is sent."""
+        """Do nothing: a notification contains the state at the time when it is sent."""
 
     def stop(self) -> None:
-        """End the notices."""
+        """Stop sending notifications."""
         self.is_stopped = True
         self.notices.put(None)
 
     def get_status(self, caller_id: str) -> Answer:
-        """Refuse what only minirospy's own master answers."""
+        """Refuse the call, which only minirospy's own master answers."""
         return [ERROR, "not a call of the Master API", 0]
 
 
 class ROSMasterHandler:
-    """The Master API: each method takes the caller's name first, and returns (code, text, value)."""
+    """The Master API: each method's first argument is the caller's name; it returns (code, status message, value)."""
 
     def __init__(self, num_workers: int = NUM_WORKERS) -> None:
         self.uri: str | None = None
@@ -70,7 +70,7 @@ class ROSMasterHandler:
         threading.Thread(target=self._notify, name="rosmaster", daemon=True).start()
 
     def __getattr__(self, name: str) -> Callable[..., tuple[int, str, object]]:
-        # One method for each call of the table.
+        # One method for each call in the table.
         if name.startswith("_") or name not in self._api.dispatcher.methods:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return lambda *args: self._call(name, args)
@@ -118,5 +118,5 @@ class ROSMasterHandler:
 
 
 def _value(tree: ParameterTree, key: str) -> object:
-    """Return what a node is notified of: {} where the parameter is not set."""
+    """Return the value that a node is notified of: {} if the parameter is not set."""
     return tree.get(key) if tree.has(key) else {}

@@ -1,6 +1,6 @@
 """rosmaster.paramserver: the tree of parameters.
 
-Keys are global names. A task is called with a list of ([(node, API)], key, value), one for each change.
+Keys are global names. A notify task is called with a list of ([(node, API)], key, value), one for each change.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Notify = Callable[[list[tuple[list[tuple[str, str]], str, object]]], object]
 
 
 class ParamDictionary:
-    """Parameters and who subscribed to them. ``reg_manager`` is rosmaster's table of nodes, which this one does not need."""
+    """Parameters and their subscribers. ``reg_manager``, rosmaster's table of nodes, has no effect here."""
 
     def __init__(self, reg_manager: object = None) -> None:
         self._tree = ParameterTree()
@@ -28,13 +28,13 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Return the nearest parameter upwards from a namespace. Raise ValueError if that is not global."""
+        """Return the closest parameter, searched from a namespace upwards. Raise ValueError if the namespace is not global."""
         if not ns or ns[0] != "/":
             raise ValueError("namespace must be global")
         return self._tree.search(ns, key)
 
     def get_param(self, key: str) -> object:
-        """Return a value, or the dictionary of a namespace. Raise KeyError."""
+        """Return a parameter's value, or a namespace as a dictionary. Raise KeyError."""
         return self._tree.get(key)
 
     def has_param(self, key: str) -> bool:
@@ -44,7 +44,7 @@ class ParamDictionary:
     def set_param(
         self, key: str, value: object, notify_task: Notify | None = None, caller_id: str | None = None
     ) -> None:
-        """Set a value; a dictionary replaces a namespace. Raise TypeError for a root that is none."""
+        """Set a value; a dictionary replaces a namespace. Raise TypeError if the root is set to anything but a dictionary."""
         if key == "/" and not isinstance(value, dict):
             raise TypeError("cannot set root of parameter tree to non-dictionary")
         self._notify(self._tree.set(key, value, caller_id or ""), notify_task)
@@ -56,7 +56,7 @@ class ParamDictionary:
         self._notify(self._tree.delete(key), notify_task)
 
     def subscribe_param(self, key: str, registration_args: tuple[str, str]) -> object:
-        """Subscribe (node, API) to a parameter; return its value, {} where it is not set."""
+        """Subscribe (node, API) to a parameter; return its value, {} if it is not set."""
         caller_id, uri = registration_args
         self._nodes[uri] = caller_id
         return self._tree.subscribe(key, caller_id, uri)

@@ -1,6 +1,6 @@
-"""rosmaster.registrations: tables of what nodes have registered, for programs that are masters themselves.
+"""rosmaster.registrations: tables of what nodes have registered, for programs that implement a master.
 
-A table maps a topic, service or parameter to the (name, API) of its nodes. Nothing here is safe for several threads.
+A table maps a topic, service or parameter to the (name, API) of its nodes. Not thread-safe.
 Source: http://wiki.ros.org/ROS/Master_API for the answers of ``unregister``.
 """
 
@@ -23,11 +23,11 @@ class Pool(Protocol):
     """The part of a MarkedThreadPool that a manager uses."""
 
     def queue_task(self, marker: object, task: Callable[..., object], args: tuple[object, ...]) -> object:
-        """Call ``task(*args)`` in a thread, tasks of a marker one after the other."""
+        """Call ``task(*args)`` in a thread; tasks with the same marker run one after the other."""
 
 
 class Registrations:
-    """One table: of the subscribers or publishers of topics, of services, or of the subscribers of parameters."""
+    """One table: the subscribers or publishers of topics, the services, or the subscribers of parameters."""
 
     TOPIC_SUBSCRIPTIONS, TOPIC_PUBLICATIONS, SERVICE, PARAM_SUBSCRIPTIONS = 1, 2, 3, 4
 
@@ -48,7 +48,7 @@ class Registrations:
         return self.map.get(key, [])
 
     def has_key(self, key: str) -> bool:
-        """Return whether anything is registered under a name."""
+        """Return whether a name has registrations."""
         return key in self.map
 
     def iterkeys(self) -> KeysView[str]:
@@ -56,21 +56,21 @@ class Registrations:
         return self.map.keys()
 
     def get_apis(self, key: str) -> list[str | None]:
-        """Return the APIs of the nodes of a name."""
+        """Return the APIs of a name's nodes."""
         return [api for _, api in self[key]]
 
     def get_service_api(self, service: str) -> str | None:
-        """Return the address of a service, None if it is not there."""
+        """Return the address of a service; None if it is not registered."""
         return (self.service_api_map or {}).get(service, ("", None))[1]
 
     def get_state(self) -> list[list[object]]:
-        """Return [name, [node, ...]] of each name, as getSystemState has it."""
+        """Return [name, [node, ...]] for each name, in the format of getSystemState."""
         return [[key, [name for name, _ in nodes]] for key, nodes in self.map.items()]
 
     def register(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> None:
-        """Add a node. A service has one, the last. Raise InternalException for a service without an address."""
+        """Add a node. A new service provider replaces the old one. Raise InternalException for a service without an address."""
         node = (caller_id, caller_api)
         nodes = self.map.get(key)
         if nodes is None or service_api:
@@ -84,7 +84,7 @@ class Registrations:
             self._require_no_service()
 
     def unregister_all(self, caller_id: str) -> None:
-        """Remove all of a node."""
+        """Remove all registrations of a node."""
         kept = {key: [node for node in nodes if node[0] != caller_id] for key, nodes in self.map.items()}
         self.map = {key: nodes for key, nodes in kept.items() if nodes}
         if self.service_api_map:
@@ -120,7 +120,7 @@ class Registrations:
 
 
 class NodeRef:
-    """What one node has registered."""
+    """The registrations of one node."""
 
     def __init__(self, id: str, api: str) -> None:
         self.id = id
@@ -128,23 +128,23 @@ class NodeRef:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all but its name and API."""
+        """Remove all registrations; keep the name and API."""
         self.param_subscriptions: list[str] = []
         self.topic_subscriptions: list[str] = []
         self.topic_publications: list[str] = []
         self.services: list[str] = []
 
     def is_empty(self) -> bool:
-        """Return whether it has registered nothing."""
+        """Return whether the node has no registrations."""
         return not any(map(self._names, range(1, 5)))
 
     def add(self, type_: int, key: str) -> None:
-        """Add a name to a table of Registrations' types. Raise InternalException for another type."""
+        """Add a name to the table ``type_``. Raise InternalException if there is no such table."""
         if key not in (names := self._names(type_)):
             names.append(key)
 
     def remove(self, type_: int, key: str) -> None:
-        """Remove a name from a table. Raise InternalException."""
+        """Remove a name from the table ``type_``. Raise InternalException if there is no such table."""
         if key in (names := self._names(type_)):
             names.remove(key)
 
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Ask a node to shut down; one that does not answer has gone."""
+    """Request a node to shut down; ignore a node that does not answer, as it has exited."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")
@@ -164,7 +164,7 @@ def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
 
 
 class RegistrationManager:
-    """The tables of a master and its nodes. A node that comes with another API replaces the old one, which is shut down."""
+    """A master's tables and nodes. If a node registers with a new API, the old node of that name is shut down."""
 
     def __init__(self, thread_pool: Pool) -> None:
         self.nodes: dict[str, NodeRef] = {}
@@ -175,11 +175,11 @@ class RegistrationManager:
         self.param_subscribers = Registrations(Registrations.PARAM_SUBSCRIPTIONS)
 
     def get_node(self, caller_id: str) -> NodeRef | None:
-        """Return a node, None if it has registered nothing."""
+        """Return a node; None if it has no registrations."""
         return self.nodes.get(caller_id)
 
     def reverse_lookup(self, caller_api: str) -> list[NodeRef] | None:
-        """Return the nodes of an API, None if there are none."""
+        """Return the nodes with this API; None if there are none."""
         return [node for node in self.nodes.values() if node.api == caller_api] or None
 
     def register_service(self, service: str, caller_id: str, caller_api: str, service_api: str) -> None:

@@ -1,4 +1,4 @@
-"""rosmaster.threadpool: threads for calls to nodes, of which no two of one marker run at a time."""
+"""rosmaster.threadpool: threads for calls to nodes; no two tasks with the same marker run at the same time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Task(NamedTuple):
 
 
 class MarkedThreadPool:
-    """Runs tasks in daemon threads, in order; a slow node, which is a marker, keeps one thread and no more."""
+    """Runs tasks in daemon threads, in order; the marker is a node, so a slow node occupies only one thread."""
 
     def __init__(self, numThreads: int) -> None:
         self._changed = threading.Condition()
@@ -29,7 +29,7 @@ class MarkedThreadPool:
         self.set_thread_count(numThreads)
 
     def set_thread_count(self, newNumThreads: int) -> bool:
-        """Start or end threads; return whether that is possible."""
+        """Start or stop threads; return whether that is possible."""
         with self._changed:
             if self._is_joining:
                 return False
@@ -48,7 +48,7 @@ class MarkedThreadPool:
         args: tuple[object, ...] | None = None,
         taskCallback: Callable[[object], object] | None = None,
     ) -> bool:
-        """Call ``task(*args)`` in a thread, then ``taskCallback`` with its result; return whether it was accepted."""
+        """Call ``task(*args)`` in a thread, then ``taskCallback`` with its result; return whether the task was accepted."""
         with self._changed:
             if self._is_joining or not callable(task):
                 return False
@@ -57,7 +57,7 @@ class MarkedThreadPool:
             return True
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
-        """End the threads, on request after the queued tasks; then the pool may be used again."""
+        """Stop the threads, after the queued tasks if requested; the pool can be used again afterwards."""
         with self._changed:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
@@ -88,11 +88,11 @@ class MarkedThreadPool:
                 if task.on_result:
                     task.on_result(result)
             except Exception:
-                # The edge of the user's task.
+                # The caller's task may raise anything.
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not at work; None if this thread is to end."""
+        """Return the first task whose marker is not in use; None if this thread has to exit."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

@@ -1,4 +1,4 @@
-"""rosmaster.util: proxies of XML-RPC servers, one for each thread and address."""
+"""rosmaster.util: proxies of XML-RPC servers, one per thread and URI."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PROXIES = _Proxies()
 
 
 def xmlrpcapi(uri: str | None) -> ServerProxy | None:
-    """Return the proxy of an address; None if it names no host. Raise OSError if it is no http address."""
+    """Return the proxy for a URI; None if it has no host. Raise OSError if it is not an http URI."""
     if uri is None or not urlparse(uri).netloc:
         return None
     if uri not in _PROXIES.by_uri:
@@ -27,5 +27,5 @@ def xmlrpcapi(uri: str | None) -> ServerProxy | None:
 
 
 def remove_server_proxy(uri: str) -> None:
-    """Forget the proxy of an address, whose server has gone."""
+    """Remove the proxy for a URI whose server has exited."""
     _PROXIES.by_uri.pop(uri, None)

@@ -1,6 +1,6 @@
-"""rosmaster.validators: what calls of the master require of their arguments.
+"""rosmaster.validators: checks of the arguments of master calls.
 
-Each function returns a check ``(value, caller_id) -> value``, which raises ParameterInvalid. The texts are rosmaster's.
+Each function returns a check ``(value, caller_id) -> value``, which raises ParameterInvalid with rosmaster's messages.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Check = Callable[[object, str], object]
 
 
 def not_none(param_name: str) -> Check:
-    """Require a value."""
+    """Require a value other than None."""
 
     def check(value: object, caller_id: str) -> object:
         if value is None:
@@ -46,7 +46,7 @@ def not_none(param_name: str) -> Check:
 
 
 def non_empty(param_name: str) -> Check:
-    """Require a value that is not empty."""
+    """Require a non-empty value."""
 
     def check(value: object, caller_id: str) -> object:
         if not value:
@@ -57,7 +57,7 @@ def non_empty(param_name: str) -> Check:
 
 
 def non_empty_str(param_name: str) -> Check:
-    """Require a text that is not empty."""
+    """Require a non-empty string."""
 
     def check(value: object, caller_id: str) -> object:
         if not isinstance(non_empty(param_name)(value, caller_id), str):
@@ -68,7 +68,7 @@ def non_empty_str(param_name: str) -> Check:
 
 
 def empty_or_valid_name(param_name: str) -> Check:
-    """Require a name or no text; return the resolved name."""
+    """Require an empty string or a valid name; return the resolved name."""
 
     def check(value: object, caller_id: str) -> object:
         if not isinstance(value, str):
@@ -91,12 +91,12 @@ def global_name(param_name: str) -> Check:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return a name, resolved. Raise ParameterInvalid where it is none."""
+    """Return the resolved name. Raise ParameterInvalid if it is not a valid name."""
     return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return a name as it is. Raise ParameterInvalid where it is none."""
+    """Return the name unchanged. Raise ParameterInvalid if it is not a valid name."""
     name = _text(param_name, param_value)
     if ":" in name or " " in name:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")
@@ -104,7 +104,7 @@ def valid_name_validator_unresolved(param_name: str, param_value: object, caller
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Check:
-    """Require a name, and resolve it on request."""
+    """Require a valid name; resolve it if ``resolve`` is set."""
     chosen = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
 
     def check(value: object, caller_id: str) -> object:
@@ -114,17 +114,17 @@ def valid_name(param_name: str, resolve: bool = True) -> Check:
 
 
 def is_topic(param_name: str) -> Check:
-    """Require the name of a topic; return the resolved name."""
+    """Require a topic name; return the resolved name."""
     return valid_name(param_name)
 
 
 def is_service(param_name: str) -> Check:
-    """Require the name of a service; return the resolved name."""
+    """Require a service name; return the resolved name."""
     return valid_name(param_name)
 
 
 def is_api(paramName: str) -> Check:
-    """Require the address of a node's or a service's API."""
+    """Require the URI of a node's or a service's API."""
 
     def check(value: object, caller_id: str) -> object:
         if not value or not isinstance(value, str):

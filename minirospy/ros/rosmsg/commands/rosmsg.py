@@ -1,6 +1,6 @@
-"""rosmsg and rossrv: the message and service types that are installed.
+"""rosmsg and rossrv: show the installed message and service types.
 
-Source: http://wiki.ros.org/rosmsg. What is printed is what ROS prints.
+Source: http://wiki.ros.org/rosmsg. The output is the same as in ROS.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def main_srv(argv: Sequence[str] | None = None) -> int:
 
 
 class _Verbs:
-    """The verbs for one kind of interface."""
+    """The verbs for one kind of interface: messages or services."""
 
     def __init__(self, command: str, kind: Kind) -> None:
         self.command = command
@@ -68,7 +68,7 @@ class _Verbs:
                 print(interfaces.text(type_) if raw else interfaces.description(type_))
 
     def _cannot_show(self, name: str) -> str:
-        """Return ROS's text about a type that does not exist."""
+        """Return ROS's error message for a type that does not exist."""
         from minirospy.workspace.packages import Packages
 
         package, slash, base = name.partition("/")
@@ -163,7 +163,7 @@ class _Verbs:
 
 
 def _names(name: str | None) -> list[str]:
-    """Return the name that was typed, else those that a pipe brings."""
+    """Return the name from the command line, else the names from stdin."""
     if name is not None:
         return [name]
     import sys
@@ -175,7 +175,7 @@ def _names(name: str | None) -> list[str]:
 
 
 def _invalid_package(name: str) -> str:
-    """Return ROS's text about a package that does not exist: the folders that were searched are part of it."""
+    """Return ROS's error message for a package that does not exist, which includes the searched folders."""
     from minirospy.workspace.packages import Packages
 
     roots = (f"\nROS path [{number}]={root}" for number, root in enumerate(Packages().roots))

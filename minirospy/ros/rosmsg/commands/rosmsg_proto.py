@@ -1,6 +1,6 @@
-"""rosmsg-proto: a message or request of default values as YAML, for completion in shells and editors.
+"""rosmsg-proto: print a message or request with default values as YAML, for completion in shells and editors.
 
-Source: `rosmsg-proto -h` of ROS 1, whose text and exit statuses these are.
+Source: `rosmsg-proto -h` of ROS 1, whose messages and exit statuses this command has.
 """
 
 from __future__ import annotations

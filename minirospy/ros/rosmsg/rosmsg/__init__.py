@@ -1,4 +1,4 @@
-"""rosmsg: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
+"""rosmsg: information about installed types. Source: http://wiki.ros.org/rosmsg."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class ROSMsgException(Exception):
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a message type, expanded, or with ``raw`` as in its file. Raise ROSMsgException."""
+    """Return the text of a message type: expanded, or as in its file if ``raw``. Raise ROSMsgException."""
     return _text(type_, raw, Kind.MESSAGE)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a service type, expanded, or with ``raw`` as in its file. Raise ROSMsgException."""
+    """Return the text of a service type: expanded, or as in its file if ``raw``. Raise ROSMsgException."""
     return _text(type_, raw, Kind.SERVICE)
 
 
@@ -87,22 +87,22 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the types of a name without its package."""
+    """Yield the full names of the types whose name without package is ``base_type``."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 
 
 def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
-    """Yield (name, folder of its definitions) of each package that has any."""
+    """Yield (name, folder of its definitions) for each package that has definitions."""
     packages = Packages()
     for name in Interfaces(packages, _kind(mode)).packages():
         yield name, str(packages.find(name) / mode.removeprefix("."))
 
 
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
+    """Return a genmsg spec as `rosmsg show` prints it, indented by ``indent``; also write it to the stream ``buff``.
 
-    Raise KeyError if it needs a message that is not in the context.
+    Raise KeyError if a message that it depends on is not in the context.
     """
     from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
 
@@ -114,9 +114,10 @@ def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = No
 
 
 def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None = None) -> str:
-    """Return a message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
+    """Return a message as YAML with sorted fields, and ``prefix`` before each line.
 
-    Else flat values are in braces if a message or array has more than four entries, so that it fits the screen.
+    ``flow_style_``: put everything in braces.
+    By default, flat values are in braces if a message or array has more than four entries, to save lines.
     """
     import yaml
 
@@ -127,7 +128,7 @@ def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None
 
 
 def rosmsgmain(mode: str = MODE_MSG) -> int:
-    """Run the command on this process's command line. Return its exit status."""
+    """Run the command with this process's arguments. Return its exit status."""
     from minirospy.ros.rosmsg.commands import rosmsg
 
     return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
@@ -144,17 +145,17 @@ def rosmsg_cmd_packages(mode: str, full: object, argv: Sequence[str] | None = No
 
 
 def rosmsg_cmd_md5(mode: str, full: object) -> int:
-    """Run ``rosmsg md5`` or ``rossrv md5`` with the arguments of this process's command line."""
+    """Run ``rosmsg md5`` or ``rossrv md5`` with this process's arguments."""
     return _run(mode, ["md5", *sys.argv[2:]])
 
 
 def rosmsg_cmd_package(mode: str, full: object) -> int:
-    """Run ``rosmsg package`` or ``rossrv package`` with the arguments of this process's command line."""
+    """Run ``rosmsg package`` or ``rossrv package`` with this process's arguments."""
     return _run(mode, ["package", *sys.argv[2:]])
 
 
 def rosmsg_cmd_show(mode: str, full: object, alias: str = "show") -> int:
-    """Run ``rosmsg show`` or ``rossrv show`` with the arguments of this process's command line."""
+    """Run ``rosmsg show`` or ``rossrv show`` with this process's arguments."""
     return _run(mode, ["show", *sys.argv[2:]])
 
 
@@ -165,24 +166,24 @@ def _run(mode: str, words: Sequence[str]) -> int:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder for whose path ``rfilter`` is true; none if the folder does not exist."""
+    """Return the names in a folder for which ``rfilter`` of their path is true; none if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
 
 
 def _msg_filter(ext: str) -> Callable[[str], bool]:
-    """Return a function of a path that returns whether it is a file with this extension."""
+    """Return a function that returns whether a path is a file with this extension."""
     return lambda path: os.path.isfile(path) and path.endswith(ext)
 
 
 def _list_types(path: str, subdir: str, ext: str) -> list[str]:
-    """Return the names of the types that the files in a folder define, sorted; ``subdir`` has no effect, as in ROS."""
+    """Return the sorted names of the types that a folder's files define; ``subdir`` has no effect, as in ROS."""
     return sorted(name[: -len(ext)] for name in _list_resources(path, _msg_filter(ext)))
 
 
 def _plain(value: object) -> object:
-    """Return a value as dictionaries, lists and scalars of YAML."""
+    """Convert a value to YAML's dictionaries, lists and scalars."""
     if isinstance(value, TVal):
         return {"secs": value.secs, "nsecs": value.nsecs}
     if hasattr(value, "__slots__"):
@@ -191,13 +192,13 @@ def _plain(value: object) -> object:
 
 
 def _width(plain: object) -> int:
-    """Return the number of entries of the widest dictionary or list."""
+    """Return the number of entries of the longest dictionary or list."""
     inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
     return max(len(inner), *map(_width, inner), 0)
 
 
 def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
-    """Return the folders of a package's definitions, for programs that load them by genmsg."""
+    """Return the folders of a package's definitions, for programs that load them with genmsg."""
     return [rospack.get_path(pkgname)]
 
 

@@ -1,6 +1,6 @@
-"""rosnode: which nodes there are, what they do, whether they answer; stopping them.
+"""rosnode: lists, inspects, pings and kills nodes.
 
-Source: http://wiki.ros.org/rosnode. What is printed is what ROS prints.
+Source: http://wiki.ros.org/rosnode. The output is the same as in ROS.
 """
 
 from __future__ import annotations
@@ -88,14 +88,14 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error about a missing node name; it lists the nodes where a master answers."""
+    """Return the error for a missing node name; it lists the nodes if a master answers."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # Twice, as ROS does: its list of nodes is an error inside of the error.
+    # ROS prints the error twice, because its list of nodes is an error inside the error.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -104,7 +104,7 @@ def _no_node_to_ping() -> Misuse:
 
 
 def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
-    """Ping a node once a second: ``count`` times, or until Ctrl-C where it is 0."""
+    """Ping a node once a second: ``count`` times, or until Ctrl-C if ``count`` is 0."""
     print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
     times: list[float] = []
     try:
@@ -136,7 +136,7 @@ def _ping_all(graph: Graph) -> int:
 
 
 def _no_answer(error: NodeUnreachableError) -> str:
-    """Return ROS's text about a node that does not answer."""
+    """Return ROS's error message for a node that does not answer."""
     if is_unknown_host(error):
         return f"ERROR: Unknown host [{node_host(error.uri)}] for node [{error.name}]"
     if is_timeout(error):
@@ -145,7 +145,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print; the milliseconds are in ``times`` before the line is printed, in case Ctrl-C follows."""
+    """Ping and print; append the milliseconds to ``times`` before the line is printed, in case Ctrl-C arrives."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -287,7 +287,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return the nodes of ``names`` that exist; print an error for each of the others."""
+    """Return the existing nodes of ``names``; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

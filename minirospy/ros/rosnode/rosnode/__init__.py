@@ -1,4 +1,4 @@
-"""rosnode: queries about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
+"""rosnode: information about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return what the master knows of a node, as `rosnode info` prints it. Raise ROSNodeIOException."""
+    """Return the master's information about a node, as `rosnode info` prints it. Raise ROSNodeIOException."""
     with _graph() as graph:
         name = graph.resolve(node_name)
         try:
@@ -89,9 +89,9 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node answers ``max_count`` pings (None: pings until it does not). Raise ROSNodeIOException.
+    """Return whether a node answers ``max_count`` pings (None: until one fails). Raise ROSNodeIOException.
 
-    Why it does not is printed on stderr, all else with ``verbose`` alone.
+    The reason of a failure is printed to stderr; everything else only with ``verbose``.
     """
     with _graph() as graph:
         name = graph.resolve(node_name)
@@ -131,7 +131,7 @@ def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[l
 
 
 def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
-    """Request nodes to shut down; return (notified, unknown or unreachable). Without a master all are unknown."""
+    """Request nodes to shut down; return (notified, unknown or unreachable). Without a master, all are unknown."""
     notified: list[str] = []
     unknown: list[str] = []
     try:
@@ -151,12 +151,12 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 
 
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
-    """Take what the nodes in ``blacklist`` registered out of the master, and print their names.
+    """Unregister the nodes in ``blacklist`` from the master, and print their names.
 
-    Raise ConnectionRefusedError if no master answers, as ROS's does.
+    Raise ConnectionRefusedError if no master answers, as in ROS.
     """
     with _graph(master, ConnectionRefusedError) as graph:
-        # Also if nothing is on the list: a master that does not answer is an error.
+        # Called even if the list is empty, because an unreachable master is an error.
         graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
@@ -164,9 +164,9 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 
 
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
-    """Take what all nodes but those in ``whitelist`` registered out of the master.
+    """Unregister all nodes except those in ``whitelist`` from the master.
 
-    Raise ConnectionRefusedError if no master answers, as ROS's does.
+    Raise ConnectionRefusedError if no master answers, as in ROS.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -174,14 +174,14 @@ def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str])
 
 
 def get_machines_by_nodes() -> list[str]:
-    """Return the machines that nodes run on."""
+    """Return the machines on which nodes run."""
     with _graph() as graph:
         hosts = (node_host(node.uri) for node in graph.addresses(nodes.list_nodes(graph)))
         return sorted({host for host in hosts if host})
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """Return the nodes on a machine. Raise ROSNodeException if its name does not resolve."""
+    """Return the nodes on a machine. Raise ROSNodeException if its name cannot be resolved."""
     try:
         wanted = socket.gethostbyname(machine)
     except OSError as error:
@@ -195,12 +195,12 @@ def get_nodes_by_machine(machine: str) -> list[str]:
 
 
 def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list_all: bool = False) -> None:
-    """Print what `rosnode list` prints."""
+    """Print the output of `rosnode list`."""
     print(_sub_rosnode_listnodes(namespace, list_uri, list_all))
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print what `rosnode info` prints; ``quiet``: without asking the node. Raise ROSNodeIOException."""
+    """Print the output of `rosnode info`; ``quiet``: do not query the node. Raise ROSNodeIOException."""
     print(f"{_RULE}\n{get_node_info_description(node_name)}")
     if quiet:
         return
@@ -224,13 +224,13 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """Run the command; ``argv`` starts with its name. Exit with its status, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit with its status, as in ROS."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
 
 
-# Of ROS's private functions those that programs call.
+# Private functions of ROS that programs call.
 
 
 def _command(argv: Sequence[str]) -> None:
@@ -245,7 +245,7 @@ _rosnode_cmd_list = _rosnode_cmd_machine = _rosnode_cmd_ping = _command
 
 
 def _fullusage(return_error: bool = True) -> NoReturn:
-    """Print the commands, and exit: with the status of a usage error, or 0."""
+    """Print the list of commands, and exit with the status of a usage error, or 0."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     status = main([])
@@ -255,7 +255,7 @@ def _fullusage(return_error: bool = True) -> NoReturn:
 def _sub_rosnode_listnodes(
     namespace: str | None = None, list_uri: bool = False, list_all: bool = False
 ) -> str:
-    """Return the lines that `rosnode list` prints."""
+    """Return the output lines of `rosnode list`."""
     with _graph() as graph:
         found = graph.addresses(get_node_names(namespace))
     if list_all:
@@ -264,7 +264,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value of an answer (code, text, value). Raise ROSNodeException if it is an error."""
+    """Return the value of an answer (code, status message, value). Raise ROSNodeException if it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -276,7 +276,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Return the seconds that a ping takes; None if the node does not answer, which is printed."""
+    """Return the seconds that a ping takes; print an error and return None if the node does not answer."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:
@@ -298,8 +298,8 @@ def _address(host: str) -> str | None:
 def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
-    """Yield the graph of ``master``, else of the environment's; raise errors as this module's exceptions."""
-    # A ServerProxy, which old scripts pass, has any attribute, but no such text.
+    """Yield the graph of ``master``, or by default the environment's; raise errors as this module's exceptions."""
+    # Old scripts pass a ServerProxy, which returns an object for any attribute, but never a string.
     uri = getattr(master, "master_uri", None)
     try:
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:

@@ -1,9 +1,10 @@
-"""rospack, rosstack: where packages are, and which needs which.
+"""rospack, rosstack: find packages and their dependencies.
 
-To rosstack metapackages are packages too; to rospack they are none. What is printed, also of errors, and the exit
-statuses are theirs: http://docs.ros.org/api/rospack/html/commandline.html. Parsed without argparse, since shells and
-scripts call `rospack find` again and again. Differences on purpose: a package.xml that does not read ends only what
-needs it, conditions are evaluated, and a circle of packages is an error only for those in it.
+rosstack treats metapackages as packages; rospack does not. Output, error messages and exit
+statuses are theirs: http://docs.ros.org/api/rospack/html/commandline.html. Parsed without argparse, for speed, since
+shells and
+scripts call `rospack find` often. Intended differences: an invalid package.xml is an error only for packages that depend on
+it, conditions are evaluated, and a dependency cycle is an error only for the packages in it.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ _FOOTER = """\
 
 
 class _RospackError(MinirospyError):
-    """An error of rospack, in its words."""
+    """An error with rospack's message."""
 
 
 class _Line(NamedTuple):
-    """A command line, taken apart."""
+    """A parsed command line."""
 
     verb: str
     package: str
@@ -49,7 +50,7 @@ class _Line(NamedTuple):
 
 
 class _Verb(NamedTuple):
-    """``usage`` follows the name in the help; ``summary`` is what `rospack help VERB` prints."""
+    """A verb: ``usage`` follows its name in the help; ``summary`` is the output of `rospack help VERB`."""
 
     body: Callable[[_Line, Dependencies], None]
     usage: str
@@ -59,7 +60,7 @@ class _Verb(NamedTuple):
 
 
 class _Tool(NamedTuple):
-    """A command: its name, what it calls a package, and its verbs."""
+    """A command: its name, its word for a package, and its verbs."""
 
     name: str
     thing: str
@@ -67,12 +68,12 @@ class _Tool(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 1 where rospack does."""
+    """Run the command; return 1 if rospack would."""
     return _run(_Tool("rospack", "package", _VERBS), argv)
 
 
 def rosstack(argv: Sequence[str] | None = None) -> int:
-    """Run the command rosstack; return 1 where rosstack does."""
+    """Run the command rosstack; return 1 if rosstack would."""
     return _run(_Tool("rosstack", "stack", _STACK_VERBS), argv)
 
 
@@ -96,7 +97,7 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             print(_help(tool, line.package))
             return 0
         if not line.verb:
-            # No failure, to rospack.
+            # rospack does not treat this as a failure.
             complain("Error", f"no command given.  Try '{tool.name} help'")
             return 0
         tree = Dependencies(
@@ -145,7 +146,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return the verb of a line. Raise _RospackError if it does not exist or does not take the line's options."""
+    """Return the verb of a command line. Raise _RospackError if it does not exist or does not support the options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
@@ -168,7 +169,10 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 
 
 def _package(line: _Line, *others: str, said: str = "package") -> str:
-    """Return the package of a line, or the current folder's. Raise _RospackError without one, or one of ``others``."""
+    """Return the package of a command line, or the current folder's.
+
+    Raise _RospackError if there is none, or it is in ``others``.
+    """
     package = line.package or _package_here()
     if not package or not all(line.options.get(name) for name in others):
         raise _RospackError(f"no {said} given")
@@ -176,7 +180,7 @@ def _package(line: _Line, *others: str, said: str = "package") -> str:
 
 
 def _package_here() -> str:
-    """Return the package that the current folder is, or is in."""
+    """Return the package that contains the current folder."""
     here = Path.cwd()
     return next(filter(None, map(package_name, (here, *here.parents))), "")
 
@@ -229,7 +233,7 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # What rosbuild wrote when it generated messages: catkin packages have none.
+    # rosbuild created these files when it generated messages; catkin packages do not have them.
     tree.all(_package(line))
     print()
 
@@ -253,7 +257,7 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # <versioncontrol> is a tag of manifest.xml, which package.xml has not.
+    # <versioncontrol> is a tag of manifest.xml that package.xml does not have.
     tree.folder(_package(line))
 
 
@@ -277,7 +281,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """Return the values of an attribute in the exports of a package and of all that it needs, each once."""
+    """Return the distinct values of an attribute in the exports of a package and all of its dependencies."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:
@@ -309,7 +313,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """Return the compiler's or linker's words in <cpp> exports, of those that ``keep`` chooses, without ``prefix``."""
+    """Return a verb that prints the compiler or linker flags in <cpp> exports that ``keep`` selects, without ``prefix``."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

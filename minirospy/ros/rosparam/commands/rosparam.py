@@ -1,6 +1,6 @@
 """rosparam: read and write the parameter server.
 
-Source: http://wiki.ros.org/rosparam. What is printed is what ROS prints.
+Source: http://wiki.ros.org/rosparam. The output is the same as in ROS.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _set(parameter: str, value: str | None, textfile: str | None, binfile: str |
     elif binfile is not None:
         new = _read_bytes(binfile)
     else:
-        # No text is the empty text to the shell's user; to YAML it would be null.
+        # In a shell, no text means the empty string; YAML would read it as null.
         new = parse_value(value) if value else ""
 
     with Graph.open("rosparam") as graph:
@@ -272,7 +272,7 @@ FAMILY = Family(
         ),
         Verb("list", "list parameter names", _list_parser, _list),
     ),
-    # ROS ends with 0 for an unknown verb, too; that would hide the error from scripts.
+    # ROS exits with 0 for an unknown verb, which would hide the error from scripts.
     help_status=HelpStatus(none=0, short=0, long=0, unknown=64),
     shows_help_on_error=True,
 )

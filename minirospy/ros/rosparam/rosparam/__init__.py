@@ -41,7 +41,7 @@ __all__ = [
 NAME = "rosparam"
 NS = "_ns"
 
-# Programs that import rosparam read deg(90) and rad(pi/2) with the loaders of PyYAML, as with ROS's.
+# Programs that import rosparam can read deg(90) and rad(pi/2) with PyYAML's own loaders, as in ROS.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
 
@@ -55,13 +55,13 @@ class RosParamIOException(RosParamException):
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """A text is not YAML: programs catch the one or the other."""
+    """Invalid YAML; programs catch either of the two base classes."""
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter's value; bytes and dates in xmlrpc.client's wrappers, as programs know them from ROS.
+    """Return a parameter's value, with bytes and dates in xmlrpc.client's wrappers, as in ROS.
 
-    Raise rosgraph.MasterError if it is not set, or the name is empty.
+    Raise rosgraph.MasterError if it is not set, or if the name is empty.
     """
     with _graph() as graph:
         name = _resolve(graph, param)
@@ -72,7 +72,7 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter from YAML text. Raise RosParamException, also if it is none."""
+    """Set a parameter from a YAML string. Raise RosParamException, also if it is not YAML."""
     try:
         parsed = parse_value(value)
     except ValueTextError as error:
@@ -81,7 +81,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
-    """Set a parameter to a value; a dictionary leaves other parameters of its namespace."""
+    """Set a parameter to a value; a dictionary does not delete other parameters of the namespace."""
     with _graph() as graph:
         target = graph.resolve(param) if isinstance(param, str) else _resolve(graph, param)
         for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
@@ -90,7 +90,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Return a value with bytes instead of each Binary in it."""
+    """Return a value with each Binary replaced by bytes."""
     if isinstance(value, Binary):
         return value.data
     if isinstance(value, dict):
@@ -99,7 +99,7 @@ def _with_bytes(value: object) -> object:
 
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
-    """Set all values below a namespace. Raise RosParamException if they have no names at the root."""
+    """Set all values below a namespace. Raise RosParamException if the root is set to anything but a dictionary."""
     check_sendable(ns)
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -109,7 +109,7 @@ def upload_params(ns: str, values: object, verbose: bool = False) -> None:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raise rosgraph.MasterError if it is not set, or the name is empty."""
+    """Delete a parameter. Raise rosgraph.MasterError if it is not set, or if the name is empty."""
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
@@ -121,7 +121,7 @@ def delete_param(param: str, verbose: bool = False) -> None:
 
 
 def print_params(params: object, ns: str) -> None:
-    """Print parameters, ``name=value`` a line; a single value by itself."""
+    """Print parameters, one ``name=value`` per line; print a single value alone."""
     if isinstance(params, dict):
         for name, value in parameters.flatten(ns, params):
             print(f"{name}={value}")
@@ -130,7 +130,7 @@ def print_params(params: object, ns: str) -> None:
 
 
 def get_param_server() -> Master:
-    """Return the parameter server: the master that the environment names."""
+    """Return the parameter server: the environment's master."""
     return Master("/" + NAME)
 
 
@@ -144,10 +144,10 @@ def list_params(ns: str) -> list[str]:
 def load_file(
     filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] of each document of a YAML file, which may contain more than a parameter can.
+    """Return [(values, namespace)] for each document in a YAML file; values may be of types that parameters cannot have.
 
-    ``-``, or nothing, is the standard input.
-    Raise RosParamException if it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
+    ``-`` or an empty name means stdin.
+    Raise RosParamException if it cannot be read; invalid YAML raises one that is also a yaml.YAMLError.
     """
     if not filename or filename == "-":
         if verbose:
@@ -169,7 +169,7 @@ def load_file(
 def load_str(
     str: str | bytes, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
+    """Return [(values, namespace)] for each document in a YAML string, which :func:`load_file` read from ``filename``."""
     text = str.decode() if isinstance(str, bytes) else str
     try:
         documents = list(parse_documents(text, filename))
@@ -186,7 +186,7 @@ def load_str(
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters below a name to a file. Raise OSError, rosgraph.MasterError if there are none."""
+    """Write the parameters below a name to a file. Raise OSError, or rosgraph.MasterError if there are none."""
     values = get_param(param)
     if verbose:
         print_params(values, param)
@@ -194,14 +194,14 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
 
 
-# Of ROS's private functions those that programs call.
+# Private functions of ROS that programs call.
 
 _rosparam_cmd_delete = _rosparam_cmd_list = yamlmain
 
@@ -215,16 +215,17 @@ _rosparam_cmd_set_load = _rosparam_cmd_get_dump
 
 
 def _fullusage() -> NoReturn:
-    """Print the commands, and exit as `rosparam` without arguments does."""
+    """Print the list of commands, and exit as `rosparam` without arguments does."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     sys.exit(main([]))
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return the global name of a parameter. An empty one would be the namespace, and so all parameters in it.
+    """Return the global name of a parameter. An empty name would mean the namespace, and so all parameters in it.
 
-    What is not text raises what ROS raises, which sends it to the master: TypeError where XML-RPC has no type for it.
+    A value that is not a string raises the same error as in ROS, which sends it to the master: TypeError if XML-RPC has
+    no such type.
     """
     if not isinstance(param, str):
         check_sendable(param)

@@ -1,3 +1,3 @@
-"""rospkg: where packages are, and what they need."""
+"""rospkg: finds packages and their dependencies."""
 
 __version__ = "1.4.0"

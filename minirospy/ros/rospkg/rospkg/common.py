@@ -1,4 +1,4 @@
-"""rospkg.common: file names, and the error of a name that is not found."""
+"""rospkg.common: file names, and the error for a name that is not found."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROS_STACK = "ros"
 
 
 class ResourceNotFound(Exception):
-    """No package or stack of a name; ``ros_paths`` are the folders that were searched."""
+    """No package or stack has this name; ``ros_paths`` are the searched folders."""
 
     def __init__(self, msg: str, ros_paths: Sequence[str] | None = None, nearest: Sequence[str] = ()) -> None:
         super().__init__(msg)

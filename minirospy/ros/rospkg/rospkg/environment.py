@@ -1,4 +1,4 @@
-"""rospkg.environment: the names of variables, and what they are set to."""
+"""rospkg.environment: the names and values of environment variables."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"
 
 
 def _compute_package_paths(ros_root: str | None, ros_package_path: str | None) -> list[str]:
-    """Return the folders that two variables' values name."""
+    """Return the folders in the values of ROS_ROOT and ROS_PACKAGE_PATH."""
     named = (ros_package_path or "").split(os.pathsep)
     return [path for path in (ros_root or "", *named) if path.strip()]
 
 
 def _resolve_path(p: str) -> str:
-    """Return a path of a variable, ``~`` at its start expanded."""
+    """Return a path from a variable, with ``~`` at its start expanded."""
     return os.path.expanduser(p) if p and p[0] == "~" else p
 
 
 def _resolve_paths(paths: str) -> str:
-    """Return the paths of a variable, ``~`` at the start of each expanded."""
+    """Return the paths from a variable, with ``~`` at the start of each expanded."""
     return os.pathsep.join(_resolve_path(path) for path in paths.split(os.pathsep) if path)
 
 
@@ -91,7 +91,7 @@ def get_etc_ros_dir(env: Environ | None = None) -> str:
 
 
 def on_ros_path(p: str, env: Environ | None = None) -> bool:
-    """Return whether a path is in one of the folders that are searched for packages."""
+    """Return whether a path is in one of the folders in which packages are searched."""
     place = Path(p).resolve()
     return any(place.is_relative_to(Path(root).resolve()) for root in get_ros_paths(env))
 

@@ -1,4 +1,4 @@
-"""rospkg.manifest: a package.xml as rospkg shows it."""
+"""rospkg.manifest: the content of a package.xml in rospkg's form."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Export:
 
 
 class Manifest:
-    """A package.xml as rospkg shows it. ``filename`` is its path."""
+    """The content of a package.xml in rospkg's form. ``filename`` is its path."""
 
     is_catkin = True
     brief = license_url = status = notes = ""
@@ -75,7 +75,7 @@ class Manifest:
         self.unknown_tags: list[str] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """Return the values of an attribute in the exports of a tag; ``${prefix}`` becomes the folder if ``convert``."""
+        """Return the values of an attribute of the exports with this tag; if ``convert``, replace ``${prefix}`` by the folder."""
         values = [export.attrs[attr] for export in self.exports if export.tag == tag and attr in export.attrs]
         folder = os.path.dirname(self.filename)
         return [value.replace("${prefix}", folder) if convert else value for value in values]

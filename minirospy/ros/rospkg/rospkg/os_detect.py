@@ -1,6 +1,6 @@
-"""rospkg.os_detect: which operating system this is, by name, version and codename.
+"""rospkg.os_detect: detects the operating system's name, version and codename.
 
-Linux says it in /etc/os-release, whatever the distribution; rospkg's detectors of single distributions are here one class.
+All Linux distributions specify them in /etc/os-release, so one class replaces rospkg's detectors for single distributions.
 ``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
 """
 
@@ -50,15 +50,15 @@ _OF_FDO = {
     "raspbian": OS_DEBIAN, "rhel": OS_RHEL, "rocky": OS_ROCKY, "sailfishos": OS_SAILFISHOS, "slackware": OS_SLACKWARE,
     "tizen": OS_TIZEN, "ubuntu": OS_UBUNTU, "zorin": OS_ZORIN,
 }  # fmt: skip
-"""ID of /etc/os-release -> rospkg's name."""
+"""ID in /etc/os-release -> rospkg's name."""
 
 
 class OsNotDetected(Exception):
-    """This operating system is not the one that a detector knows."""
+    """This operating system is not the detector's."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
-    """Return the values of an os-release file; None if there is none."""
+    """Return the values of an os-release file; None if the file does not exist."""
     for path in (filename,) if filename else ("/etc/os-release", "/usr/lib/os-release"):
         try:
             with open(path, encoding="utf-8", errors="replace") as file:
@@ -70,7 +70,7 @@ def read_os_release(filename: str | None = None) -> dict[str, str] | None:
 
 
 def read_issue(filename: str = "/etc/issue") -> list[str] | None:
-    """Return the words of /etc/issue; None if there is none."""
+    """Return the words of /etc/issue; None if the file does not exist."""
     try:
         with open(filename, encoding="utf-8", errors="replace") as file:
             return file.read().split()
@@ -84,30 +84,30 @@ def uname_get_machine() -> str:
 
 
 class OsDetector:
-    """Recognizes one operating system."""
+    """Detects one operating system."""
 
     def is_os(self) -> bool:
-        """Return whether this is it."""
+        """Return whether the detector's system is running."""
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
-        """Return its version. Raise OsNotDetected."""
+        """Return the system's version. Raise OsNotDetected."""
         raise NotImplementedError("get_version unimplemented")
 
     def get_codename(self) -> str:
-        """Return its codename. Raise OsNotDetected."""
+        """Return the system's codename. Raise OsNotDetected."""
         raise NotImplementedError("get_codename unimplemented")
 
 
 class FdoDetect(OsDetector):
-    """A Linux by its ID in os-release."""
+    """Detects a Linux distribution by its ID in os-release."""
 
     def __init__(self, fdo_id: str) -> None:
         release = read_os_release()
         self.release_info = release if release and release.get("ID") == fdo_id else None
 
     def is_os(self) -> bool:
-        """Return whether this is it."""
+        """Return whether the detector's system is running."""
         return self.release_info is not None
 
     def get_version(self) -> str:
@@ -129,7 +129,7 @@ class FdoDetect(OsDetector):
 
 
 class LsbDetect(FdoDetect):
-    """A Linux by the name that `lsb_release` gives it, which os-release has in lower case."""
+    """Detects a Linux distribution by its name from `lsb_release`, which os-release has in lower case."""
 
     def __init__(self, lsb_name: str, get_version_fn: object = None) -> None:
         self.lsb_name = lsb_name
@@ -137,29 +137,29 @@ class LsbDetect(FdoDetect):
 
 
 class Debian(LsbDetect):
-    """Debian."""
+    """Detects Debian."""
 
     def __init__(self, get_version_fn: object = None) -> None:
         super().__init__("debian", get_version_fn)
 
 
 class _Platform(OsDetector):
-    """A system that Python's own ``platform`` names."""
+    """Detects a system by the name in Python's ``platform``."""
 
     system = ""
 
     def is_os(self) -> bool:
-        """Return whether this is it."""
+        """Return whether the detector's system is running."""
         return platform.system() == self.system
 
     def get_version(self) -> str:
-        """Return its version. Raise OsNotDetected."""
+        """Return the system's version. Raise OsNotDetected."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return self._version()
 
     def get_codename(self) -> str:
-        """Return no codename. Raise OsNotDetected."""
+        """Return an empty codename. Raise OsNotDetected."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return ""
@@ -169,7 +169,7 @@ class _Platform(OsDetector):
 
 
 class Windows(_Platform):
-    """Windows."""
+    """Detects Windows."""
 
     system = "Windows"
 
@@ -178,7 +178,7 @@ class Windows(_Platform):
 
 
 class OSX(_Platform):
-    """macOS."""
+    """Detects macOS."""
 
     system = "Darwin"
 
@@ -190,7 +190,7 @@ class OSX(_Platform):
 
 
 class FreeBSD(_Platform):
-    """FreeBSD."""
+    """Detects FreeBSD."""
 
     system = "FreeBSD"
 
@@ -199,7 +199,7 @@ class FreeBSD(_Platform):
 
 
 class OsDetect:
-    """Finds the operating system among detectors; the first that recognizes its own wins."""
+    """Detects the operating system with a list of detectors; the first that matches wins."""
 
     default_os_list: list[tuple[str, OsDetector]] = []
 
@@ -209,7 +209,7 @@ class OsDetect:
 
     @staticmethod
     def register_default(os_name: str, os_detector: OsDetector) -> None:
-        """Add a detector for all that follow."""
+        """Add a detector for all later OsDetect objects."""
         OsDetect.default_os_list.append((os_name, os_detector))
 
     def detect_os(self, env: Mapping[str, str] | None = None) -> tuple[str, str, str]:
@@ -228,7 +228,7 @@ class OsDetect:
         return self._found[:3]
 
     def get_detector(self, name: str | None = None) -> OsDetector | None:
-        """Return the detector of a name, or the one that recognized its own. Raise KeyError, OsNotDetected."""
+        """Return the detector with this name, or the one that matched. Raise KeyError, OsNotDetected."""
         if name is None:
             self.detect_os()
             return self._found[3] if self._found else None
@@ -238,7 +238,7 @@ class OsDetect:
         raise KeyError(name)
 
     def add_detector(self, name: str, detector: OsDetector) -> None:
-        """Add a detector, of which the later ones are tried first where they have no list of their own."""
+        """Add a detector to the end of the list."""
         self._os_list.append((name, detector))
 
     def get_name(self) -> str:

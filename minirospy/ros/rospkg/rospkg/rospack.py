@@ -1,7 +1,7 @@
-"""rospkg's classes and functions, over Packages and Dependencies; `import rospkg` re-exports them.
+"""rospkg's classes and functions, implemented with Packages and Dependencies; `import rospkg` re-exports them.
 
-Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. Where rospkg looks into rosdep's database
-for names that are packages, ours takes the packages that it finds: the other names are rosdep keys.
+Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. To tell packages from rosdep keys, rospkg reads
+rosdep's database; this module counts the names of packages that it finds as packages, and all others as rosdep keys.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 
 
 class ManifestManager:
-    """Packages, or stacks, below some folders. Results are cached: create a new object to see changes on disk."""
+    """Packages or stacks below given folders. Results are cached: create a new object to see changes on disk."""
 
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
@@ -47,7 +47,7 @@ class ManifestManager:
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
-        """Return the one object for these folders."""
+        """Return the shared object for these folders."""
         key: object = cls
         found = _instance(key, tuple(get_ros_paths() if ros_paths is None else ros_paths))
         assert isinstance(found, cls)
@@ -55,11 +55,11 @@ class ManifestManager:
 
     @property
     def ros_paths(self) -> Names:
-        """The folders that are searched."""
+        """The searched folders."""
         return list(self._ros_paths)
 
     def get_ros_paths(self) -> Names:
-        """Return the folders that are searched."""
+        """Return the searched folders."""
         return self.ros_paths
 
     def list(self) -> Names:
@@ -67,18 +67,18 @@ class ManifestManager:
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """Return the folder of one. Raise ResourceNotFound."""
+        """Return the folder of a package or stack. Raise ResourceNotFound."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
         return str(folders[name])
 
     def get_manifest(self, name: str) -> Manifest:
-        """Return the manifest of one. Raise ResourceNotFound, InvalidManifest."""
+        """Return the manifest of a package or stack. Raise ResourceNotFound, InvalidManifest."""
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that one names, or with ``implicit`` also what those need.
+        """Return the direct dependencies of a package; with ``implicit``, also the indirect ones.
 
         Raise ResourceNotFound, InvalidManifest.
         """
@@ -90,27 +90,27 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that name this one, or with ``implicit`` those that need it."""
+        """Return the packages that depend on this one directly; with ``implicit``, also those that do so indirectly."""
         found = []
         for other in self._folders():
             try:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
             except InvalidManifest:
-                # It does not matter to other packages.
+                # One invalid manifest must not affect other packages.
                 continue
         return found
 
     def get_custom_cache(self, key: Hashable, default: object = None) -> Any:
-        """Return a value of the user's cache."""
+        """Return a value from the program's own cache."""
         return self._custom.get(key, default)
 
     def set_custom_cache(self, key: Hashable, value: object) -> None:
-        """Store a value in the user's cache."""
+        """Store a value in the program's own cache."""
         self._custom[key] = value
 
     def _load_manifest(self, name: str) -> Manifest:
-        # Programs call it, though it is private in rospkg, too.
+        # Programs call this method, although it is private in rospkg, too.
         return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
@@ -124,7 +124,7 @@ class ManifestManager:
             raise InvalidManifest(str(error)) from error
 
     def _split(self, name: str) -> tuple[Names, Names]:
-        """Return the names in a manifest: those that are packages, those that are not."""
+        """Return the dependencies in a manifest: those that are packages, and those that are not."""
         from minirospy.workspace.manifest import Kind
 
         left_out = {Kind.DOC, Kind.BUILDTOOL_EXPORT}
@@ -137,15 +137,15 @@ class ManifestManager:
             if each not in found:
                 found[each] = None
                 self._visit(each, found)
-                # After what it needs.
+                # Move the package behind its dependencies.
                 found[each] = found.pop(each)
 
 
 class RosPack(ManifestManager):
-    """Packages."""
+    """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """Return the names in a manifest, or with ``implicit`` also in those that it needs, that are not packages.
+        """Return a package's dependencies that are not packages; with ``implicit``, also those of its dependencies.
 
         Raise ResourceNotFound, InvalidManifest.
         """
@@ -153,7 +153,7 @@ class RosPack(ManifestManager):
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """Return the stack of a package: None, as catkin has no stacks. Raise ResourceNotFound."""
+        """Return None, because catkin has no stacks. Raise ResourceNotFound."""
         self.get_path(package)
         return None
 
@@ -162,10 +162,10 @@ class RosPack(ManifestManager):
 
 
 class RosStack(ManifestManager):
-    """Metapackages."""
+    """Finds metapackages."""
 
     def packages_of(self, stack: str) -> Names:
-        """Return the packages that a metapackage names. Raise ResourceNotFound, InvalidManifest."""
+        """Return the packages in a metapackage. Raise ResourceNotFound, InvalidManifest."""
         return self.get_depends(stack, implicit=False)
 
     def get_stack_version(self, stack: str) -> str:
@@ -182,7 +182,7 @@ def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> Manifes
 
 
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:
-    """Return the packages below a folder; their folders go into ``cache``."""
+    """Return the packages below a folder; store their folders in ``cache``."""
     found = {name: str(folder) for name, folder in Packages.below(Path(path)).folders().items()}
     for name, folder in found.items():
         cache.setdefault(name, folder)
@@ -190,7 +190,7 @@ def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[s
 
 
 def get_package_name(path: str) -> str | None:
-    """Return the package that contains a path; None if none does."""
+    """Return the package that contains a path; None if there is none."""
     place = Path(path).absolute()
     return next(filter(None, map(package_name, (place, *place.parents))), None)
 
@@ -198,7 +198,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names): names of metapackages become those of their packages."""
+    """Return (packages, unknown names); metapackages are replaced by their packages."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():
@@ -211,5 +211,5 @@ def expand_to_packages(
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str:
-    """Return the version in the package.xml of a folder. Raise InvalidManifest."""
+    """Return the version in a folder's package.xml. Raise InvalidManifest."""
     return parse_manifest_file(stack_dir).version

@@ -1,1 +1,1 @@
-"""The part of `import rospy` besides `minirospy.client`: rospy's submodules, which programs reach into."""
+"""The submodules of rospy that programs import; the names of `import rospy` itself are in `minirospy.client`."""

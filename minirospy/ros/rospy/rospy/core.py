@@ -71,7 +71,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log for the caller of the caller, as rospy's log functions do: programs have such functions, too.
+    """Log with the position of the caller's caller, as rospy's log functions do; programs wrap it in the same way.
 
     ``level`` is a method of logging.Logger (``warning``), ``kwargs`` may have ``logger_name``.
     """
@@ -107,23 +107,23 @@ def add_preshutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` when is_shutdown() has become true. Raise TypeError."""
+    """Call ``h(reason)`` after is_shutdown() has become true. Raise TypeError."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
-    """Call ``h()`` at shutdown, as rospy.on_shutdown."""
+    """Call ``h()`` at shutdown, as rospy.on_shutdown does."""
     current_session().lifecycle.add_hook(h)
 
 
 def register_signals() -> None:
-    """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
+    """Make SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
     current_session().signals.install()
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT of the environment. Raise ROSException if it is ``required`` and not set."""
+    """Return ROS_ROOT from the environment. Raise ROSException if it is ``required`` and not set."""
     root = (os.environ if env is None else env).get("ROS_ROOT")
     if required and not root:
         raise ROSException("ROS_ROOT is not set")
@@ -142,12 +142,12 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid."""
     return valid_name(param_name)
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
-    """Return ``h`` as a hook without an argument, for the lifecycle. Raise TypeError."""
+    """Wrap ``h`` as a hook without an argument, for the lifecycle. Raise TypeError."""
     if not callable(h):
         raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
     lifecycle = current_session().lifecycle

@@ -1,6 +1,6 @@
-"""Internal names of rospy that programs read and set: each is a property of its module.
+"""Internal variables of rospy that programs read and set: each is a property of its module.
 
-Imported by `import rospy` as the last of its modules, so that those are there.
+`import rospy` imports this module last, because it needs the others.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _Put = Callable[[Any], object]
 
 
 def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
-    """Give ``module`` attributes: each a function that returns the value, and one that takes a new one.
+    """Add attributes to ``module``; each has a function that returns the value, and one that sets it.
 
-    To delete one brings back the value before, which is how unittest.mock ends a patch.
+    Deleting an attribute restores the previous value, which is how unittest.mock ends a patch.
     """
 
     def attribute(get: _Get, put: _Put) -> property:
@@ -57,7 +57,7 @@ def _restart_unless(value: object) -> None:
         replace_session()
 
 
-# Programs that want another node after the first has shut down say so by setting the flags to False.
+# Programs set these flags to False to start another node after the first has shut down.
 _install(
     rospy.core,
     _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),

@@ -1,6 +1,6 @@
-"""rospy.logger_level_service_caller: the levels of other nodes' loggers.
+"""rospy.logger_level_service_caller: gets and sets the levels of other nodes' loggers.
 
-Source: the behaviour of rospy's class, which rqt_logger_level and programs that make a noisy node quiet use.
+Source: the behaviour of rospy's class, which rqt_logger_level and programs that silence noisy nodes use.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ class LoggerLevelServiceCaller:
         self._current_levels: dict[str, str] = {}
 
     def get_levels(self) -> list[str]:
-        """Return the levels, from the least severe on."""
+        """Return the levels, the least severe first."""
         return ["debug", "info", "warn", "error", "fatal"]
 
     def get_node_names(self) -> list[str]:
-        """Return the nodes whose levels can be set."""
+        """Return the nodes that have a service for levels."""
         names = rosservice.get_service_list()
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
     def get_loggers(self, node: str) -> list[str]:
-        """Return the names of a node's loggers, and keep their levels. Raise ROSConsoleException."""
+        """Return the names of a node's loggers, and cache their levels. Raise ROSConsoleException."""
         try:
             _, response = rosservice.call_service(_service(node, _GET), [])
         except rosservice.ROSServiceException as error:
@@ -47,7 +47,7 @@ class LoggerLevelServiceCaller:
         return self._current_loggers
 
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
-        """Set a level; return False if get_loggers() found it set already.
+        """Set a level; return False if it was already set according to get_loggers().
 
         Raise rosservice.ROSServiceException.
         """

@@ -18,7 +18,7 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
-    """Write ``msg`` with its length to ``b``; a header gets ``seq``, and with frame_id "0" none."""
+    """Write ``msg`` with its length to ``b``. A header gets ``seq``, and an empty frame_id if it was "0"."""
     number_header(msg, seq)
     start = b.tell()
     b.write(b"\0\0\0\0")
@@ -39,7 +39,7 @@ def deserialize_messages(
 ) -> None:
     """Move the complete messages of ``b``, from ``start`` to its position, to ``msg_queue``.
 
-    At most ``max_msgs`` of them; ``queue_size`` keeps only so many, the newest. What is incomplete moves to the
+    Move at most ``max_msgs``; keep only the newest ``queue_size``. An incomplete message moves to the
     front of ``b``. Raise DeserializationError.
     """
     data, position, count = b.getvalue()[: b.tell()], start, 0

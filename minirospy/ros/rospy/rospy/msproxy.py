@@ -36,15 +36,14 @@ _NAMES_FIRST = frozenset(
         "unregisterSubscriber",
         "unsubscribeParam",
     }
-)
-"""The methods whose first argument is a name of the graph."""
+)  # methods whose first argument is the name of a graph resource
 
 
 class ServerProxy:
-    """An XML-RPC server: each attribute is a method of it.
+    """An XML-RPC server: each attribute is one of its methods.
 
-    As with xmlrpc.client, a server that cannot be reached is an OSError (ConnectionRefusedError, TimeoutError),
-    a fault of it an xmlrpc.client.Fault. Many threads may call.
+    As in xmlrpc.client, an unreachable server raises OSError (ConnectionRefusedError, TimeoutError),
+    and its faults raise xmlrpc.client.Fault. Thread-safe.
     """
 
     def __init__(self, uri: str) -> None:
@@ -73,11 +72,11 @@ class ServerProxy:
 
 
 class MasterProxy:
-    """The master at ``uri``: its API with this node's name as first argument and names resolved, results unchanged.
+    """The master at ``uri``: passes this node's name as first argument, resolves names, and returns unchanged results.
 
-    ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``. In addition
+    These are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
-    are those of the parameters. Errors: see :class:`ServerProxy`.
+    access the parameters. Errors: see :class:`ServerProxy`.
     """
 
     def __init__(self, uri: str) -> None:
@@ -117,7 +116,7 @@ class MasterProxy:
         return iter(value if code == 1 else [])
 
     def search_param(self, key: str) -> str | None:
-        """Return the nearest parameter of this name, upwards from this node's namespace; None if there is none."""
+        """Return the closest parameter of this name, searched upwards from this node's namespace; None if there is none."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
@@ -128,19 +127,19 @@ class MasterProxy:
 
 
 def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
-    """Return the master of this node, or of the ROS_MASTER_URI in an ``env`` that is not os.environ."""
+    """Return the master of this node, or of the ROS_MASTER_URI in ``env`` if that is not os.environ."""
     uri = env.get("ROS_MASTER_URI") if isinstance(env, dict) else None
     return _master(uri or current_session().identity.environment.master_uri, os.getpid())
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return the XML-RPC server at ``uri``, one object for each; None if that is not a URI."""
+    """Return the XML-RPC server at ``uri``, always the same object for a URI; None if ``uri`` is invalid."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# One per process: a fork must not use its parent's connections.
+# Cached per process: a forked child must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

@@ -38,7 +38,7 @@ def _set_caller_id(name: str) -> None:
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
 Validator = Callable[[object, str], str]
-"""Checks an argument of a call by the node ``caller_id``, and returns the value to use."""
+"""Checks an argument of a call from the node ``caller_id``, and returns the value to use."""
 
 
 class ParameterInvalid(Exception):
@@ -53,13 +53,13 @@ class ParameterInvalid(Exception):
 
 
 def get_mappings() -> dict[str, str]:
-    """Return the remappings of this node's command line as they are spelled, ``__name`` and its like included."""
+    """Return the remappings of this node's command line as written, including ``__name`` and other special keys."""
     arguments = current_session().identity.arguments
     return {**arguments.remappings, **arguments.special}
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the remappings by global names; empty before init_node."""
+    """Return the remappings with global names; empty before init_node."""
     session = current_session()
     identity = session.identity
     return {**identity.remappings, **identity.arguments.special} if session.initialized else {}
@@ -71,20 +71,20 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, as the node ``node_name`` sees them."""
+    """Resolve the remappings again, for the node name ``node_name``."""
     identity = current_session().identity
     identity.remappings = identity.arguments.resolved_remappings(node_name)
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return the global name of a topic before init_node. Raise ValueError on a private one."""
+    """Return the global name of a topic before init_node. Raise ValueError if the name is private."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")
 
 
 def scoped_name(caller_id: str, name: str) -> str:
-    """Return ``name`` without the namespace of ``caller_id``. Raise ROSException if that is not global."""
+    """Return ``name`` without the namespace of ``caller_id``. Raise ROSException if ``caller_id`` is not global."""
     if not is_global(caller_id):
         raise ROSException("caller_id must be global")
     return names.canonicalize(name)[len(names.namespace_of(caller_id)) :]
@@ -103,18 +103,18 @@ def global_name(param_name: str) -> Validator:
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Validator:
-    """Return a check that the argument ``param_name`` is a name, which it resolves. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a valid name, and resolves it. The check raises ParameterInvalid."""
     check = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
     return lambda param_value, caller_id: check(param_name, param_value, caller_id)
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the global name of an argument, not remapped. Raise ParameterInvalid."""
+    """Return an argument as a global name, without remapping. Raise ParameterInvalid."""
     return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument that is a name. Raise ParameterInvalid."""
+    """Return an argument unchanged if it is a valid name. Raise ParameterInvalid."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

@@ -1,6 +1,6 @@
-"""Names that rospy's modules have of one another by accident: ROS's import each other's names with a star.
+"""Names that rospy's modules re-export by accident, because ROS's modules import each other with a star.
 
-Programs that say `rospy.core.resolve_name` find it; an editor sees only the names that a module defines.
+Programs that use `rospy.core.resolve_name` find it; an editor lists only the names that a module defines.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ __all__ = ["core_dir", "core_getattr", "service_dir", "service_getattr", "topics
 
 
 def _passing_on(name: str, source: str) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also has the public names of ``source``."""
+    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also exports the public names of ``source``."""
 
     def get(attribute: str) -> object:
         if not attribute.startswith("_"):

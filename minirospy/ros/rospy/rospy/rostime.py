@@ -1,4 +1,4 @@
-"""rospy.rostime: the clock of the node, which a program may set."""
+"""rospy.rostime: the node's clock, which a program may set."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ __all__ = [
 
 
 def wallsleep(duration: float) -> None:
-    """Sleep so many seconds of the wall clock, whatever the node's time is. Raise ValueError if negative."""
+    """Sleep for ``duration`` seconds of wall-clock time, even if the node's time is simulated. Raise ValueError if negative."""
     time.sleep(duration)
 
 
 def get_rostime_cond() -> threading.Condition:
-    """Return the condition that is notified of each simulated time."""
+    """Return the condition that is notified when simulated time changes."""
     return current_session().time_changed
 
 
@@ -37,12 +37,12 @@ def is_rostime_initialized() -> bool:
 
 
 def set_rostime_initialized(val: bool) -> None:
-    """Make the time available, so that a program without a node can use Time.now()."""
+    """Make the time available, so that a program without a node can call Time.now()."""
     current_session().has_time = bool(val)
 
 
 def set_rostime(t: object) -> None:
-    """Set the node's time, which is simulated from now on. Raise ValueError if ``t`` is not a Time."""
+    """Set the node's time, which is simulated afterwards. Raise ValueError if ``t`` is not a Time."""
     if not isinstance(t, Time):
         raise ValueError(f"must be Time instance: {t.__class__}")
     session = current_session()
@@ -53,10 +53,10 @@ def set_rostime(t: object) -> None:
 
 
 def switch_to_wallclock() -> None:
-    """Use the machine's time from now on."""
+    """Use the machine's clock from now on."""
     session = current_session()
     before, session.clock = session.clock, WallClock()
     if isinstance(before, SimulatedClock):
-        # Wake the threads that sleep by it.
+        # Wake the threads that sleep on the previous clock.
         before.set(session.clock.now())
     session.has_time = True

@@ -1,1 +1,4 @@
-"""rospy_message_converter: messages as dicts and JSON, and back. Source: http://wiki.ros.org/rospy_message_converter."""
+"""rospy_message_converter: converts messages to dicts and JSON, and back.
+
+Source: http://wiki.ros.org/rospy_message_converter.
+"""

@@ -1,4 +1,4 @@
-"""rospy_message_converter.json_message_converter: messages as JSON, and back."""
+"""rospy_message_converter.json_message_converter: converts messages to JSON, and back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def convert_json_to_ros_message(
     check_types: bool = True,
     log_level: str = "error",
 ) -> object:
-    """Return a message of a type with the values of a JSON object. Raise ValueError, TypeError, NotFoundError."""
+    """Convert a JSON object to a message of the given type. Raise ValueError, TypeError, NotFoundError."""
     return convert_dictionary_to_ros_message(
         message_type,
         json.loads(json_message),
@@ -33,5 +33,5 @@ def convert_json_to_ros_message(
 
 
 def convert_ros_message_to_json(message: Message, binary_array_as_bytes: bool = True) -> str:
-    """Return the fields of a message as a JSON object."""
+    """Convert a message to a JSON object."""
     return json.dumps(convert_ros_message_to_dictionary(message, binary_array_as_bytes))

@@ -1,6 +1,6 @@
-"""rospy_message_converter.message_converter: messages as dicts, and back.
+"""rospy_message_converter.message_converter: converts messages to dicts, and back.
 
-Arrays of bytes (uint8[], char[]) are base64 texts in dicts, as in JSON; times have ``secs`` and ``nsecs``.
+Arrays of bytes (uint8[], char[]) are base64 strings in dicts, as in JSON; times have ``secs`` and ``nsecs``.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ def convert_dictionary_to_ros_message(
     check_types: bool = True,
     log_level: str = "error",
 ) -> Any:
-    """Return a message of a type, such as std_msgs/String, with the values of a dict.
+    """Convert a dict to a message of the given type, for example std_msgs/String.
 
-    ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError, without ``strict_mode``
-    they are logged. With ``check_missing_fields`` a field without a value raises ValueError, with ``check_types`` a value of
-    another type TypeError. Raise NotFoundError if the type is unknown.
+    ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError; without ``strict_mode``
+    they are only logged. With ``check_missing_fields``, a field without a value raises ValueError; with ``check_types``,
+    a value of
+    another type raises TypeError. Raise NotFoundError if the type is unknown.
     """
     if kind == "message":
         message = message_class(message_type)()
@@ -76,7 +77,7 @@ def convert_dictionary_to_ros_message(
 def convert_ros_message_to_dictionary(
     message: Message, binary_array_as_bytes: bool = True
 ) -> dict[str, object]:
-    """Return the fields of a message as a dict; with ``binary_array_as_bytes`` arrays of bytes are base64 texts, else lists."""
+    """Convert a message to a dict. Byte arrays become base64 strings; without ``binary_array_as_bytes`` they become lists."""
     return {
         name: _from_ros(type_, getattr(message, name), binary_array_as_bytes)
         for name, type_ in zip(message.__slots__, message._slot_types, strict=True)
@@ -84,7 +85,7 @@ def convert_ros_message_to_dictionary(
 
 
 def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
-    """Return a value of a dict as a field has it. Raise TypeError, ValueError."""
+    """Convert a value of a dict to a field's value. Raise TypeError, ValueError."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             return _bytes_of(name, value)
@@ -111,7 +112,7 @@ def _wrong(name: str, value: object, valid: str) -> TypeError:
 
 
 def _bytes_of(name: str, value: Any) -> bytes:
-    """Return an array of bytes: of a base64 text, of bytes, or of numbers."""
+    """Convert a base64 string, bytes, or a list of numbers to a byte array."""
     try:
         return base64.b64decode(value, validate=True) if isinstance(value, str) else bytes(value)
     except (binascii.Error, ValueError) as error:

@@ -1,7 +1,9 @@
-"""SerialClient: a device at the other end of a line as a part of this node.
+"""SerialClient: represents a device on a serial port or connection as part of this node.
 
-The device describes its topics and services; from then on messages go both ways. It gets the time, parameters, and its log lines
-appear as the node's. Source: http://wiki.ros.org/rosserial/Overview/Protocol, http://wiki.ros.org/rosserial_python.
+The device describes its topics and services; afterwards messages pass in both directions. It can request the time and
+parameters,
+and its log messages appear as the node's. Source: http://wiki.ros.org/rosserial/Overview/Protocol,
+http://wiki.ros.org/rosserial_python.
 """
 
 from __future__ import annotations
@@ -59,8 +61,7 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0
-"""An Arduino restarts when its port is opened."""
+_BOOT_SECONDS = 2.0  # seconds to boot: an Arduino restarts when its port is opened
 
 
 class SerialClient:
@@ -78,7 +79,7 @@ class SerialClient:
         timeout: float = 5.0,
         fix_pyserial_for_test: bool = False,
     ) -> None:
-        """Open the port, again where that fails, and request the device's topics. ``timeout``: seconds for a packet."""
+        """Open the port, retrying after a failure, and request the device's topics. ``timeout``: seconds per packet."""
         self.timeout = timeout
         self.synced = False
         self.publishers: dict[int, Publisher] = {}
@@ -90,7 +91,7 @@ class SerialClient:
         self.callbacks: dict[int, Callable[[bytes], object]] = {
             TopicInfo.ID_PUBLISHER: self.setupPublisher,
             TopicInfo.ID_SUBSCRIBER: self.setupSubscriber,
-            # A service has two: one for each half of a call.
+            # A service has two entries, one for each direction of its calls.
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_PUBLISHER: self.setupServiceServerPublisher,
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_SUBSCRIBER: self.setupServiceServerSubscriber,
             TopicInfo.ID_SERVICE_CLIENT + TopicInfo.ID_PUBLISHER: self.setupServiceClientPublisher,
@@ -135,7 +136,7 @@ class SerialClient:
     # --- the line
 
     def run(self) -> None:
-        """Pass messages on until the node is shut down. Raise PortError if the line breaks."""
+        """Forward messages until the node is shut down. Raise PortError if the connection breaks."""
         if self.port is None:
             return
         self._writer = threading.Thread(target=self._write_all, args=(self.port,), daemon=True)
@@ -171,7 +172,7 @@ class SerialClient:
             self._write_error = error
 
     def send(self, topic: int, msg: bytes) -> None:
-        """Send a message of a topic, given by its id, to the device."""
+        """Send a message on the topic with this id to the device."""
         if 0 < self.buffer_in < len(msg) or len(msg) > LONGEST:
             text = "Message from ROS network dropped: message larger than buffer (%d of %d bytes)."
             rospy.logerr(text, len(msg), self.buffer_in if self.buffer_in > 0 else LONGEST)
@@ -185,7 +186,7 @@ class SerialClient:
         self._to_write.put(encode(TopicInfo.ID_PUBLISHER, b""))
 
     def txStopRequest(self) -> None:
-        """Request that the device sends no more."""
+        """Request the device to stop sending."""
         self._to_write.put(encode(TopicInfo.ID_TX_STOP, b""))
         rospy.loginfo("Sending tx stop request")
 
@@ -258,13 +259,13 @@ class SerialClient:
     # --- what a device sends
 
     def setPublishSize(self, size: int) -> None:
-        """Set the size of the device's buffer for what it sends, once."""
+        """Set the size of the device's output buffer; only the first call has an effect."""
         if self.buffer_out < 0:
             self.buffer_out = size
             rospy.loginfo("Note: publish buffer size is %d bytes", size)
 
     def setSubscribeSize(self, size: int) -> None:
-        """Set the size of the device's buffer for what it gets, once."""
+        """Set the size of the device's input buffer; only the first call has an effect."""
         if self.buffer_in < 0:
             self.buffer_in = size
             rospy.loginfo("Note: subscribe buffer size is %d bytes", size)
@@ -288,7 +289,7 @@ class SerialClient:
             info = _info(data)
             known = self.subscribers.get(info.topic_name)
             if known is None:
-                # Before the first message comes.
+                # Set before the first message arrives.
                 self.setSubscribeSize(info.buffer_size)
                 self.subscribers[info.topic_name] = Subscriber(info, self.send)
                 rospy.loginfo("Setup subscriber on %s [%s]", info.topic_name, info.message_type)
@@ -304,27 +305,27 @@ class SerialClient:
                     info.message_type,
                 )
             else:
-                # A device that has restarted may number its topics in another way.
+                # A restarted device may number its topics differently.
                 known.id = info.topic_id
 
     def setupServiceServerPublisher(self, data: bytes) -> None:
-        """Receive the responses of a service of the device."""
+        """Register the topic on which the device sends its service's responses."""
         self._set_up_half(data, ServiceServer, "server", from_device=True)
 
     def setupServiceServerSubscriber(self, data: bytes) -> None:
-        """Send requests to a service of the device."""
+        """Register the topic on which requests go to the device's service."""
         self._set_up_half(data, ServiceServer, "server", from_device=False)
 
     def setupServiceClientPublisher(self, data: bytes) -> None:
-        """Receive the requests of calls by the device."""
+        """Register the topic on which the device sends requests of its service calls."""
         self._set_up_half(data, ServiceClient, "client", from_device=True)
 
     def setupServiceClientSubscriber(self, data: bytes) -> None:
-        """Send the responses of calls by the device."""
+        """Register the topic on which responses to the device's service calls go to it."""
         self._set_up_half(data, ServiceClient, "client", from_device=False)
 
     def _set_up_half(self, data: bytes, kind: type[_Service], name: str, *, from_device: bool) -> None:
-        """Set up one half of a service's calls: the one that the device sends, or the one that it gets."""
+        """Register one direction of a service's calls: from the device, or to it."""
         with _Creation(f"service {name}"):
             info = _info(data)
             (self.setPublishSize if from_device else self.setSubscribeSize)(info.buffer_size)
@@ -348,13 +349,13 @@ class SerialClient:
         return known
 
     def handleTimeRequest(self, data: bytes) -> None:
-        """Send the time to the device, which requests it as a sign of life."""
+        """Send the time to the device, whose request also serves as a heartbeat."""
         self.send(TopicInfo.ID_TIME, to_bytes(Time(rospy.Time.now())))
         self.lastsync = rospy.Time.now()
         self._synced_at = time.monotonic()
 
     def handleParameterRequest(self, data: bytes) -> None:
-        """Send a parameter to the device: numbers or texts, all of one type."""
+        """Send a parameter to the device: numbers or strings, all of the same type."""
         request = RequestParamRequest()
         request.deserialize(data)
         value = rospy.get_param(request.name, None)
@@ -379,7 +380,7 @@ class SerialClient:
         self.send(TopicInfo.ID_PARAMETER_REQUEST, to_bytes(response))
 
     def handleLoggingRequest(self, data: bytes) -> None:
-        """Log a line of the device."""
+        """Log a message from the device."""
         line = Log()
         line.deserialize(data)
         log = {
@@ -393,7 +394,7 @@ class SerialClient:
             log("%s", line.msg)
 
     def sendDiagnostics(self, level: int, msg_text: str) -> None:
-        """Publish the state of the line on /diagnostics."""
+        """Publish the connection's state on /diagnostics."""
         last = time.ctime(self.lastsync.to_sec()) if self.lastsync else "never"
         values = [
             KeyValue("last sync", last),
@@ -413,7 +414,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """Logs why something that a device describes cannot be made, and goes on."""
+    """Logs why a topic or service that a device describes cannot be created, and suppresses the error."""
 
     def __init__(self, what: str) -> None:
         self._what = what

@@ -1,4 +1,4 @@
-"""The topics and services that a device describes, each a publisher, subscriber, service or proxy of the node."""
+"""The topics and services that a device describes: each becomes a publisher, subscriber, service or proxy of the node."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _LOOK_SECONDS = 0.2
 
 
 class EndpointError(MinirospyError):
-    """A topic or service cannot be had as a device describes it."""
+    """A topic or service cannot be created as the device describes it."""
 
 
 def to_bytes(message: Message) -> bytes:
-    """Return a message as it goes over the line."""
+    """Return a message as bytes for the device."""
     buffer = BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
@@ -49,7 +49,7 @@ def _compare(ours: str, theirs: str) -> None:
 
 
 class Publisher:
-    """Passes messages of the device on to ROS. Raise EndpointError."""
+    """Forwards messages from the device to ROS. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo) -> None:
         self.topic = info.topic_name
@@ -68,7 +68,7 @@ class Publisher:
 
 
 class Subscriber:
-    """Passes messages of ROS on to the device. Raise EndpointError."""
+    """Forwards messages from ROS to the device. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -89,7 +89,7 @@ class Subscriber:
 
 
 class _Service:
-    """A service's classes, and the id under which the device gets its half of a call. Raise EndpointError."""
+    """A service's classes, and the id of the topic on which the device receives its part of a call. Raise EndpointError."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -105,16 +105,16 @@ class _Service:
         self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device's request is another."""
+        """Raise EndpointError if the device's request type differs."""
         _compare(self.request._md5sum, info.md5sum)
 
     def check_response(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device's response is another."""
+        """Raise EndpointError if the device's response type differs."""
         _compare(self.response._md5sum, info.md5sum)
 
 
 class ServiceServer(_Service):
-    """A service of the device: one call at a time."""
+    """A service that the device provides; handles one call at a time."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -128,7 +128,7 @@ class ServiceServer(_Service):
             if self.id < 0:
                 raise rospy.ServiceException("the device has not finished to describe this service")
             while not self._responses.empty():
-                # Of a call that was given up.
+                # Discard the response to a call that has timed out.
                 self._responses.get_nowait()
             self._send(self.id, to_bytes(request))
             while not self._is_closed and not rospy.is_shutdown():
@@ -139,7 +139,7 @@ class ServiceServer(_Service):
         raise rospy.ServiceException("the device is disconnected")
 
     def handle(self, data: bytes) -> None:
-        """Return the device's response to the caller."""
+        """Pass the device's response to the caller."""
         response = self.response()
         response.deserialize(data)
         self._responses.put(response)
@@ -152,7 +152,7 @@ class ServiceServer(_Service):
 
 
 class ServiceClient(_Service):
-    """Calls of the device: in a thread, so that its other topics go on meanwhile."""
+    """Service calls from the device, made in a thread, so that its other topics are not blocked."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -175,11 +175,11 @@ class ServiceClient(_Service):
             except rospy.ROSInterruptException:
                 return
             except rospy.ROSException as error:
-                # The device waits until its own time limit.
+                # The device waits until its own timeout.
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
             except rospy.ServiceException as error:
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
 
     def unregister(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._requests.put(None)

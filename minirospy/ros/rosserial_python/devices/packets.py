@@ -1,4 +1,4 @@
-"""Bytes of a serial line <-> packets. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
+"""Encode and decode the packets on a serial line. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
 
 A packet: ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of id and data. A
 checksum makes the sum of what it covers 255 modulo 256.
@@ -14,25 +14,24 @@ __all__ = ["LONGEST", "Decoder", "Fault", "Packet", "WrongVersion", "encode"]
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-LONGEST = 0xFFFF
-"""Bytes of the longest message that a packet can hold."""
+LONGEST = 0xFFFF  # bytes in the longest message that a packet can contain
 
 
 class Packet(NamedTuple):
-    """A message of the topic with that id."""
+    """A message for the topic with this id."""
 
     topic_id: int
     data: bytes
 
 
 class Fault(NamedTuple):
-    """A packet that is dropped: what is wrong with it, in the real program's words."""
+    """A rejected packet: the error, in the words of the real rosserial_python."""
 
     text: str
 
 
 class WrongVersion(NamedTuple):
-    """The second byte of a packet is that of another version of the protocol, or of no packet."""
+    """The second byte belongs to another version of the protocol, or the data is not a packet."""
 
     byte: int
 
@@ -42,7 +41,7 @@ def _checksum(data: bytes) -> int:
 
 
 def encode(topic_id: int, data: bytes) -> bytes:
-    """Return a packet. Raise ValueError for data that is too long for one."""
+    """Return a packet. Raise ValueError if the data is too long."""
     if len(data) > LONGEST:
         raise ValueError(f"{len(data)} bytes: a packet holds {LONGEST}")
     length, topic = struct.pack("<H", len(data)), struct.pack("<H", topic_id)
@@ -59,24 +58,24 @@ def encode(topic_id: int, data: bytes) -> bytes:
 
 
 class Decoder:
-    """Packets from bytes as they come, in pieces of any size."""
+    """Decodes packets from bytes that arrive in chunks of any size."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     @property
     def missing(self) -> int:
-        """How many bytes the packet that has started lacks; 0 between packets."""
+        """The number of bytes that the current packet lacks; 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
     def received(self) -> int:
-        """How many bytes of a packet that has started are there."""
+        """The number of bytes of the current packet that have arrived."""
         return len(self._bytes)
 
     @property
     def step(self) -> str:
-        """What is read next of a packet, in the real program's words."""
+        """The part of a packet that is read next, in the words of the real rosserial_python."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:
@@ -84,11 +83,11 @@ class Decoder:
         return "data" if self.missing > 1 else "data checksum"
 
     def reset(self) -> None:
-        """Forget a packet that has started."""
+        """Discard the current packet."""
         self._bytes.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet | Fault | WrongVersion]:
-        """Yield what is complete with these bytes."""
+        """Add bytes, and yield the packets and errors that they complete."""
         self._bytes += data
         while self._bytes:
             if self._bytes[0] != _SYNC:
@@ -102,7 +101,7 @@ class Decoder:
                 yield found
 
     def _needed(self) -> int:
-        """Return how many bytes must be there before something can be decided."""
+        """Return the number of bytes that are needed for the next decision."""
         if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
             return 2
         if len(self._bytes) < 5 or not self._has_right_length():

@@ -1,4 +1,4 @@
-"""The lines to a device: serial ports (by pyserial), sockets, and files of a program's own."""
+"""The connections to a device: serial ports (through pyserial), sockets, and file-like objects of the user's program."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ _CHUNK = 4096
 
 
 class PortError(MinirospyError):
-    """A line cannot be opened, or has broken: one line with the reason."""
+    """A connection cannot be opened, or has broken; one line with the reason."""
 
 
 class Port(Protocol):
-    """A line to a device."""
+    """A connection to a device."""
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError if the line has broken."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection has broken."""
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raise PortError."""
+        """Write all bytes. Raise PortError."""
 
     def flush_input(self) -> None:
-        """Forget what has come and is not read."""
+        """Discard the bytes that have arrived and are not read."""
 
     def close(self) -> None:
-        """Close it."""
+        """Close the connection."""
 
 
 @runtime_checkable
 class File(Protocol):
-    """A program's own line: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is called where there is one."""
+    """A file-like object of the program: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
 
     def read(self, count: int, /) -> bytes:
-        """Return bytes of the device."""
+        """Return bytes from the device."""
 
     def write(self, data: bytes, /) -> object:
         """Write bytes to the device."""
 
     def inWaiting(self) -> int:
-        """Return how many bytes have come."""
+        """Return the number of bytes that have arrived."""
 
 
 class SerialPort:
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError if the line has broken."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection has broken."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -85,33 +85,33 @@ class SerialPort:
             raise PortError(f"Serial Port read failure: {error}") from error
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raise PortError."""
+        """Write all bytes. Raise PortError."""
         try:
             self._serial.write(data)
         except self._errors as error:
             raise PortError(f"Serial Port write failure: {error}") from error
 
     def flush_input(self) -> None:
-        """Forget what has come and is not read."""
+        """Discard the bytes that have arrived and are not read."""
         try:
             self._serial.reset_input_buffer()
         except Exception as error:
             raise PortError(str(error)) from error
 
     def close(self) -> None:
-        """Close it."""
+        """Close the port."""
         self._serial.close()
 
 
 class SocketPort:
-    """A connection of TCP."""
+    """A TCP connection."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._socket = connection
         connection.settimeout(_WRITE_SECONDS)
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError if the connection is closed."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is closed."""
         try:
             ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
             if not ready:
@@ -124,28 +124,28 @@ class SocketPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raise PortError."""
+        """Write all bytes. Raise PortError."""
         try:
             self._socket.sendall(data)
         except OSError as error:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Do nothing: what a connection delivers is whole."""
+        """Do nothing: a TCP connection delivers no stray bytes."""
 
     def close(self) -> None:
-        """Close it."""
+        """Close the connection."""
         self._socket.close()
 
 
 class FilePort:
-    """An object of a program's own with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient takes it."""
+    """An object of the program with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient accepts it."""
 
     def __init__(self, file: File) -> None:
         self._file = file
 
     def read(self) -> bytes:
-        """Return what has come, nothing after a moment. Raise PortError for what the object raises."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError for the object's exceptions."""
         try:
             waiting = int(self._file.inWaiting())
             if waiting < 1:
@@ -156,17 +156,17 @@ class FilePort:
             raise PortError(str(error)) from error
 
     def write(self, data: bytes) -> None:
-        """Write all of it. Raise PortError."""
+        """Write all bytes. Raise PortError."""
         try:
             self._file.write(data)
         except (OSError, RuntimeError) as error:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Forget what has come and is not read."""
+        """Discard the bytes that have arrived and are not read."""
         flush = getattr(self._file, "flushInput", None)
         if flush is not None:
             flush()
 
     def close(self) -> None:
-        """Leave it open: it is the program's."""
+        """Leave the object open, because it belongs to the program."""

@@ -1,6 +1,6 @@
-"""serial_node.py: a device on a serial port, or devices that connect by TCP (`serial_node.py tcp [PORT]`).
+"""serial_node.py: a device on a serial port, or devices that connect over TCP (`serial_node.py tcp [PORT]`).
 
-Parameters: ~port (/dev/ttyUSB0), ~baud (57600), ~tcp_port and ~fork_server (else those of /rosserial_embeddedlinux),
+Parameters: ~port (/dev/ttyUSB0), ~baud (57600), ~tcp_port and ~fork_server (default: those of /rosserial_embeddedlinux),
 ~fix_pyserial_for_test. Source: http://wiki.ros.org/rosserial_python.
 """
 
@@ -22,7 +22,7 @@ _OTHER = "/rosserial_embeddedlinux"
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status: 1 where it cannot be run at all."""
+    """Run the node until it is shut down; return the exit status: 1 if it cannot start."""
     try:
         rospy.init_node("serial_node")
         rospy.loginfo("ROS Serial Python Node")
@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter, else that of rosserial_embeddedlinux, as earlier launch files have it."""
+    """Return a private parameter, else the one of rosserial_embeddedlinux, which older launch files set."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 
@@ -80,7 +80,7 @@ def _follow(port: str, baud: int, uses_handshake: bool) -> None:
 
 
 def message_info_service() -> int:
-    """Run the node of that name, which only logs that it is not needed; return the exit status."""
+    """Run message_info_service, which only logs that it is no longer needed; return the exit status."""
     try:
         rospy.init_node("message_info_service")
         rospy.logwarn(

@@ -1,4 +1,4 @@
-"""Devices that connect by TCP. Source: http://wiki.ros.org/rosserial_python (tcp)."""
+"""Serves devices that connect over TCP. Source: http://wiki.ros.org/rosserial_python (tcp)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LOOK_SECONDS = 0.2
 
 
 class RosSerialServer:
-    """Listens on a port of TCP: one device after the other, or, with ``fork_server``, each in its own thread."""
+    """Listens on a TCP port: serves one device at a time or, with ``fork_server``, each in its own thread."""
 
     def __init__(self, tcp_portnum: int, fork_server: bool = False) -> None:
         rospy.loginfo("Fork_server is: %s", fork_server)
@@ -23,7 +23,7 @@ class RosSerialServer:
         self.fork_server = fork_server
 
     def listen(self) -> None:
-        """Serve devices until the node is shut down. Raise OSError if the port cannot be had."""
+        """Serve devices until the node is shut down. Raise OSError if the port cannot be opened."""
         with socket.create_server(("", self.tcp_portnum), backlog=8) as server:
             server.settimeout(_LOOK_SECONDS)
             rospy.loginfo("Waiting for socket connection")

@@ -1,6 +1,6 @@
-"""rosservice: which services there are, of which type; calling them.
+"""rosservice: lists services, shows their types, and calls them.
 
-Source: http://wiki.ros.org/rosservice. What is printed is what ROS prints.
+Source: http://wiki.ros.org/rosservice. The output is the same as in ROS.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _service_parser(verb: str, description: str, missing: str = "service must be specified") -> Parser:
-    """Return the parser of a verb that takes a service's name."""
+    """Return the parser of a verb that needs a service name."""
     parser = Parser(
         f"rosservice {verb}",
         description,
@@ -60,7 +60,7 @@ def _info(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         name = graph.resolve(service)
         offer = services.service_offer(graph, name)
-        # What the master knows, before its node is called, which may have ended.
+        # Print the master's information before calling the node, which may have exited.
         print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
         type_ = services.service_type(graph, name)
     print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
@@ -164,7 +164,7 @@ def _call(
 
 
 def _as_ros_shows(error: ServiceException, service: str) -> str:
-    """Return ROS's text of an error: of the handler's own it shows the bytes."""
+    """Return ROS's message for an error; an error of the service's handler is shown as bytes."""
     cause = error.__cause__
     if isinstance(cause, CallFailed):
         return f"service [{service}] responded with an error: {cause.text!r}"
@@ -172,7 +172,7 @@ def _as_ros_shows(error: ServiceException, service: str) -> str:
 
 
 def _incorrect_type(type_: str, error: MessageException) -> WordedError:
-    """Return the error of a request whose values do not fit, with ROS's words: they end with the definition."""
+    """Return the error for a request whose values do not fit, in ROS's words, which end with the definition."""
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages
 
@@ -188,9 +188,9 @@ def _warn_waiting(graph: Graph, service: str) -> None:
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
-    """Yield the requests: one of the values typed, or one for each document on standard input.
+    """Yield the requests: one from the command line's values, or one for each document on stdin.
 
-    In a terminal the fields that have no value yet are prompted for.
+    On a terminal, prompt for fields without a value.
     """
     from minirospy.introspect.values import message_values, parse_arguments, parse_lines
 

@@ -1,4 +1,4 @@
-"""rosservice: queries about services, and calls. Source: http://wiki.ros.org/rosservice."""
+"""rosservice: information about services, and calls. Source: http://wiki.ros.org/rosservice."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ROSServiceIOException(ROSServiceException):
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """Return the names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
+    """Return the names of the services (of a node, below a namespace); with ``include_nodes``, as [name, [nodes]]."""
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
         owner = _resolved(graph, node) if node else None
@@ -81,14 +81,14 @@ def get_service_uri(service_name: str) -> str | None:
 
 
 def get_service_node(service_name: str) -> str | None:
-    """Return the node that offers a service; None if it does not exist."""
+    """Return the node that provides a service; None if it does not exist."""
     with _graph() as graph:
         nodes = graph.state().services.get(_resolved(graph, service_name))
     return nodes[0] if nodes else None
 
 
 def get_service_args(service_name: str) -> str:
-    """Return the names of the fields of a service's request, with spaces between. Raise ROSServiceException."""
+    """Return the field names of a service's request, separated by spaces. Raise ROSServiceException."""
     with _graph() as graph:
         return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
 
@@ -106,7 +106,7 @@ def rosservice_find(service_type: str) -> list[str]:
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
-        # No service has it; as ROS's, it raises where no master answers.
+        # No service can match, but as in ROS, an unreachable master raises an error.
         services.list_services(graph)
         return []
 
@@ -114,7 +114,7 @@ def rosservice_find(service_type: str) -> list[str]:
 def call_service(
     service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
 ) -> tuple[Message, Any]:
-    """Call a service and return (request, response), with the request's values. Raise ROSServiceException."""
+    """Call a service; return (request, response), with the request filled with the values. Raise ROSServiceException."""
     with _graph() as graph:
         name = _sent(graph, service_name)
         type_ = service_class._type if service_class else services.service_type(graph, name)
@@ -123,7 +123,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header that a service answers with. Raise ROSServiceIOException if it does not."""
+    """Return the connection header of a service's answer. Raise ROSServiceIOException if it does not answer."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -138,37 +138,37 @@ def has_service_args(service_name: str, service_class: ServiceClass | None = Non
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
     from minirospy.ros.rosservice.commands.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
 
 
-# Of ROS's private functions those that programs call.
+# Private functions of ROS that programs call.
 
 _rosservice_cmd_args = _rosservice_cmd_call = _rosservice_cmd_find = _rosservice_cmd_info = rosservicemain
 _rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice_cmd_uri = rosservicemain
 
 
 def _fullusage() -> None:
-    """Print the commands, and exit with the status of a usage error."""
+    """Print the list of commands, and exit with the status of a usage error."""
     rosservicemain([NAME])
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return the global name; what is not text as its text, which is the name of nothing, as in ROS."""
+    """Return the global name. A value that is not a string is converted to one, which names nothing, as in ROS."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the same of a name that is sent to the master. Raise TypeError if XML-RPC has no type for it."""
+    """Return the global name for a call to the master. Raise TypeError if XML-RPC has no such type."""
     check_sendable(name)
     return _resolved(graph, name)
 
 
 def _get_master() -> masterapi.Master:
-    """Return the master as rosservice calls it."""
+    """Return the master with rosservice's caller id."""
     return masterapi.Master("/rosservice")
 
 

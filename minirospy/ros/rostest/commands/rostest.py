@@ -1,4 +1,4 @@
-"""`rostest` and `rosunit`: run the tests of a launch file, or a unit test's file, and say how they went.
+"""`rostest` and `rosunit`: run the tests of a launch file or of a unit test file, and report the results.
 
 Source: http://wiki.ros.org/rostest/Commandline, http://wiki.ros.org/rosunit.
 """
@@ -24,12 +24,12 @@ __all__ = ["ROSTEST", "ROSUNIT", "rostest", "rosunit"]
 
 
 def rostest(argv: Sequence[str] | None = None) -> int:
-    """Run rostest; return 0 all passed, 1 a test could not be run or did not report its results, 2 a test failed."""
+    """Run rostest; return 0 if all tests passed, 1 if one could not run or reported no results, 2 if one failed."""
     return ROSTEST.main(argv)
 
 
 def rosunit(argv: Sequence[str] | None = None) -> int:
-    """Run rosunit; return 0 all passed, 1 the file could not be run or did not report its results, 2 a test failed."""
+    """Run rosunit; return 0 if all tests passed, 1 if the file could not run or reported no results, 2 if one failed."""
     return ROSUNIT.main(argv)
 
 
@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # The boards that the test's nodes start, such as MINIROSPY_BOARD=$(anon test), end without a trace.
+    # Delete the boards of the test's nodes at their exit, such as MINIROSPY_BOARD=$(anon test).
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,
@@ -205,7 +205,7 @@ def _base(folder: str | None) -> Path:
 
 
 def _file(what: list[str], packages: Packages) -> Path:
-    """Return the launch file that the command line names. Raise MinirospyError."""
+    """Return the launch file named on the command line. Raise MinirospyError."""
     if len(what) == 1:
         if Path(what[0]).is_file():
             return Path(what[0]).resolve()
@@ -222,7 +222,7 @@ def _file(what: list[str], packages: Packages) -> Path:
 
 
 def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
-    """Return the package that a file is in, and its folder. Raise MinirospyError."""
+    """Return the package that contains a file, and the package's folder. Raise MinirospyError."""
     for folder in file.resolve().parents:
         name = package_name(folder)
         if name:

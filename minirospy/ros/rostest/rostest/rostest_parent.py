@@ -1,4 +1,4 @@
-"""rostest.rostest_parent: a launch file's nodes for its tests, one after the other."""
+"""rostest.rostest_parent: runs a launch file's nodes for its tests, one test after the other."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ __all__ = ["ROSTestLaunchParent"]
 
 
 class ROSTestLaunchParent(ROSLaunchParent):
-    """Runs the nodes of a configuration with a new master on a free port, and tests with them.
+    """Runs the nodes of a configuration with a new master on a free port, and runs tests with them.
 
-    ``reuse_master``: with the master of ROS_MASTER_URI, whose parameters ``clear`` deletes first. ``port`` has no effect.
+    ``reuse_master``: use the master of ROS_MASTER_URI instead; ``clear`` first deletes its parameters. ``port`` has no effect.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open = ExitStack()
 
     def setUp(self) -> None:
-        """Have the master ready. Raise RLException, MasterUnreachableError if one that is reused does not answer."""
+        """Start or connect to the master. Raise RLException, or MasterUnreachableError if a reused master does not answer."""
         environment = self._open.enter_context(
             master_of_tests(Environment.read(), self.run_id, reuse=self.reuse_master, clear=self.clear)
         )
@@ -50,7 +50,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self.pm = self.runner.pm
 
     def launch(self) -> tuple[list[str], list[str]]:
-        """Start the nodes; the names of the processes that were started, and those of the nodes that were not."""
+        """Start the nodes; return the names of the started processes and of the nodes that failed to start."""
         assert self.runner
         return self.runner.launch()
 
@@ -60,9 +60,9 @@ class ROSTestLaunchParent(ROSLaunchParent):
         return self.runner.run_test(test)
 
     def tearDown(self) -> None:
-        """End all. Idempotent."""
+        """Terminate all processes. Idempotent."""
         self.shutdown()
         self._open.close()
 
     def _load_config(self) -> None:
-        """Leave the configuration that was given."""
+        """Keep the given configuration."""

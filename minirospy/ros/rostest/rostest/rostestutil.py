@@ -1,4 +1,4 @@
-"""rostest.rostestutil: what the command `rostest` prints, for programs that run tests. Source: http://wiki.ros.org/rostest."""
+"""rostest.rostestutil: the output of the command `rostest`, for programs that run tests. Source: http://wiki.ros.org/rostest."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ _logger = logging.getLogger("rostest")
 
 
 def printlog(msg: str, *args: object) -> None:
-    """Print a line, its ``%s`` filled with ``args``, and log it."""
+    """Print a line with its ``%s`` replaced by ``args``, and log it."""
     text = msg % args if args else msg
     _logger.info("%s", text)
     print("[ROSTEST]" + text)
 
 
 def printlogerr(msg: str, *args: object) -> None:
-    """Print a line on standard error, its ``%s`` filled with ``args``, and log it as an error."""
+    """Print a line to stderr with its ``%s`` replaced by ``args``, and log it as an error."""
     text = msg % args if args else msg
     _logger.error("%s", text)
     print("[ROSTEST]" + text, file=sys.stderr)
 
 
 def printRostestSummary(result: unittest.TestResult, rostest_results: Result) -> None:
-    """Print the summary of a run: what the runner found, and the results of its nodes."""
+    """Print the summary of a run: the runner's result, and the results of its nodes."""
     print_runner_summary(result, rostest_results, "ROSTEST")

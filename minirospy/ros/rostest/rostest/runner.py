@@ -35,7 +35,7 @@ _DEFAULT_TEST_PORT = 22422
 
 
 class _Run:
-    """What the tests of this process have done so far."""
+    """The state of this process's tests."""
 
     def __init__(self) -> None:
         self.results = Result("rostest")
@@ -48,7 +48,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """What the class of :func:`createUnitTest` has; programs make their own with these functions."""
+    """The attributes of the class that :func:`createUnitTest` returns; programs also build such classes themselves."""
 
     config: ROSLaunchConfig
     test_file: str
@@ -61,22 +61,22 @@ TestMethod: TypeAlias = Callable[[RosTestCase], None]
 
 
 def getResults() -> Result:
-    """Return the results that the tests have written so far, together."""
+    """Return the combined results that the tests have written so far."""
     return _run.results
 
 
 def getConfig() -> ROSLaunchConfig | None:
-    """Return the configuration of the last test; None before the first."""
+    """Return the configuration of the last test; None before the first test."""
     return _run.config
 
 
 def getRostestParents() -> list[ROSTestLaunchParent]:
-    """Return the launches of all tests, for a last tearDown() of each."""
+    """Return the launches of all tests, so that each can be torn down at the end."""
     return _run.parents
 
 
 def setTextMode(val: bool) -> None:
-    """Choose whether tests print what they find, and write no files of results."""
+    """Set whether tests print their results and write no result files."""
     _run.is_text = val
 
 
@@ -101,9 +101,9 @@ def failDuplicateRunner(testName: str) -> TestMethod:
 
 
 def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None) -> TestMethod:
-    """Return a test method that launches the nodes and runs a ``<test>``, again as often as its retry says.
+    """Return a test method that launches the nodes and runs a ``<test>``, with as many retries as its tag allows.
 
-    Its results are read from its XML file, in a folder of the package in ``results_base_dir``.
+    The results are read from its XML file, in the package's folder in ``results_base_dir``.
     """
 
     def fn(self: RosTestCase) -> None:
@@ -154,7 +154,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
 
 
 def setUp(self: RosTestCase) -> None:
-    """Prepare the launch of a test: the method of its class."""
+    """Prepare the launch of a test; used as a method of its class."""
     self.test_parent = ROSTestLaunchParent(
         self.config, [self.test_file], reuse_master=self.reuse_master, clear=self.clear
     )
@@ -166,7 +166,7 @@ def setUp(self: RosTestCase) -> None:
 
 
 def tearDown(self: RosTestCase) -> None:
-    """End the launch of a test: the method of its class."""
+    """Terminate the launch of a test; used as a method of its class."""
     printlog("tearDown[%s]", self.test_file)
     if self.test_parent:
         self.test_parent.tearDown()
@@ -180,7 +180,7 @@ def createUnitTest(
     clear: bool = False,
     results_base_dir: str | None = None,
 ) -> type[unittest.TestCase]:
-    """Return the class of a launch file's tests. Raise RLException if it cannot be read."""
+    """Return the TestCase class of a launch file's tests. Raise RLException if the file cannot be read."""
     config = load_config_default([test_file], None)
     methods: dict[str, TestMethod] = {}
     for test in config.tests:

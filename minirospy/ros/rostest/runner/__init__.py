@@ -1,4 +1,4 @@
-"""Tests of ROS packages: unit tests that write JUnit XML, launch files whose ``<test>`` tags are run.
+"""Tests of ROS packages: unit tests that write JUnit XML, and launch files with ``<test>`` tags.
 
 Source: http://wiki.ros.org/rostest, http://wiki.ros.org/rosunit.
 """

@@ -1,4 +1,4 @@
-"""A unit test's file, run as a separate program: its results, and what went wrong besides them.
+"""Runs a unit test file as a separate program; returns its results, and errors of the run itself.
 
 Source: http://wiki.ros.org/rosunit.
 """
@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Let Ctrl-C set the event meanwhile. An exception could come just when a process has started, and leave it behind."""
+    """Make Ctrl-C set the event instead of raising: an exception could leave behind a process that has just started."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
@@ -49,9 +49,9 @@ def run_bare(
     seconds: float,
     text: bool,
 ) -> tuple[Result, TestCaseResult]:
-    """Run a file, Python or executable, for at most so many seconds: (its results, how the run itself went).
+    """Run a file, Python or executable, for at most ``seconds``; return (its results, the result of the run itself).
 
-    ``text``: it prints, and writes no results; then its exit status says how it went.
+    ``text``: the test prints and writes no results; then its exit status decides.
     """
     case = TestCaseResult("runTest")
     case.classname = "rosunit.baretest.BareTestCase"
@@ -80,7 +80,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """Return the exit status; None after the time limit. Raise MinirospyError at Ctrl-C."""
+    """Return the exit status; None after the time limit. Raise MinirospyError on Ctrl-C."""
     with interrupt_noted() as interrupted, guard_children(), subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:

@@ -1,4 +1,4 @@
-"""JUnit XML as rosunit writes it: results <-> text, and what is printed of them. ``rosunit.junitxml`` re-exports this.
+"""JUnit XML in rosunit's format: read, write and print results. ``rosunit.junitxml`` re-exports this.
 
 Source: http://wiki.ros.org/rosunit (the files), https://llg.cubic.org/docs/junit/ (the format).
 """
@@ -39,7 +39,7 @@ _RED, _GREEN = "1;31", "32"
 
 
 class TestInfo:
-    """The fault of a test case: the exception's name, and its text with the lines that led there."""
+    """The error of a test case: the exception's name, and its message with the traceback."""
 
     kind: ClassVar[str] = ""
     word: ClassVar[str] = ""
@@ -49,32 +49,35 @@ class TestInfo:
         self.text = text
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the element of a test case."""
+        """Return the error as an XML element of a test case."""
         element = ElementTree.Element(self.kind, {"type": self.type})
         element.text = filter_nonprintable_text(self.text)
         return element
 
     def xml(self) -> bytes:
-        """Return the element as text."""
+        """Return the element as bytes."""
         return ElementTree.tostring(self.xml_element())
 
 
 class TestError(TestInfo):
-    """An exception that the test did not expect."""
+    """An unexpected exception."""
 
     kind = "error"
     word = "ERROR"
 
 
 class TestFailure(TestInfo):
-    """An assertion that does not hold."""
+    """A failed assertion."""
 
     kind = "failure"
     word = "FAILURE"
 
 
 class TestCaseResult:
-    """One test case: its name and class, seconds, and what went wrong. ``skipped`` says why it was not run."""
+    """One test case: its name and class, its duration in seconds, and its errors.
+
+    ``skipped`` is the reason for not running it.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -86,12 +89,12 @@ class TestCaseResult:
 
     @property
     def passed(self) -> bool:
-        """Return whether all cases passed."""
+        """Return whether the case has neither errors nor failures."""
         return not self.errors and not self.failures
 
     @property
     def description(self) -> str:
-        """The word for it in the summary."""
+        """The lines about this case in the summary."""
         if self.passed:
             return f"[{self.name}][passed]\n"
         return "".join(
@@ -101,7 +104,7 @@ class TestCaseResult:
 
     @property
     def line(self) -> str:
-        """The text that is printed when it has run."""
+        """The text that is printed after the case has run."""
         lines = [f"[Testcase: {self.name}] ... ok"]
         for info in (*self.failures, *self.errors):
             lines[0] = f"[Testcase: {self.name}] ... {info.word}!"
@@ -109,15 +112,15 @@ class TestCaseResult:
         return "\n".join(lines)
 
     def add_error(self, error: TestInfo) -> None:
-        """Note an error."""
+        """Add an error."""
         self.errors.append(error)
 
     def add_failure(self, failure: TestInfo) -> None:
-        """Note a failure."""
+        """Add a failure."""
         self.failures.append(failure)
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the element of a test suite."""
+        """Return the case as an XML element of a test suite."""
         attributes = {"classname": self.classname, "name": self.name, "time": f"{self.time:.4f}"}
         element = ElementTree.Element("testcase", attributes)
         if self.skipped is not None:
@@ -126,12 +129,12 @@ class TestCaseResult:
         return element
 
     def xml(self) -> bytes:
-        """Return the element as text."""
+        """Return the element as bytes."""
         return ElementTree.tostring(self.xml_element())
 
 
 class Result:
-    """The results of a test suite: counts, what was printed, and the cases."""
+    """The results of a test suite: counts, captured output, and cases."""
 
     def __init__(self, name: str, num_errors: int = 0, num_failures: int = 0, num_tests: int = 0) -> None:
         self.name = name
@@ -154,11 +157,11 @@ class Result:
         self.system_err = "\n".join(filter(None, (self.system_err, other.system_err)))
 
     def add_test_case_result(self, result: TestCaseResult) -> None:
-        """Add a case; the counts stay as they are."""
+        """Add a case without changing the counts."""
         self.test_case_results.append(result)
 
     def add_case(self, case: TestCaseResult) -> None:
-        """Add a case, and count it."""
+        """Add a case and count it."""
         self.add_test_case_result(case)
         self.num_tests += 1
         self.num_errors += bool(case.errors)
@@ -166,7 +169,7 @@ class Result:
         self.time += case.time
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the root of a file."""
+        """Return the root element of the file."""
         attributes = {
             "errors": str(self.num_errors),
             "failures": str(self.num_failures),
@@ -181,12 +184,12 @@ class Result:
         return suite
 
     def xml(self) -> bytes:
-        """Return the file's text."""
+        """Return the file's content."""
         text: bytes = ElementTree.tostring(self.xml_element(), encoding="utf-8", xml_declaration=True)
         return text
 
     def write(self, file: Path) -> None:
-        """Write the file, as a whole or not at all."""
+        """Write the file atomically."""
         part = file.with_name(f"{file.name}.part")
         with os.fdopen(private_files.create_file(part, 0o666), "wb") as stream:
             stream.write(self.xml())
@@ -197,7 +200,10 @@ class Result:
 
 
 def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
-    """Return the results in a file, its cases named ``package.rosunit-name/case``; empty, with a warning, on a bad file."""
+    """Return the results in a file, with cases named ``package.rosunit-name/case``.
+
+    An invalid file prints a warning and returns no cases.
+    """
     path = Path(test_file)
     if not path.is_file():
         print(f"WARN: cannot read test result file [{test_file}]: test file does not exist")
@@ -218,7 +224,7 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
 
 
 def read_all(filter_: Sequence[str] = ()) -> Result:
-    """Return the results below the folder of results, of the packages in ``filter_`` or of all; not those of rostest itself."""
+    """Read all results in the results folder, for the packages in ``filter_`` or for all; skip those of rostest itself."""
     from minirospy.workspace.folders import results_dir
 
     root = Path(results_dir())
@@ -257,24 +263,24 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
 
 
 def headline(text: str) -> str:
-    """Return a text with a line appended."""
+    """Return a string padded with dashes to the line width."""
     return text.ljust(_WIDTH, "-")
 
 
 def coloured(text: str, colour: str) -> str:
-    """Return a text in the colour of a terminal's code."""
+    """Return a text wrapped in a terminal colour code."""
     return f"\x1b[{colour}m{text}\x1b[0m"
 
 
 def names_of(infos: Iterable[tuple[object, str]]) -> list[str]:
-    """Return the names of the tests in unittest's list of errors or failures."""
+    """Return the test names from unittest's list of errors or failures."""
     return [str(getattr(test, "_testMethodName", test)) for test, _ in infos]
 
 
 def report(results: Result, runner_name: str, errors: int = 0, failed: Sequence[str] = ()) -> str:
-    """Return a line for each case, and the counts.
+    """Return a line for each case, then the counts.
 
-    ``errors`` and ``failed`` are those of the runner itself: tests that could not say how they went.
+    ``errors`` and ``failed`` are the runner's own: tests that could not report their results.
     """
     errors, failures = errors + results.num_errors, len(failed) + results.num_failures
     is_good = not errors and not failures
@@ -295,7 +301,7 @@ def report(results: Result, runner_name: str, errors: int = 0, failed: Sequence[
 
 
 def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
-    """Print each case, and the counts."""
+    """Print each case, then the counts."""
     print(report(junit_results, runner_name))
 
 
@@ -303,7 +309,7 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
 
 
 def filter_nonprintable_text(text: str) -> str:
-    """Return the text with what XML cannot hold written as ``&#x001B;``."""
+    """Return the text with characters that XML does not allow written as ``&#x001B;``."""
     return _NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 
@@ -314,7 +320,7 @@ def failure_junit_xml(
     class_name: str = "Results",
     testcase_name: str = "test_ran",
 ) -> bytes:
-    """Return a file that says that a test failed, for one that could not say so itself."""
+    """Return a results file with one failed test, for a test that could not write its own."""
     suite, case = _single(test_name, 1, class_name, testcase_name)
     ElementTree.SubElement(case, "failure", {"message": message, "type": ""})
     if stdout is not None:
@@ -324,7 +330,7 @@ def failure_junit_xml(
 
 
 def success_junit_xml(test_name: str, class_name: str = "Results", testcase_name: str = "test_ran") -> bytes:
-    """Return a file that says that a test passed."""
+    """Return a results file with one passed test."""
     return ElementTree.tostring(_single(test_name, 0, class_name, testcase_name)[0])
 
 

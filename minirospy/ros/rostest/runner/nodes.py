@@ -1,4 +1,4 @@
-"""The tests that come with rostest, as nodes with private parameters: `<test pkg="rostest" type="hztest" ...>`.
+"""The test nodes of rostest, configured by private parameters: `<test pkg="rostest" type="hztest" ...>`.
 
 Source: http://wiki.ros.org/rostest/Nodes.
 """
@@ -25,20 +25,19 @@ _WAIT_SECONDS = 20.0
 _POLL_SECONDS = 0.1
 _UNSET = object()
 
-_Item: TypeAlias = dict[str, Any]
-"""An item of a parameter that is a list: a name, and what is to hold of it."""
+_Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and the conditions for it
 
 
 def main(name: str) -> None:
-    """Run one of the tests, as the main function of its program."""
+    """Run one of the test nodes, as the main function of its program."""
     test = _TESTS[name]
-    # The name that the results have with those that bring the class in the program itself.
+    # In ROS the program defines the class itself, so the results have this module name.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 
 
 class _NodeTest(unittest.TestCase):
-    """The common part of the tests: a node, and its private parameters."""
+    """The base class of the tests: a node and its private parameters."""
 
     node: str
 
@@ -46,12 +45,12 @@ class _NodeTest(unittest.TestCase):
         rospy.init_node(self.node)
 
     def require(self, holds: bool, text: str) -> None:
-        """Fail the test with this text where the condition does not hold."""
+        """Fail the test with this text if ``holds`` is False."""
         if not holds:
             self.fail(text)
 
     def param(self, name: str, default: object = _UNSET) -> Any:
-        """Return a private parameter; the test fails where it has neither value nor default."""
+        """Return a private parameter; fail the test if it has neither value nor default."""
         value = rospy.get_param(f"~{name}", None)
         if value is None and default is _UNSET:
             self.fail(
@@ -60,7 +59,7 @@ class _NodeTest(unittest.TestCase):
         return default if value is None else value
 
     def seconds(self, name: str, default: object = _UNSET) -> float:
-        """Return a private parameter that is a time."""
+        """Return a private parameter that is a time in seconds."""
         value = self.param(name, default)
         if not isinstance(value, int | float) or isinstance(value, bool) or value < 0:
             self.fail(f"bad parameter ({name}): [{value}] is not a number of seconds")
@@ -76,7 +75,7 @@ class _NodeTest(unittest.TestCase):
         return [{**each, "name": rospy.resolve_name(str(each["name"]))} for each in value]
 
     def limits(self, name: str) -> list[tuple[str, float, bool, _Item]]:
-        """(name, timeout, negative, all) of such a list, the shortest timeout first."""
+        """Return (name, timeout, negative, item) for each item of a list parameter, the shortest timeout first."""
         found = [
             (each["name"], float(each.get("timeout", _WAIT_SECONDS)), bool(each.get("negative")), each)
             for each in self.listed(name)
@@ -85,7 +84,7 @@ class _NodeTest(unittest.TestCase):
 
 
 class HzTest(_NodeTest):
-    """A topic has a rate: ~topic, ~hz, ~hzerror (Hz), ~test_duration, ~wait_time (s), ~check_intervals."""
+    """Check a topic's rate: ~topic, ~hz, ~hzerror (Hz), ~test_duration, ~wait_time (s), ~check_intervals."""
 
     node = "hztest"
 
@@ -132,7 +131,7 @@ class HzTest(_NodeTest):
 
 
 class PublishTest(_NodeTest):
-    """Something is published: ~topics, a list of {name, timeout (s), negative}."""
+    """Check that topics are published: ~topics, a list of {name, timeout (s), negative}."""
 
     node = "publishtest"
 
@@ -152,7 +151,7 @@ class PublishTest(_NodeTest):
 
 
 class _GraphTest(_NodeTest):
-    """Conditions for which the master is polled."""
+    """Conditions that are checked by polling the master."""
 
     def setUp(self) -> None:
         super().setUp()
@@ -160,7 +159,7 @@ class _GraphTest(_NodeTest):
         self.addCleanup(self.master.close)
 
     def check(self, parameter: str, known: Callable[[SystemState], Container[str]], text: str) -> list[_Item]:
-        """Wait for each name of a list, the shortest timeout first; those that came."""
+        """Wait for each name in a list parameter, the shortest timeout first; return the items that were found."""
         started = time.monotonic()
         came = []
         for name, timeout, negative, each in self.limits(parameter):
@@ -175,7 +174,7 @@ class _GraphTest(_NodeTest):
 
 
 class AdvertiseTest(_GraphTest):
-    """Topics and services are offered: ~topics and ~services, lists of {name, type, timeout (s), negative}."""
+    """Check that topics and services are advertised: ~topics and ~services, lists of {name, type, timeout (s), negative}."""
 
     node = "advertisetest"
 
@@ -204,7 +203,7 @@ class SubscribeTest(_GraphTest):
 
 
 class ParamTest(_NodeTest):
-    """A parameter is set: ~param_name_target, ~param_value_expected (any value where it is not given), ~wait_time (s)."""
+    """Check that a parameter is set: ~param_name_target, ~param_value_expected (default: any value), ~wait_time (s)."""
 
     node = "paramtest"
 

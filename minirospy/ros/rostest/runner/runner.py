@@ -1,4 +1,4 @@
-"""The ``<test>`` tags of a launch file -> results: each runs with the file's nodes and a new master.
+"""Runs the ``<test>`` tags of a launch file: each with the file's nodes and a new master.
 
 Source: http://wiki.ros.org/rostest, http://wiki.ros.org/roslaunch/XML/test.
 """
@@ -36,10 +36,10 @@ _CLASS = "rostest.runner.RosTest"
 
 @dataclass
 class RosTest:
-    """A launch file and how its tests are run. ``own`` are the tests themselves, ``results`` what they wrote.
+    """A launch file's tests. ``own``: whether each test could run; ``results``: the cases that the tests reported.
 
-    ``text``: everything is printed, and no test writes a file. ``reuse_master``: no master is started, and
-    ``clear`` deletes all parameters of the one that is there. ``results_dir`` is where the XML files go.
+    ``text``: print everything and write no XML files. ``reuse_master``: use the running master instead of starting one;
+    ``clear`` deletes all of its parameters. ``results_dir``: folder for the XML files.
     """
 
     package: str
@@ -55,7 +55,7 @@ class RosTest:
     is_interrupted: bool = False
 
     def run(self) -> None:
-        """Run all tests, one after the other, by name; a signal ends it."""
+        """Run all tests, one after the other, sorted by name; a signal stops the run."""
         nodes = {node.name for node in self.spec.nodes}
         by_name: dict[str, list[TestSpec]] = {}
         for test in self.spec.tests:
@@ -98,7 +98,7 @@ class RosTest:
                 return
 
     def _why_not(self, test: TestSpec) -> str:
-        """Why a test cannot be run; empty if it can."""
+        """Return the reason why a test cannot run; empty if it can."""
         node = f"{test.node.package}/{test.node.type}"
         try:
             self.packages.find_executable(test.node.package, test.node.type)
@@ -112,7 +112,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once, and record in ``case`` the faults that are not in its own results."""
+        """Run a test once, and record in ``case`` the errors that are not in the test's own results."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
@@ -149,14 +149,14 @@ class RosTest:
             case.add_failure(_failure(text + self._last_lines(test)))
 
     def _launch(self, test: TestSpec, environment: Environment, case: TestCaseResult) -> int:
-        """Run the nodes, and the test until it ends or its time is over."""
+        """Run the nodes, and the test until it exits or its time limit is reached."""
         words = [test.node.args, shlex.quote(f"{XML_OUTPUT_FLAG}{self._results_file(test)}")]
         if self.text:
             words.append("--text")
         node = replace(
             test.node,
             args=" ".join(filter(None, words)),
-            # With its end all ends.
+            # When the test exits, the whole launch stops.
             required=True,
             output="screen" if self.text else "log",
         )
@@ -180,7 +180,7 @@ class RosTest:
 
     @property
     def run_id(self) -> str:
-        """The folder of the nodes' log files."""
+        """The name of the folder of the nodes' log files."""
         return f"rostest-{os.getpid()}"
 
     def _results_file(self, test: TestSpec) -> Path:
@@ -188,7 +188,7 @@ class RosTest:
         return Path(xml_results_file(self.package, test.test_name, False, place))
 
     def _last_lines(self, test: TestSpec) -> str:
-        """Return the end of what a test printed."""
+        """Return the last lines that a test printed."""
         stem = test.node.name.lstrip("/").replace("/", "-")
         folder = self.environment.log_dir / self.run_id
         files = sorted(folder.glob(f"{stem}-*-stdout.log"), key=os.path.getmtime)
@@ -207,10 +207,10 @@ class RosTest:
 def master_of_tests(
     environment: Environment, run_id: str, *, reuse: bool = False, clear: bool = False
 ) -> Iterator[Environment]:
-    """Provide the environment with a new master on a free port, whose run_id this is; it ends with the block.
+    """Yield the environment with a new master on a free port, which has this run_id and is stopped after the block.
 
-    ``reuse``: with the master that the environment names; ``clear`` deletes its parameters first.
-    Raise MasterUnreachableError if that one does not answer.
+    ``reuse``: use the master that the environment specifies; ``clear`` deletes its parameters first.
+    Raise MasterUnreachableError if it does not answer.
     """
     if reuse:
         with contextlib.closing(MasterProxy(environment.master_uri, "/rostest")) as master:

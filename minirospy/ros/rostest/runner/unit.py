@@ -1,4 +1,4 @@
-"""Unit tests in the process that runs them: a TestCase in, a JUnit XML file and a summary out. ``rosunit`` re-exports this.
+"""Runs the unit tests of a TestCase in this process; writes JUnit XML and prints a summary. ``rosunit`` re-exports this.
 
 Source: http://wiki.ros.org/rosunit, http://wiki.ros.org/unittest.
 """
@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# Modules whose lines say nothing about a fault.
+# Folders of modules whose lines are left out of tracebacks.
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]
@@ -57,11 +57,11 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase, given as its class or its name, as the main function of a test's file.
+    """Run a TestCase, given as its class or its name, as the main function of a test file.
 
-    ``--text`` in ``sysargs`` (default: ``sys.argv``) prints as unittest does; else the results go to
-    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or where ``--gtest_output=xml:FILE`` says. Raise SystemExit(1)
-    where a test fails. ``coverage_packages`` is accepted: run the file under coverage.py instead.
+    With ``--text`` in ``sysargs`` (default: ``sys.argv``), print as unittest does; else write the results to
+    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file of ``--gtest_output=xml:FILE``. Raise SystemExit(1)
+    if a test fails. ``coverage_packages`` has no effect: run the file under coverage.py instead.
     """
     arguments = sys.argv if sysargs is None else sysargs
     loader = unittest.TestLoader()
@@ -85,14 +85,14 @@ def unitrun(
 def create_xml_runner(
     test_pkg: str, test_name: str, results_file: str | None = None, is_rostest: bool = False
 ) -> XMLTestRunner:
-    """Return a runner that writes ``results_file``, or the file that rosunit's rules name."""
+    """Return a runner that writes ``results_file``, or rosunit's default file."""
     file = Path(results_file or xml_results_file(test_pkg, test_name, is_rostest))
     begin_results(file)
     return XMLTestRunner(file)
 
 
 def begin_results(file: Path) -> None:
-    """Make a file's folder, and say where results go. A file of an earlier run must not pass for that of this one."""
+    """Create the file's folder, delete the file of an earlier run, and print the file's path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -101,14 +101,14 @@ def begin_results(file: Path) -> None:
 def xml_results_file(
     test_pkg: str, test_name: str, is_rostest: bool = False, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return the file for the results of a test: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
+    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
     return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")
 
 
 def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
-    """Return the name of a test file's results: ``test/hz.test`` in its package is ``test_hz``."""
+    """Return the results name of a test file: ``test/hz.test`` in its package becomes ``test_hz``."""
     name = (
         test_file.removeprefix(pkg_dir).removeprefix(os.sep) if test_file.startswith(pkg_dir) else test_file
     )
@@ -128,7 +128,7 @@ def print_unittest_summary(result: unittest.TestResult) -> None:
 def print_runner_summary(
     runner_results: unittest.TestResult, junit_results: Result, runner_name: str = "ROSUNIT"
 ) -> None:
-    """Print each case of the results that tests wrote, and counts with the faults of the runner itself."""
+    """Print each case of the results that tests wrote, then the counts with the runner's own errors."""
     print(report(junit_results, runner_name, len(runner_results.errors), names_of(runner_results.failures)))
 
 
@@ -138,14 +138,14 @@ def print_runner_summary(
 class XMLTestRunner:
     """Runs tests, prints a line for each, and writes the results to a file (or stream) at the end.
 
-    What the tests print goes into the file alone.
+    The output of the tests goes only into the file.
     """
 
     def __init__(self, stream: Path | TextIO | None = None) -> None:
         self._stream = stream
 
     def run(self, test: unittest.TestSuite | unittest.TestCase) -> unittest.TestResult:
-        """Run; the result counts as unittest's own."""
+        """Run the tests; return the result with unittest's own counts."""
         result = _Recorder(sys.stdout)
         started = time.perf_counter()
         with _captured() as (out, err):
@@ -164,7 +164,7 @@ class XMLTestRunner:
 
 
 class _Recorder(unittest.TestResult):
-    """unittest's result that also keeps each case as JUnit wants it, and prints a line for each."""
+    """A unittest result that also records each case for JUnit XML, and prints a line for each."""
 
     def __init__(self, terminal: TextIO) -> None:
         super().__init__()
@@ -205,7 +205,7 @@ class _Recorder(unittest.TestResult):
         self._note(test, (TestFailure if is_failure else TestError)(kind, text))
 
     def addUnexpectedSuccess(self, test: unittest.TestCase) -> None:
-        # As a failure, which is what wasSuccessful() makes of it.
+        # Count it as a failure, as wasSuccessful() does.
         super().addUnexpectedSuccess(test)
         text = "the test was expected to fail, and did not"
         self.failures.append((test, text))
@@ -217,7 +217,7 @@ class _Recorder(unittest.TestResult):
             self._case.skipped = reason
 
     def _note(self, test: unittest.TestCase, info: TestInfo) -> None:
-        # A setUpClass or setUpModule that fails comes without startTest.
+        # If setUpClass or setUpModule fails, startTest is not called.
         case = self._case or _case_of(test)
         (case.add_error if isinstance(info, TestError) else case.add_failure)(info)
         if self._case is None:
@@ -229,7 +229,7 @@ class _Recorder(unittest.TestResult):
 
 
 def _case_of(test: unittest.TestCase) -> TestCaseResult:
-    # ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``.
+    # For example ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``.
     name, _, place = test.id().partition(" (")
     where, _, last = name.rpartition(".")
     case = TestCaseResult(last)
@@ -238,7 +238,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """Return the name of an exception, and its text with the lines that led there, without those of unittest."""
+    """Return the name of an exception, and its message with the traceback, without unittest's own lines."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

@@ -1,7 +1,7 @@
-"""rostopic: which topics there are, and the messages that go over them.
+"""rostopic: lists topics and shows their messages.
 
-What measures is in `rostopic_rates.py`, what publishes in `rostopic_pub.py`.
-Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
+Measurements are in `rostopic_rates.py`, publishing is in `rostopic_pub.py`.
+Source: http://wiki.ros.org/rostopic. The output is the same as in ROS.
 """
 
 from __future__ import annotations

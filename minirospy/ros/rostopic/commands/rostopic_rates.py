@@ -1,6 +1,6 @@
-"""rostopic hz, bw, delay: the rate, the bandwidth and the delay of a topic's messages, once a second.
+"""rostopic hz, bw, delay: print the rate, bandwidth and delay of a topic's messages once a second.
 
-Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
+Source: http://wiki.ros.org/rostopic. The output is the same as in ROS.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _delay_parser() -> Parser:
         "rostopic delay [options] /topic",
         ros_argparse="rostopic",
     )
-    # As ROS spells it.
+    # The spelling is ROS's.
     parser.add_argument("topic", help="topic name to be calcurated the delay", completer="topics")
     parser.add_argument(
         "-w",
@@ -163,7 +163,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, also if a field of one is named; warn of one that nobody publishes yet."""
+    """Return the global names of topics, even if one of their fields is given; warn of topics without a publisher."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

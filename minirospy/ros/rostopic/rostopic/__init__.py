@@ -42,8 +42,7 @@ NAME = "rostopic"
 _LATCH_SECONDS = 3.0
 _Topic = tuple[str, str, list[str]]
 
-_TopicRow = tuple[str, str, list[str]]
-"""A topic's name, its type and the nodes at one of its ends."""
+_TopicRow = tuple[str, str, list[str]]  # topic, type, nodes that publish (or subscribe to) it
 
 
 class ROSTopicException(Exception):
@@ -55,15 +54,15 @@ class ROSTopicIOException(ROSTopicException):
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """Also an error of sockets, as programs expect of ROS's get_topic_list."""
+    """Also a socket error, as programs expect from ROS's get_topic_list."""
 
 
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
-    """Return (type, topic, function that returns the field of a message); three times None without such a topic.
+    """Return (type, topic, function that extracts the field from a message); three times None without such a topic.
 
-    ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
+    ``topic`` may include a field of the messages. ``blocking`` waits until the topic exists or the node shuts down.
     """
     with _graph() as graph:
         name = graph.resolve(topic)
@@ -83,7 +82,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return the same as :func:`get_topic_type`, with the message's class. Raise ROSTopicException if it is not installed."""
+    """Return get_topic_type()'s result, with the message class as type. Raise ROSTopicException if it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -110,9 +109,9 @@ def find_by_type(topic_type: str) -> list[str]:
 
 
 def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
-    """Return a function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
+    """Return a function that extracts the field at a path (``/pose/x``) from a message; None for the whole message.
 
-    None, too, where a bracket of the path does not parse, which is reported on stderr, as is a message without the field.
+    Also return None if a bracket in the path is invalid; print this error, and a message's missing field, to stderr.
     """
     fields = [each for each in pattern.split("/") if each]
     try:
@@ -121,7 +120,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # A name that no field can have.
+        # Treat it as a field name, which no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def value(message: Message) -> object:
@@ -137,7 +136,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return what is wrong with the brackets of a field, in ROS's words; empty if nothing is."""
+    """Return the error in the brackets of a field, in ROS's words; empty if there is none."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""
@@ -157,7 +156,7 @@ def _slice_fault(field: str) -> str:
 
 
 def get_info_text(topic: str) -> str:
-    """Return the type, publishers and subscribers of a topic, as `rostopic info` prints them. Raise ROSTopicException."""
+    """Return a topic's type, publishers and subscribers, as `rostopic info` prints them. Raise ROSTopicException."""
     from minirospy.introspect.texts import topic_text
 
     if topic is not None and not isinstance(topic, str):
@@ -170,7 +169,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return the URI of a node, or `unknown address` and its name. Raise ROSTopicIOException."""
+    """Return a node's URI, or `unknown address` and its name. Raise ROSTopicIOException."""
     try:
         return master.lookupNode(caller_id)
     except masterapi.MasterException:
@@ -182,7 +181,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
 ) -> tuple[Publisher[Message], type[Message]]:
-    """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
+    """Return (publisher, message class) for a topic and a type's name; call init_node if there is no node.
 
     Raise ROSTopicException if the type is not installed.
     """
@@ -213,7 +212,7 @@ def publish_message(
 ) -> None:
     """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
 
-    ``substitute_keywords``: `now` and `auto` are replaced in each message. Raise ROSTopicException on values that do
+    ``substitute_keywords``: replace `now` and `auto` in each message. Raise ROSTopicException if the values do
     not fit.
     """
     import rospy
@@ -252,11 +251,11 @@ def publish_message(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program on failure, as ROS's does."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# Of ROS's private functions those that programs call.
+# Private functions of ROS that programs call.
 
 _rostopic_cmd_bw = _rostopic_cmd_delay = _rostopic_cmd_echo = _rostopic_cmd_find = _rostopic_cmd_hz = (
     rostopicmain
@@ -265,7 +264,7 @@ _rostopic_cmd_info = _rostopic_cmd_list = _rostopic_cmd_pub = _rostopic_cmd_type
 
 
 def _fullusage() -> NoReturn:
-    """Print the commands, and exit with the status of a usage error."""
+    """Print the list of commands, and exit with the status of a usage error."""
     _command([])
     raise AssertionError("a command without arguments is a usage error")
 
@@ -273,7 +272,7 @@ def _fullusage() -> NoReturn:
 def _rostopic_list_group_by_host(
     master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
 ) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
-    """Return host -> rows, for the publishers and the subscribers of rows (topic, type, nodes)."""
+    """Return host -> rows for the publishers, and the same for the subscribers; a row is (topic, type, nodes)."""
     hosts: dict[str, str] = {}
 
     def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
@@ -300,7 +299,7 @@ def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
 
 
 def _sleep(duration: float) -> None:
-    """Wait for these seconds of ROS's clock. Raise ROSInterruptException."""
+    """Wait for ``duration`` seconds on ROS's clock. Raise ROSInterruptException."""
     import rospy
 
     rospy.rostime.wallsleep(duration)
@@ -316,19 +315,19 @@ def _rostopic_list(
     publishers_only: bool = False,
     group_by_host: bool = False,
 ) -> None:
-    """Print what `rostopic list` prints. Raise ROSTopicIOException."""
+    """Print the output of `rostopic list`. Raise ROSTopicIOException."""
     _check_master()
     chosen = {"-v": verbose, "-s": subscribers_only, "-p": publishers_only, "--host": group_by_host}
     _command(["list", *(option for option, on in chosen.items() if on), *([topic] if topic else [])])
 
 
 def _rostopic_info(topic: str) -> None:
-    """Print what `rostopic info` prints. Raise ROSTopicException."""
+    """Print the output of `rostopic info`. Raise ROSTopicException."""
     print(get_info_text(topic))
 
 
 def _rostopic_type(topic: str) -> None:
-    """Print what `rostopic type` prints. Raise ROSTopicIOException."""
+    """Print the output of `rostopic type`. Raise ROSTopicIOException."""
     _check_master()
     _command(["type", topic])
 
@@ -336,7 +335,7 @@ def _rostopic_type(topic: str) -> None:
 def _rostopic_echo(
     topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
 ) -> None:
-    """Give the messages of a topic, or a field of them, to ``callback_echo`` until it has enough of them."""
+    """Pass the messages of a topic, or one of their fields, to ``callback_echo`` until it is done."""
     import rospy
 
     if bag_file:
@@ -355,7 +354,7 @@ def _rostopic_echo(
 
 
 def _is_shutdown() -> bool:
-    """Return whether the program is a node that shuts down; one that never imported rospy is none."""
+    """Return whether the program is a node that is shutting down; False if it never imported rospy."""
     rospy: Any = sys.modules.get("rospy")
     return rospy is not None and bool(rospy.is_shutdown())
 

@@ -1,4 +1,4 @@
-"""The printing of messages in user code, as callback of a subscriber or base class."""
+"""Prints messages in user code, as a subscriber's callback or a base class."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ ValueTransform = Callable[[object, object], object]
 class CallbackEcho:
     """Prints messages as `rostopic echo` does: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
 
-    ``msg_eval`` takes the field out of a message that is to be printed; of messages for which ``filter_fn`` is false
-    nothing is printed. ``done`` is true once ``count`` messages were.
+    ``msg_eval`` extracts the field to print; messages for which ``filter_fn`` is false
+    are not printed. ``done`` becomes true after ``count`` messages.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class CallbackEcho:
     def callback(
         self, data: Message, callback_args: Mapping[str, object], current_time: Time | None = None
     ) -> None:
-        """Print a message. ``callback_args``: its ``topic`` and, where known, ``type_information``."""
+        """Print a message. ``callback_args``: its ``topic`` and, if known, ``type_information``."""
         if self.done or not self._wanted(data, str(callback_args["topic"])):
             return
         value = self.msg_eval(data) if self.msg_eval is not None else data
@@ -108,7 +108,7 @@ class CallbackEcho:
 
 
 def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
-    """Return a function for `strify_message` that leaves out fields that are texts, or arrays."""
+    """Return a function for `strify_message` that omits string fields or array fields."""
 
     def fields(message: Message) -> list[str]:
         return [
@@ -121,5 +121,5 @@ def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
 
 
 def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> ValueTransform:
-    """Return a function of (value, type) that replaces texts, or arrays, by a note."""
+    """Return a function of (value, type) that replaces strings or arrays by a placeholder."""
     return lambda value, type_: elided(value, str(type_ or ""), not echo_nostr, not echo_noarr)

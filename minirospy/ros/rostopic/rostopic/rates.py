@@ -1,4 +1,4 @@
-"""The measuring of rates, bandwidths and delays in user code, as callbacks of a subscriber."""
+"""Measures rates, bandwidths and delays in user code, as a subscriber's callback."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Statistics = tuple[float, float, float, float, int]
 class ROSTopicHz:
     """Measures the rate of topics: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
 
-    ``window_size``: messages that count (-1: all). Time is that of rospy, with ``use_wtime`` the machine's.
+    ``window_size``: number of latest messages to use (-1: all). The clock is rospy's; with ``use_wtime``, the machine's.
     """
 
     def __init__(
@@ -52,12 +52,12 @@ class ROSTopicHz:
                 self._window(topic).add(now)
 
     def get_hz(self, topic: str | None = None) -> Statistics | None:
-        """Return (rate, least pause, longest pause, standard deviation, messages); None if no new message has arrived."""
+        """Return (rate, minimum and maximum interval, standard deviation, messages); None if no new message has arrived."""
         report = self._report(topic)
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
     def print_hz(self, topics: Sequence[str | None] = (None,)) -> None:
-        """Print the rates: of one topic two lines, of several a table."""
+        """Print the rates: two lines for one topic, a table for several."""
         print(rate_text({str(topic): self._report(topic) for topic in topics}))
 
     def _report(self, topic: str | None) -> Spread | None:
@@ -71,7 +71,7 @@ class ROSTopicHz:
 class ROSTopicBandwidth:
     """Measures the bandwidth of a topic: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``.
 
-    ``times`` (seconds) and ``sizes`` (bytes) are those of the latest ``window_size`` messages.
+    ``times`` (seconds) and ``sizes`` (bytes) describe the latest ``window_size`` messages.
     """
 
     def __init__(self, window_size: int = 100) -> None:
@@ -89,7 +89,7 @@ class ROSTopicBandwidth:
                 del self.times[0], self.sizes[0]
 
     def print_bw(self) -> None:
-        """Print the bandwidth, where two messages have come."""
+        """Print the bandwidth if at least two messages have arrived."""
         window = BandwidthWindow(self.window_size)
         with self.lock:
             for moment, size in zip(self.times, self.sizes, strict=True):
@@ -100,7 +100,7 @@ class ROSTopicBandwidth:
 
 
 class ROSTopicDelay:
-    """Measures how late a topic's stamped messages come: ``rospy.Subscriber(topic, Type, delay.callback_delay)``."""
+    """Measures the delay of a topic's stamped messages: ``rospy.Subscriber(topic, Type, delay.callback_delay)``."""
 
     def __init__(self, window_size: int) -> None:
         self.lock = threading.Lock()
@@ -108,7 +108,7 @@ class ROSTopicDelay:
         self._window = DelayWindow(self.window_size)
 
     def callback_delay(self, msg: Stamped) -> None:
-        """Measure the delay of a message; log an error where it has no header."""
+        """Measure the delay of a message; log an error if it has no header."""
         if not msg._has_header:
             import rospy
 
@@ -119,12 +119,12 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """Return (mean, least, longest, standard deviation, messages); None if no new message has arrived."""
+        """Return (mean, minimum, maximum, standard deviation, messages); None if no new message has arrived."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 
     def print_delay(self) -> None:
-        """Print the delay, where something new has come."""
+        """Print the delay if a new message has arrived."""
         report = self._report()
         if report:
             print(delay_text(report))
@@ -135,7 +135,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # At the first message rospy has long been imported, for a subscriber of it calls.
+    # When the first message arrives, a subscriber has already imported rospy.
     from minirospy.client import get_time
 
     return get_time()

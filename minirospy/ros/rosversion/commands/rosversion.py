@@ -1,7 +1,7 @@
-"""rosversion: the version of a package, or of the ROS distribution.
+"""rosversion: print the version of a package or of the ROS distribution.
 
-Source: http://wiki.ros.org/rosversion. minirospy is not a distribution: -d prints ROS_DISTRO where a workspace or a real
-ROS has set it, else noetic, the last of ROS 1 and the one whose files and wire these are.
+Source: http://wiki.ros.org/rosversion. minirospy is not a distribution: -d prints ROS_DISTRO if a workspace or a real
+ROS has set it, else noetic, the last distribution of ROS 1, with which minirospy is compatible.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _parser() -> Parser:
         "rosversion",
         "Print the version of a package, or the name of the ROS distribution.",
         "rosversion [-h] [-s] [-d] [-a] [package]",
-        # As ROS has it, which confuses the two.
+        # ROS's own text, which confuses the two.
         about="rosversion -d: Output the version of the given package\n"
         "rosversion package: Output the ROS distribution name",
         ros_argparse="rosversion",

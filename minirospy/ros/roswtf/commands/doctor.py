@@ -1,4 +1,4 @@
-"""`minirospy doctor` and `roswtf`: what is wrong, a line for each check, with what to do.
+"""`minirospy doctor` and `roswtf`: find problems; print a line for each check, with a remedy.
 
 Source: http://wiki.ros.org/roswtf.
 """
@@ -81,7 +81,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
     if machines and offline:
         raise Misuse(f"{machines[0]}: to try another machine needs the network")
 
-    # What the node under the checks would log is what they find out.
+    # Suppress the log of the node that runs the checks: the checks report the same errors.
     logging.getLogger("minirospy").addHandler(logging.NullHandler())
     show = _show_json if json else _show
     counts = dict.fromkeys(Status, 0)
@@ -99,7 +99,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
 
 
 def _is_file(word: str) -> bool:
-    """Return whether a word names a file, rather than a machine."""
+    """Return whether an argument names a file rather than a machine."""
     return "/" in word or word.endswith((".launch", ".test", ".xml")) or Path(word).is_file()
 
 
@@ -120,7 +120,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
-    """Yield whether a launch file loads, and whether the programs that it starts are there."""
+    """Yield whether a launch file loads, and whether the programs that it starts exist."""
     from minirospy.base.errors import MinirospyError
     from minirospy.ros.roslaunch.launcher.command import node_command
     from minirospy.ros.roslaunch.launcher.load import load_files

@@ -1,10 +1,10 @@
-"""roswtf: what is wrong with a graph. Source: http://wiki.ros.org/roswtf."""
+"""roswtf: finds problems in a graph. Source: http://wiki.ros.org/roswtf."""
 
 __all__ = ["roswtf_main"]
 
 
 def roswtf_main() -> None:
-    """Run the command on this process's command line, and exit."""
+    """Run the command with this process's arguments, and exit."""
     import sys
 
     from minirospy.ros.roswtf.commands.doctor import roswtf

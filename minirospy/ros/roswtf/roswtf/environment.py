@@ -1,4 +1,4 @@
-"""roswtf.environment: the checks of paths and addresses that plugins of roswtf use."""
+"""roswtf.environment: the checks of paths and URIs that plugins of roswtf use."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ __all__ = ["invalid_url", "is_executable", "paths"]
 
 
 def paths(path: str | None) -> list[str]:
-    """Return the folders of a variable such as PATH."""
+    """Return the folders in the value of a variable such as PATH."""
     return path.split(os.pathsep) if path else []
 
 
 def is_executable(path: str) -> int:
-    """Return the permission bits of a file that allow to execute it; 0 if none does. Raise OSError."""
+    """Return the permission bits that allow a file to be executed; 0 if there are none. Raise OSError."""
     mode = os.stat(path)[stat.ST_MODE]
     return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
 
 
 def invalid_url(url: str | None) -> str | None:
-    """Return what is wrong with the address of a master; None if nothing is."""
+    """Return the error in a master's URI; None if it is valid."""
     if not url:
         return None
     scheme, _, rest = url.partition("://")

@@ -1,4 +1,4 @@
-"""roswtf.model: what a check found."""
+"""roswtf.model: the results of checks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __all__ = ["WtfError", "WtfWarning"]
 
 
 class WtfError:
-    """A fault: its text, the text before its values were inserted, and what the check returned."""
+    """An error: its message, the message's template, and the return value of the check."""
 
     def __init__(self, msg: str, format_msg: str | None = None, return_val: object = None) -> None:
         self.msg = msg
@@ -15,4 +15,4 @@ class WtfError:
 
 
 class WtfWarning(WtfError):
-    """Something that may be a fault."""
+    """A possible error."""

@@ -1,6 +1,6 @@
-"""roswtf.rules: from what a check returns to the errors and warnings of a context.
+"""roswtf.rules: convert the return values of checks to errors and warnings of a context.
 
-A rule is a pair of a check and a text; a check returns what is wrong, or nothing. A list is written item by item.
+A rule is a pair (check, message); a check returns the problem, or a false value. A list is shown item by item.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ __all__ = ["error_rule", "warning_rule"]
 
 
 class Context(Protocol):
-    """The subject of the rules of roswtf."""
+    """The object that the rules of roswtf check."""
 
     errors: list[WtfError]
     warnings: list[WtfError]
 
     def as_dictionary(self) -> Mapping[str, object]:
-        """Return the values that a rule's text may name."""
+        """Return the values that a rule's message may contain."""
 
 
 Rule = tuple[Callable[..., object], str]
 
 
 def error_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add an error to the context where the check of a rule returned something."""
+    """Add an error to the context if the rule's check returned something."""
     _add(rule, ret, ctx, ctx.errors, WtfError)
 
 
 def warning_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add a warning to the context where the check of a rule returned something."""
+    """Add a warning to the context if the rule's check returned something."""
     _add(rule, ret, ctx, ctx.warnings, WtfWarning)
 
 

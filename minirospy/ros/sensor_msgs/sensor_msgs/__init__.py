@@ -1,1 +1,1 @@
-"""sensor_msgs: what its package offers besides messages."""
+"""sensor_msgs: the Python modules of the package, besides its messages."""

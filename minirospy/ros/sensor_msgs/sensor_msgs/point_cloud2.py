@@ -1,7 +1,7 @@
-"""sensor_msgs.point_cloud2: the points of a PointCloud2 as tuples or as numpy arrays, and back.
+"""sensor_msgs.point_cloud2: converts the points of a PointCloud2 to tuples or numpy arrays, and back.
 
 Source: http://docs.ros.org/api/sensor_msgs/html/point__cloud2_8py.html. ``read_points_numpy`` and arrays as ``points`` of
-``create_cloud`` are those of sensor_msgs_py.
+``create_cloud`` are from sensor_msgs_py.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from std_msgs.msg import Header
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Values: TypeAlias = NDArray[Any]
-    """The values of points, of any of the types that fields have."""
+    Values: TypeAlias = NDArray[Any]  # the values of points, of any type that fields may have
 
 __all__ = [
     "create_cloud",
@@ -45,17 +44,15 @@ _DATATYPES: dict[int, tuple[str, int]] = {
     PointField.FLOAT32: ("f", 4),
     PointField.FLOAT64: ("d", 8),
 }
-"""Format character and bytes of a field's type."""
+"""A field's datatype -> its format character and size in bytes."""
 
-_BLOCK = 4_096
-"""How many points are read at a time: few enough for the processor's cache."""
+_BLOCK = 4_096  # points read at a time, so that they fit the processor's cache
 
-_FEW = 1_000
-"""Below this number of points numpy costs more than it saves."""
+_FEW = 1_000  # with fewer points than this, numpy is slower than plain Python
 
 
 class Column(NamedTuple):
-    """A field as it is read: where in a point, format character and bytes of a value, how many values."""
+    """A field to read: its offset in the point, format character, bytes per value, and number of values."""
 
     offset: int
     format: str
@@ -71,8 +68,8 @@ def read_points(
 ) -> Iterator[Point]:
     """Yield a tuple of values for each point: those of ``field_names``, in the order of their offsets.
 
-    ``skip_nans`` leaves out points with a NaN in one of them; ``uvs`` names the points to yield, as (column, row).
-    Raise AssertionError if it is not a PointCloud2, struct.error where the data ends before the last point.
+    ``skip_nans`` leaves out points with a NaN in one of them; ``uvs`` selects the points to yield, as (column, row).
+    Raise AssertionError if it is not a PointCloud2, struct.error if the data ends before the last point.
     """
     _check_type(cloud)
     columns = _columns(cloud.fields, field_names)
@@ -84,7 +81,8 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # A tuple per point is most of the cost; zip makes it with the fewest steps, and reuses one that the caller drops.
+        # Creating the tuples takes most of the time; zip does it fastest, and reuses a tuple that the caller has
+        # dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -94,14 +92,15 @@ def read_points_list(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] = (),
 ) -> list[Point]:
-    """Return what ``read_points`` yields as a list of namedtuples. Raise what it raises, and TypeError."""
+    """Return the points of ``read_points`` as a list of namedtuples. Raise its errors, and TypeError."""
     _check_type(cloud)
     if field_names is None:
         field_names = [field.name for field in cloud.fields]
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Raise TypeError if a field has more than one value; all points have as many.
+    # Raise TypeError if a field has more than one value. One point is enough, since all have the same number of
+    # values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -116,8 +115,8 @@ def read_points_numpy(
     """Return the points as an array of shape (points, values), in the order of ``field_names``.
 
     With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
-    data where the values have one type and are evenly spaced, as x, y, z; else a copy, of the type that holds all of them.
-    Raise AssertionError if it is not a PointCloud2, ValueError where it lacks a field or data.
+    data if the values have one type and are evenly spaced, as x, y, z are; else a copy, with a type that can represent all.
+    Raise AssertionError if it is not a PointCloud2, ValueError if a field or data is missing.
     """
     _check_type(cloud)
     fields = {field.name: field for field in cloud.fields}
@@ -144,9 +143,9 @@ def read_points_numpy(
 def create_cloud(
     header: Header, fields: Sequence[PointField], points: Sequence[Iterable[float]] | Values
 ) -> PointCloud2:
-    """Return a cloud of these points, each with one value for each of its fields; an array's rows are points.
+    """Return a cloud of these points; each point has one value for each field, and an array has one row per point.
 
-    Raise struct.error where a point has another number of values, or one that does not fit the field's type.
+    Raise struct.error if a point has a different number of values, or a value does not fit the field's type.
     """
     columns = _columns(fields, None)
     point = struct.Struct(_format(False, columns))
@@ -170,7 +169,7 @@ def create_cloud(
 
 
 def create_cloud_xyz32(header: Header, points: Sequence[Iterable[float]] | Values) -> PointCloud2:
-    """Return a cloud of points with x, y and z as 32 bit floats. Raise struct.error."""
+    """Return a cloud of points with x, y and z as 32-bit floats. Raise struct.error."""
     return create_cloud(
         header, [PointField(name, 4 * at, PointField.FLOAT32, 1) for at, name in enumerate("xyz")], points
     )
@@ -184,12 +183,12 @@ def _check_type(cloud: PointCloud2) -> None:
 def _get_struct_fmt(
     is_bigendian: bool, fields: Iterable[PointField], field_names: Collection[str] | None = None
 ) -> str:
-    """Return the format of a point, as ``struct`` has it. Programs use it, though it is private in ROS, too."""
+    """Return the ``struct`` format of a point. Programs use this function, although it is private in ROS, too."""
     return _format(is_bigendian, _columns(fields, field_names))
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return where the fields of these names are: as ROS reads them, one after the other, even if they overlap."""
+    """Return the columns of the fields with these names, read one after the other as in ROS, even if they overlap."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:
@@ -213,24 +212,24 @@ def _format(is_bigendian: bool, columns: Iterable[Column]) -> str:
 
 
 def _offsets(cloud: PointCloud2) -> Iterator[int]:
-    """Yield where each point starts."""
+    """Yield the byte offset of each point."""
     for row in range(cloud.height):
         for column in range(cloud.width):
             yield cloud.row_step * row + cloud.point_step * column
 
 
 def _is_whole(cloud: PointCloud2, size: int) -> bool:
-    """Return whether each point has its whole step in the data, and that is bytes."""
+    """Return whether the data is bytes, and contains all of ``point_step`` for each point."""
     if not isinstance(cloud.data, bytes | bytearray | memoryview) or not 0 < size <= cloud.point_step:
         return False
     return len(cloud.data) >= (cloud.height - 1) * cloud.row_step + cloud.width * cloud.point_step
 
 
 def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
-    """Yield where the parts of a cloud start, and their rows and columns, in the order of the points."""
+    """Yield the byte offset and (rows, columns) of each block of a cloud, in the order of the points."""
     height, width = cloud.height, cloud.width
     if cloud.row_step == width * cloud.point_step:
-        # Nothing between the rows: they are one.
+        # Without padding between the rows, treat them as one row.
         height, width = 1, height * width
     rows = max(1, _BLOCK // width)
     for row in range(0, height, rows):
@@ -242,7 +241,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values of a part of a cloud, one sequence for each value of a point."""
+    """Return the values of a block of a cloud: one sequence for each value of a point."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"
@@ -259,13 +258,13 @@ def _values(
                 good &= ~np.isnan(each)
         if not good.all():
             arrays = [each[good] for each in arrays]
-    # Copies, since memoryview reads only values in the machine's byte order, at multiples of their size.
+    # Copy, because memoryview reads only aligned values in the machine's byte order.
     copies = [each.astype(each.dtype.newbyteorder("="), order="C") for each in arrays]
     return [each.reshape(-1).data for each in copies]
 
 
 def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
-    """Return an array of shape (height, width, values)."""
+    """Return the cloud as an array of shape (height, width, values)."""
     import numpy as np
 
     shape = cloud.height, cloud.width
@@ -295,14 +294,14 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
         )
         return view
     with np.errstate(invalid="ignore"):
-        # NaNs of any bits are values like others.
+        # Suppress warnings about NaNs, which are valid values here.
         return np.stack(
             [np.ndarray(shape, dtype, cloud.data, offset, strides) for dtype, offset in values], axis=-1
         )
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the data of points that are an array of floats for fields of floats; None if ``struct`` has to decide."""
+    """Return the packed data if points and fields are all floats; None if ``struct`` has to pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

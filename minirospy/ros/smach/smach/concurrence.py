@@ -1,4 +1,4 @@
-"""The container that executes its states at the same time, each in a thread."""
+"""The container that executes its states at the same time, each in its own thread."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ from minirospy.ros.smach.smach.util import is_shutdown
 
 __all__ = ["Concurrence"]
 
-_SHUTDOWN_CHECK = 0.1
-"""Seconds between two looks for a shutdown."""
+_SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class Concurrence(Container):
     """Executes all of its states in parallel, and ends when all of them have ended.
 
-    Its outcome is what ``outcome_cb`` returns, else the outcome of ``outcome_map`` that most states agree with, else
-    ``default_outcome``; "preempted" where the states ended because the container was requested to.
+    Its outcome is the return value of ``outcome_cb``, else the outcome of ``outcome_map`` that most states match, else
+    ``default_outcome``; "preempted" if the states ended because the container was preempted.
     """
 
     def __init__(
@@ -40,10 +39,10 @@ class Concurrence(Container):
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
-        """``outcome_map``: outcome -> (label -> outcome of that state).
+        """Create the container. ``outcome_map``: outcome -> (label -> outcome of that state).
 
-        ``child_termination_cb`` gets the outcomes so far, None of those that execute, each time a state ends; where it
-        returns a true value, the other states are requested to end.
+        ``child_termination_cb`` is called each time a state ends, with the outcomes so far (None for running states); if it
+        returns a true value, the other states are preempted.
         """
         known = list(outcomes)
         super().__init__(known, input_keys, output_keys)
@@ -58,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards what follows, and is notified when the states that still execute are to end.
+        # Guards the attributes below; notified when the states that still execute have to end.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -86,14 +85,14 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a state to the open container, and return it; ``remapping``: the state's key -> the container's."""
+        """Add a state to the open container and return it; ``remapping``: the state's key -> the container's."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state
         concurrence._remappings[label] = remapping or {}
         return state
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if the outcome map names a state or an outcome that is not there."""
+        """Raise InvalidTransitionError if the outcome map names a state or an outcome that does not exist."""
         for outcomes in self._outcome_map.values():
             for label, outcome in outcomes.items():
                 if label not in self._states:
@@ -130,7 +129,7 @@ class Concurrence(Container):
         return outcome
 
     def _run_states(self) -> None:
-        """Start a thread for each state, wait until they are to end, and until they have."""
+        """Start a thread for each state, wait until they have to end, and wait for their end."""
         self._is_ending = self._user_code_exception = False
         self._child_outcomes = dict.fromkeys(self._states)
         self._threads = {
@@ -188,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether no other state need go on, now that one has ended."""
+        """Return whether the other states can end, now that one has ended."""
         others_end = False
         if self._child_termination_cb:
             try:
@@ -249,7 +248,7 @@ class Concurrence(Container):
         return self._is_running
 
     def request_preempt(self) -> None:
-        """Request the container to end, and its states."""
+        """Preempt the container and its states."""
         with self._done_cond:
             super().request_preempt()
             self._done_cond.notify_all()
@@ -261,11 +260,11 @@ class Concurrence(Container):
         return self._states
 
     def __getitem__(self, key: str) -> State:
-        """Return the state of a label."""
+        """Return the state with this label."""
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add to the userdata; all states start, whatever ``initial_states`` are."""
+        """Add ``userdata`` to the container's; ``initial_states`` has no effect, since all states start."""
         if 0 < len(initial_states) < len(self._states):
             logwarn(
                 "Attempting to set initial states in Concurrence container, but Concurrence children are always all "
@@ -282,7 +281,7 @@ class Concurrence(Container):
         return [label for label, outcome in self._child_outcomes.items() if outcome is None]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return what the outcome map says: outcome, label, outcome of the container."""
+        """Return the outcome map as edges: outcome, label, outcome of the container."""
         return [
             (outcome, label, target)
             for target, outcomes in self._outcome_map.items()

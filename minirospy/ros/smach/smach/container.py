@@ -1,4 +1,4 @@
-"""The common part of all containers: construction in a ``with`` block, userdata that is copied in and out, callbacks."""
+"""The base class of all containers: construction in a ``with`` block, copying of userdata in and out, callbacks."""
 
 from __future__ import annotations
 
@@ -27,15 +27,14 @@ Callback = Callable[..., object]
 
 
 class Container(State):
-    """A state that holds states; derived classes execute them.
+    """A state that contains states; subclasses execute them.
 
     Callbacks are called when it starts (userdata, initial states), at each transition (userdata, active states), and when
     it ends (userdata, the last states, the outcome).
     """
 
     _construction_stack: ClassVar[list[Container]] = []
-    _construction_lock = threading.RLock()
-    """Held by the thread that has a container open."""
+    _construction_lock = threading.RLock()  # held by the thread that has a container open
 
     def __init__(
         self,
@@ -44,15 +43,14 @@ class Container(State):
         output_keys: Iterable[str] = (),
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self.userdata = UserData()
-        """What its states share."""
+        self.userdata = UserData()  # shared by its states
         self._executing_thread: int | None = None
         self._start_cbs: list[tuple[Callback, Sequence[object]]] = []
         self._transition_cbs: list[tuple[Callback, Sequence[object]]] = []
         self._termination_cbs: list[tuple[Callback, Sequence[object]]] = []
 
     def __getitem__(self, key: str) -> State:
-        """Return the state of a label."""
+        """Return the state with this label."""
         raise NotImplementedError
 
     def get_children(self) -> Mapping[str, State]:
@@ -60,19 +58,19 @@ class Container(State):
         raise NotImplementedError
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Set where the container starts, and add to its userdata."""
+        """Set the initial states, and add ``userdata`` to the container's."""
         raise NotImplementedError
 
     def get_initial_states(self) -> list[str]:
-        """Return the labels of the states that it starts with."""
+        """Return the labels of the initial states."""
         raise NotImplementedError
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the states that are executed now."""
+        """Return the labels of the states that are executing."""
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: outcome, label of the state, label or outcome that it leads to."""
+        """Return the transitions: outcome, the state's label, the label or container outcome that it leads to."""
         raise NotImplementedError
 
     def check_consistency(self) -> None:
@@ -104,15 +102,15 @@ class Container(State):
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
-        """Call the functions of ``register_start_cb``; what they raise is logged."""
+        """Call the functions of ``register_start_cb``; log their exceptions."""
         self._call("start", self._start_cbs, lambda: (self.get_initial_states(),))
 
     def call_transition_cbs(self) -> None:
-        """Call the functions of ``register_transition_cb``; what they raise is logged."""
+        """Call the functions of ``register_transition_cb``; log their exceptions."""
         self._call("transition", self._transition_cbs, lambda: (self.get_active_states(),))
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
-        """Call the functions of ``register_termination_cb``; what they raise is logged."""
+        """Call the functions of ``register_termination_cb``; log their exceptions."""
         self._call("termination", self._termination_cbs, lambda: (terminal_states, outcome))
 
     def _call(
@@ -149,7 +147,7 @@ class Container(State):
 
     @contextmanager
     def opened(self, **kwargs: object) -> Iterator[Self]:
-        """Open the container in a ``with`` block; ``kwargs`` have no effect, as in ROS."""
+        """Open the container for a ``with`` block; ``kwargs`` have no effect, as in ROS."""
         self.open()
         try:
             yield self
@@ -157,12 +155,12 @@ class Container(State):
             self.close()
 
     def open(self) -> None:
-        """Let ``add`` add to this container, until ``close``."""
+        """Open the container: ``add`` adds to it until ``close``."""
         Container._construction_lock.acquire()
         Container._construction_stack.append(self)
 
     def close(self) -> None:
-        """End what ``open`` started, and log where the container is not consistent."""
+        """Close the container, and log an error if it is not consistent."""
         self._leave()
         try:
             self.check_consistency()
@@ -176,7 +174,7 @@ class Container(State):
         Container._construction_lock.release()
 
     def is_opened(self) -> bool:
-        """Return whether ``add`` adds to this container."""
+        """Return whether the container is open, so that ``add`` adds to it."""
         stack = Container._construction_stack
         return bool(stack) and stack[-1] is self
 

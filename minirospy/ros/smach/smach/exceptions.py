@@ -1,4 +1,4 @@
-"""The errors of smach. Each error logs its text when it is made, as in ROS."""
+"""The errors of smach. Each error logs its message when it is created, as in ROS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = [
 
 
 class SmachError(Exception):
-    """The base of the errors of smach."""
+    """The base class of smach's errors."""
 
     def __init__(self, message: str) -> None:
         logerr(f"{type(self).__name__}: {message}")
@@ -22,16 +22,16 @@ class SmachError(Exception):
 
 
 class InvalidTransitionError(SmachError):
-    """A state has no such outcome, or it leads nowhere."""
+    """A state does not have this outcome, or the transition's target does not exist."""
 
 
 class InvalidStateError(SmachError):
-    """A state cannot be added, or a container is not made correctly."""
+    """A state cannot be added, or a container is not constructed correctly."""
 
 
 class InvalidUserCodeError(SmachError):
-    """Code of a state, or of a callback, raised an error."""
+    """The code of a state or callback raised an exception."""
 
 
 class InvalidConstructionError(SmachError):
-    """A container is used before it is opened."""
+    """A container is used before it was opened."""

@@ -1,4 +1,4 @@
-"""The container that executes one state for each of some items."""
+"""The container that executes one state once per item."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Items = Iterable[object] | Callable[[], Iterable[object]]
 
 
 class Iterator(Container):
-    """Executes its state with each item in the userdata, until an outcome of it breaks the loop or the items end."""
+    """Executes its state with each item in the userdata, until an outcome breaks the loop or the items are exhausted."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class Iterator(Container):
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
     ) -> None:
-        """Take the items ``it``, or a function that returns them; ``it_label``: their key in the userdata."""
+        """Create the container. ``it``: the items, or a function that returns them; ``it_label``: their userdata key."""
         super().__init__([*outcomes, exhausted_outcome], input_keys, output_keys)
         self._items = it
         self._items_label = it_label
@@ -48,7 +48,7 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Items, it_label: str = "it_data") -> None:
-        """Set the items of the open iterator, or a function that returns them, and their key in the userdata."""
+        """Set the items of the open iterator, or a function that returns them, and their userdata key."""
         iterator = Iterator._currently_opened_container()
         iterator._items = it
         iterator._items_label = it_label
@@ -63,7 +63,7 @@ class Iterator(Container):
     ) -> None:
         """Set the state of the open iterator.
 
-        An outcome of ``break_outcomes`` ends the loop; without them, each that is not one of ``loop_outcomes`` does.
+        An outcome in ``break_outcomes`` ends the loop; if that is empty, any outcome that is not in ``loop_outcomes`` does.
         ``final_outcome_map``: the state's last outcome -> the iterator's.
         """
         iterator = Iterator._currently_opened_container()
@@ -82,12 +82,12 @@ class Iterator(Container):
         iterator._final_outcome_map = final_outcome_map or {}
 
     def check_consistency(self) -> None:
-        """Do nothing, as in ROS: ``execute`` raises where there is no state."""
+        """Do nothing, as in ROS: ``execute`` raises if there is no state."""
 
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item; return its last outcome, mapped, or the one of exhausted items."""
+        """Execute the state for each item; return its last outcome, mapped, or the outcome for exhausted items."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True
@@ -142,7 +142,7 @@ class Iterator(Container):
         return self._is_running
 
     def request_preempt(self) -> None:
-        """Request the loop to end, and the state that it executes."""
+        """Preempt the loop and the state that it executes."""
         self._preempt_requested = True
         if self._is_running:
             self._state.request_preempt()
@@ -150,11 +150,11 @@ class Iterator(Container):
     # The interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the state by its label."""
+        """Return the state as ``{label: state}``."""
         return {self._state_label: self._state}
 
     def __getitem__(self, key: str) -> State:
-        """Return the state; raise KeyError, and log it, for another label."""
+        """Return the state; log and raise KeyError for any other label."""
         if key != self._state_label:
             logerr(
                 f"Attempting to get state '{key}' from Iterator container. The only available state is "
@@ -165,7 +165,7 @@ class Iterator(Container):
         return state
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add to the userdata; raise KeyError, and log it, for another state than its one."""
+        """Add ``userdata`` to the container's; log and raise KeyError for any other state than the contained one."""
         if len(initial_states) > 1:
             logwarn(
                 "Attempting to set initial state to include more than one state, but Iterator container can only have one "

@@ -1,4 +1,4 @@
-"""Where smach logs: lines on standard output, until ``set_loggers`` gives it other functions."""
+"""The log functions of smach: print to stdout until ``set_loggers`` replaces them."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ _loggers: dict[str, Logger] = {
 
 
 def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
-    """Log by these functions of one text each, in the whole process."""
+    """Replace the log functions for the whole process; each is called with one string."""
     _loggers.update(info=info, warn=warn, debug=debug, error=error)
 
 
 def loginfo(msg: object) -> None:
-    """Log what the machine does."""
+    """Log a message about the machine's progress."""
     _loggers["info"](str(msg))
 
 
 def logwarn(msg: object) -> None:
-    """Log what is probably not meant."""
+    """Log a warning."""
     _loggers["warn"](str(msg))
 
 
 def logdebug(msg: object) -> None:
-    """Log a detail."""
+    """Log a debug message."""
     _loggers["debug"](str(msg))
 
 
 def logerr(msg: object) -> None:
-    """Log what is wrong."""
+    """Log an error."""
     _loggers["error"](str(msg))

@@ -1,4 +1,4 @@
-"""A state machine whose states follow each other in the order in which they are added."""
+"""A state machine whose states run in the order in which they are added."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Sequence"]
 
 
 class Sequence(StateMachine):
-    """States one after the other, as long as they return the connector outcome."""
+    """Executes its states in order, as long as they return the connector outcome."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Sequence(StateMachine):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state, to which the connector outcome of the one before leads unless its transitions say otherwise."""
+        """Add a state. The previous state's connector outcome leads to it, unless it has another target."""
         sequence = Sequence._currently_opened_container()
         last = sequence._last_added_seq_label
         if last is not None:

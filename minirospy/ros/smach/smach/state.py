@@ -1,4 +1,4 @@
-"""The states that containers hold."""
+"""The states that containers execute."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class State:
         self._preempt_requested = False
 
     def execute(self, ud: Values) -> str | None:
-        """Do what the state is for, and return an outcome; derived classes define it."""
+        """Do the state's work and return an outcome; subclasses override it."""
         raise NotImplementedError
 
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
@@ -61,19 +61,19 @@ class State:
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
-        """Request the state to end soon; its ``execute`` checks ``preempt_requested``."""
+        """Preempt the state: its ``execute`` checks ``preempt_requested`` and should end soon."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Declare the request fulfilled."""
+        """Acknowledge the preemption: clear the request."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
-        """Take the request back."""
+        """Withdraw the preemption request."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Return whether the state is requested to end."""
+        """Return whether the state was preempted."""
         return self._preempt_requested
 
 
@@ -102,7 +102,7 @@ class CBState(State):
 
 
 def adopt_interface(state: State, cb: object) -> None:
-    """Give a state the keys and outcomes that a callback of it declares with ``cb_interface``."""
+    """Add to a state the keys and outcomes that its callback declares with ``cb_interface``."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())
         state.register_output_keys(cb.get_registered_output_keys())

@@ -1,4 +1,4 @@
-"""The container that executes one state after the other, by their outcomes."""
+"""The container that executes one state after the other, chosen by their outcomes."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Transitions = Mapping[str, "str | None"]
 
 
 class StateMachine(Container):
-    """A state machine. An outcome of a state leads to another state, or to an outcome of the machine.
+    """A state machine. A state's outcome leads to another state, or to an outcome of the machine.
 
-    One that is given no target leads to the machine's outcome of the same name.
+    An outcome without a target leads to the machine's outcome of the same name.
     """
 
     def __init__(
@@ -38,16 +38,16 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # Of `add_auto`: the state that was added last, and which of its outcomes lead to the next one.
+        # For `add_auto`: the last added state, and its outcomes that lead to the next one.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was requested to end, and may not have noticed.
+        # The state that was preempted, and may not have noticed.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
-        # Held except while a state executes: a request to end never comes between two states.
+        # Released only while a state executes, so that a preemption never arrives between two states.
         self._state_transitioning_lock = threading.RLock()
 
     def __getstate__(self) -> dict[str, object]:
@@ -70,8 +70,8 @@ class StateMachine(Container):
         """Add a state to the open machine, and return it.
 
         ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's;
-        ``constants``: values that are put into the userdata before the state executes. Raise InvalidStateError if
-        the label is taken, InvalidTransitionError for an outcome that the state does not have.
+        ``constants``: values that are set in the userdata before the state executes. Raise InvalidStateError if the
+        label is already used, InvalidTransitionError for an outcome that the state does not have.
         """
         return StateMachine._currently_opened_container()._add(
             label, state, transitions, remapping, constants
@@ -86,7 +86,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state whose ``connector_outcomes`` lead to the state that is added next; else as ``add``."""
+        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise like ``add``."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -132,7 +132,7 @@ class StateMachine(Container):
         return state
 
     def check_state_spec(self, label: str, state: State, transitions: Transitions) -> None:
-        """Raise InvalidTransitionError for a transition of an outcome that the state does not have."""
+        """Raise InvalidTransitionError if a transition is for an outcome that the state does not have."""
         registered = state.get_registered_outcomes()
         for outcome in transitions:
             if outcome not in registered:
@@ -142,7 +142,7 @@ class StateMachine(Container):
                 )
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is no initial state, or a transition leads nowhere."""
+        """Raise InvalidTransitionError if there is no initial state, or if the target of a transition does not exist."""
         outcomes = self.get_registered_outcomes()
         available = [*self._states, *(each for each in outcomes if each not in self._states)]
         errors = []
@@ -170,7 +170,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine, and return that; None at a shutdown."""
+        """Execute states until one leads to an outcome of the machine, and return this outcome; None at a shutdown."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()
@@ -199,7 +199,7 @@ class StateMachine(Container):
         return outcome
 
     def _step(self) -> str | None:
-        """Execute the current state; return the machine's outcome where it leads to one."""
+        """Execute the current state; return the machine's outcome if it leads to one."""
         label = self._current_label
         if label is None or label not in self._states:
             raise InvalidStateError(
@@ -230,7 +230,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Before a state executes: request it to end, where the machine is to end and the last state did not notice."""
+        """Preempt a state before it executes, if the machine is preempted and the last state did not notice."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -293,7 +293,7 @@ class StateMachine(Container):
     # Preemption.
 
     def request_preempt(self) -> None:
-        """Request the machine to end, and the state that it executes."""
+        """Preempt the machine and the state that it executes."""
         with self._state_transitioning_lock:
             self._preempt_requested = True
             if self._current_label is not None:
@@ -317,7 +317,7 @@ class StateMachine(Container):
         return self._states
 
     def __getitem__(self, key: str) -> State:
-        """Return the state of a label; raise KeyError, and log it, where there is none."""
+        """Return the state with this label; log and raise KeyError if there is none."""
         if key not in self._states:
             logerr(
                 f"Attempting to get state '{key}' from StateMachine container. The only available states are: "
@@ -327,7 +327,7 @@ class StateMachine(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Start with another state the next time, and add to the userdata."""
+        """Set the state in which the next execution starts, and add ``userdata`` to the machine's."""
         logdebug(f"Setting initial states to {initial_states}")
         if len(initial_states) > 1:
             logwarn(
@@ -340,11 +340,11 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the state that it starts with."""
+        """Return the label of the initial state."""
         return [str(self._initial_state_label)]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the state that is executed; "None" where there is none."""
+        """Return the label of the executing state; "None" if there is none."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:

@@ -1,4 +1,4 @@
-"""The data that states share: of a container (UserData), and what one state may see of it (Remapper)."""
+"""The data that states share: a container's values (UserData), and one state's view of them (Remapper)."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class UserData:
         self._data: dict[str, object] = {}
 
     def update(self, other_userdata: UserData) -> None:
-        """Take all values of another one."""
+        """Copy all values from another UserData."""
         self._data.update(other_userdata._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return copies of some values, under the names that ``remapping`` maps to theirs."""
+        """Return copies of some values under new names; ``remapping``: new name -> key here."""
         names = {outer: inner for inner, outer in remapping.items()}
         if len(names) != len(remapping):
             logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")
@@ -33,7 +33,7 @@ class UserData:
         return extracted
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Take copies of some values of another one, under the names that ``remapping`` maps theirs to."""
+        """Copy some values from another UserData; ``remapping``: key there -> key here."""
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
@@ -66,7 +66,7 @@ class UserData:
 
 
 def get_const(obj: object) -> object:
-    """Return an object that has attributes of its own as read-only, any other as it is."""
+    """Return an object that has attributes as read-only; return any other object unchanged."""
     if not hasattr(obj, "__dict__"):
         return obj
     logdebug(f"Making const '{obj}'")
@@ -74,7 +74,7 @@ def get_const(obj: object) -> object:
 
 
 class Const:
-    """An object whose attributes can be read; those that are set are set here alone, and logged as an error."""
+    """A read-only view of an object's attributes; setting one changes only the view, and logs an error."""
 
     def __init__(self, obj: object) -> None:
         object.__setattr__(self, "_obj", obj)
@@ -98,7 +98,7 @@ class Const:
 
 
 class Remapper:
-    """A state's view of a container's userdata: the keys that it declared, under its own names.
+    """A state's view of a container's userdata: its declared keys, under the state's names.
 
     A value of an input key that is not an output key is read-only (``get_const``). Writing a key that is not an output key is
     logged and has no effect; reading one that is not an input key raises InvalidUserCodeError.
@@ -121,11 +121,11 @@ class Remapper:
         return mapped
 
     def update(self, other_userdata: UserData) -> None:
-        """Give the userdata all values of another one."""
+        """Copy all values from another UserData."""
         self._ud.update(other_userdata)
 
     def keys(self) -> list[str]:
-        """Return the keys that can be read and are there."""
+        """Return the readable keys that exist."""
         return [self._remap(key) for key in list(self._ud.keys()) if key in self._input]
 
     def __contains__(self, key: object) -> bool:
@@ -162,4 +162,4 @@ class Remapper:
 
 
 Values = UserData | Remapper
-"""Userdata as a state gets it: of the container itself, or the keys that the state declared."""
+"""Userdata as a state receives it: the container's, or a view of the declared keys."""

@@ -1,4 +1,4 @@
-"""The interface that callbacks of states may declare, and the check for a shutdown."""
+"""The interface that a state's callbacks may declare, and the check for a shutdown."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ _checks: dict[str, Callable[[], bool]] = {"shutdown": lambda: False}
 
 
 def is_shutdown() -> bool:
-    """Return whether containers are to stop after the state that they execute."""
+    """Return whether containers have to stop after the current state."""
     return _checks["shutdown"]()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Let ``cb`` decide whether containers are to stop."""
+    """Set the function that decides whether containers have to stop."""
     _checks["shutdown"] = cb
 
 
 def has_smach_interface(obj: object) -> TypeGuard[CBInterface]:
-    """Return whether an object says which outcomes, input and output keys it has."""
+    """Return whether an object declares its outcomes, input keys and output keys."""
     return all(hasattr(obj, f"get_registered_{name}") for name in ("input_keys", "output_keys", "outcomes"))
 
 
 class CBInterface:
-    """A callback with outcomes and keys, which a state that it is given to gets, too."""
+    """A callback with outcomes and keys, which are added to the state that uses it."""
 
     def __init__(
         self,
@@ -47,15 +47,15 @@ class CBInterface:
         return self._cb(*args, **kwargs)
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """Return the keys of the userdata that it may read."""
+        """Return the userdata keys that the callback may read."""
         return tuple(self._input_keys)
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """Return the keys of the userdata that it may write."""
+        """Return the userdata keys that the callback may write."""
         return tuple(self._output_keys)
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """Return the outcomes that it adds to its state's."""
+        """Return the outcomes that the callback adds to its state."""
         return self._outcomes
 
 

@@ -1,6 +1,6 @@
-"""smach_ros: states that use topics, services and actions, and a view into running containers.
+"""smach_ros: states that use topics, services and actions, and introspection of running containers.
 
-When it is imported, smach logs by rospy and ends at rospy's shutdown, as in ROS. Source: http://wiki.ros.org/smach.
+Importing it makes smach log through rospy and stop at rospy's shutdown, as in ROS. Source: http://wiki.ros.org/smach.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A container as an action server: each goal executes it."""
+"""An action server that executes a container for each goal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["ActionServerWrapper"]
 
 
 class ActionServerWrapper:
-    """Executes a container for each goal of an action; its outcome says how the goal ends."""
+    """Executes a container for each goal of an action; the container's outcome decides the goal's final state."""
 
     def __init__(
         self,
@@ -36,10 +36,10 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Name the keys of the userdata in which the container finds the goal, and puts feedback and result.
+        """Set the userdata keys for the goal, which the container reads, and for feedback and result, which it writes.
 
         ``goal_slots_map``: field of the goal -> key, ``result_slots_map``: field of the result -> key. ``expand_goal_slots``
-        and ``pack_result_slots``: every field under its own name.
+        and ``pack_result_slots``: use every field under its own name.
         """
         self.wrapped_container = wrapped_container
         self.wrapped_container.register_transition_cb(self.transition_cb)
@@ -78,23 +78,23 @@ class ActionServerWrapper:
         rospy.loginfo(f"Started SMACH action server wrapper, advertising as '{self._server_name}'")
 
     def transition_cb(self, userdata: UserData, active_states: list[str]) -> None:
-        """Publish the feedback that the container has put into its userdata."""
+        """Publish the feedback in the container's userdata."""
         self.publish_feedback(userdata)
 
     def termination_cb(self, userdata: UserData, terminal_states: list[str], container_outcome: str) -> None:
-        """Log how the container ended."""
+        """Log the container's outcome."""
         rospy.logdebug(
             f"Wrapped state machine has terminated with final state: {terminal_states} and container outcome: "
             f"{container_outcome}"
         )
 
     def publish_feedback(self, userdata: UserData) -> None:
-        """Publish the feedback of a userdata, where it has one."""
+        """Publish the feedback in ``userdata``, if there is any."""
         if self._feedback_key in userdata:
             self._action_server.publish_feedback(userdata[self._feedback_key])
 
     def execute_cb(self, goal: Message) -> None:
-        """Execute the container with a goal, and end the goal by its outcome."""
+        """Execute the container with a goal, and set the goal's final state from its outcome."""
         self._store_goal(goal)
         container = self.wrapped_container
         try:
@@ -144,6 +144,6 @@ class ActionServerWrapper:
         return result
 
     def preempt_cb(self) -> None:
-        """Request the container to end."""
+        """Preempt the container."""
         rospy.loginfo("Preempt on state machine requested!")
         self.wrapped_container.request_preempt()

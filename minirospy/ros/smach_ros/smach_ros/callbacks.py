@@ -1,4 +1,4 @@
-"""Callbacks that states of services and actions are given: which keys they see, and what they return."""
+"""The callbacks of service and action states: the userdata keys that they may use, and their return values."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["StateCallback"]
 
 
 class StateCallback:
-    """A callback of a state, or none.
+    """A state's callback; it may be None.
 
-    It sees the keys that it declares with ``cb_interface``, else those of the state's arguments.
+    Its userdata has the keys that it declares with ``cb_interface``, else those of the state's arguments.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class StateCallback:
         args: Sequence[object] = (),
         kwargs: Mapping[str, object] | None = None,
     ) -> None:
-        """Raise InvalidStateError for what cannot be called; ``what``: such as "Goal", for texts."""
+        """Raise InvalidStateError if the callback is not callable. ``what`` names it in messages, for example "Goal"."""
         if callback is not None and not callable(callback):
             raise InvalidStateError(
                 f"{what} callback object given to {type(state).__name__} that IS NOT a function object"
@@ -46,7 +46,7 @@ class StateCallback:
         self._state = state
 
     def adopt(self) -> None:
-        """Give the state the keys and outcomes that the callback declares."""
+        """Add to the state the keys and outcomes that the callback declares."""
         adopt_interface(self._state, self._callback)
 
     def __bool__(self) -> bool:
@@ -56,7 +56,7 @@ class StateCallback:
         return str(self._callback)
 
     def __call__(self, ud: Values, *values: object) -> tuple[bool, object]:
-        """Return whether it went well, and what it returns; an error of it is logged."""
+        """Call the callback; return (whether it raised no exception, its return value). An exception is logged."""
         if self._callback is None:
             return True, None
         seen = Remapper(ud, self._input_keys, self._output_keys)

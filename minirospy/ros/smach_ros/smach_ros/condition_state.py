@@ -1,4 +1,4 @@
-"""A state that waits until a function returns a true value."""
+"""A state that waits until a function returns true."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["ConditionState"]
 
 
 class ConditionState(State):
-    """Outcomes: "true" as soon as the condition holds, "false" after the last check or the timeout, "preempted"."""
+    """Outcomes: "true" when the condition is met, "false" after the last check or the timeout, "preempted"."""
 
     def __init__(
         self,
@@ -24,7 +24,10 @@ class ConditionState(State):
         timeout: rospy.Duration | None = None,
         max_checks: int = 1,
     ) -> None:
-        """``cond_cb`` gets the userdata, every ``poll_rate``; -1 checks: no limit. As in ROS, n allow n + 1 checks."""
+        """Create the state. ``cond_cb`` is called with the userdata every ``poll_rate``.
+
+        ``max_checks``: -1 means no limit; as in ROS, n allows n + 1 checks.
+        """
         super().__init__(outcomes=["true", "false", "preempted"], input_keys=input_keys)
         if hasattr(cond_cb, "get_registered_input_keys") and hasattr(cond_cb, "get_registered_output_keys"):
             self.register_input_keys(cond_cb.get_registered_input_keys())
@@ -35,7 +38,7 @@ class ConditionState(State):
         self._max_checks = max_checks
 
     def execute(self, ud: Values) -> str:
-        """Check the condition until an outcome is certain."""
+        """Check the condition until the outcome is known."""
         start = rospy.Time.now()
         checks = 0
         while self._max_checks == -1 or checks <= self._max_checks:

@@ -1,4 +1,4 @@
-"""The work of containers, on topics: their structure, their status, and where they start the next time.
+"""Publishes the structure and status of containers, and receives the states in which their next execution starts.
 
 Topics: NAME/smach/container_structure, NAME/smach/container_status, NAME/smach/container_init.
 Source: http://wiki.ros.org/smach/Tutorials/Smach%20Viewer.
@@ -34,15 +34,15 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""How long a command waits for the server to be connected."""
+"""Seconds that a command waits for the connection to the server."""
 _RESEND_SECONDS = 0.3
 
 
 class IntrospectionClient:
-    """Finds the servers, and sets where their containers start."""
+    """Finds introspection servers, and sets the initial states of their containers."""
 
     def get_servers(self) -> list[str]:
-        """Return the names of the servers that publish now."""
+        """Return the names of the servers that are publishing."""
         topics = rostopic.find_by_type(SmachContainerStatus._type)
         return [topic[: topic.rfind(STATUS_TOPIC)] for topic in topics]
 
@@ -54,9 +54,9 @@ class IntrospectionClient:
         initial_userdata: UserData | None = None,
         timeout: rospy.Duration | None = None,
     ) -> bool | None:
-        """Let the container at a path start with other states, and add to its userdata.
+        """Set the initial states of the container at a path, and add values to its userdata.
 
-        Return whether it has answered so within ``timeout``; None without a timeout.
+        Return whether the container confirmed this within ``timeout``; None without a timeout.
         """
         data = {} if initial_userdata is None else initial_userdata._data
         local_data, _ = pickle_userdata(data)
@@ -105,7 +105,7 @@ def _is_set(status: SmachContainerStatus, initial_states: Sequence[str], data: d
 
 
 class ContainerProxy:
-    """One container on the topics of a server."""
+    """Publishes one container on a server's topics."""
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class ContainerProxy:
         path: str,
         update_rate: rospy.Duration = rospy.Duration(2.0),  # noqa: B008 - a Duration does not change
     ) -> None:
-        """``update_rate``: the time between two messages while nothing changes."""
+        """Create the proxy; ``update_rate`` is the interval between messages while nothing changes."""
         self._path = path
         self._container = container
         self._update_rate = update_rate
@@ -137,11 +137,11 @@ class ContainerProxy:
         )
 
     def start(self) -> None:
-        """Publish regularly, from now on."""
+        """Start publishing periodically."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Publish no longer without a transition."""
+        """Stop the periodic messages; transitions are still published."""
         self._has_stopped.set()
 
     def _publish_regularly(self) -> None:
@@ -212,26 +212,26 @@ class ContainerProxy:
 
 
 class IntrospectionServer:
-    """Publishes what a container does, and the containers in it."""
+    """Publishes the state of a container and of the containers in it."""
 
     def __init__(self, server_name: str, state: Container, path: str) -> None:
-        """``path``: what the container is called, such as "/SM_ROOT"."""
+        """Create the server; ``path`` is the container's name, for example "/SM_ROOT"."""
         self._proxies: list[ContainerProxy] = []
         self._server_name = server_name
         self._state = state
         self._path = path
 
     def start(self) -> None:
-        """Publish from now on."""
+        """Start publishing."""
         self.construct(self._server_name, self._state, self._path)
 
     def stop(self) -> None:
-        """Publish no longer without a transition."""
+        """Stop the periodic messages; transitions are still published."""
         for proxy in self._proxies:
             proxy.stop()
 
     def construct(self, server_name: str, state: Container, path: str) -> None:
-        """Publish a container and those in it."""
+        """Create the proxies of a container and of those in it."""
         proxy = ContainerProxy(server_name, state, path)
         prefix = "" if path == "/" else path
         for label, child in state.get_children().items():
@@ -242,5 +242,5 @@ class IntrospectionServer:
         self._proxies.append(proxy)
 
     def clear(self) -> None:
-        """Forget the containers."""
+        """Remove all containers."""
         self._proxies = []

@@ -1,4 +1,4 @@
-"""A state that goes on until a message of a topic does not meet a condition."""
+"""A state that monitors a topic until a message does not meet a condition."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from minirospy.ros.smach.smach.user_data import Values
 
 __all__ = ["MonitorState"]
 
-_SHUTDOWN_CHECK = 0.1
-"""Seconds between two looks for a shutdown."""
+_SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class MonitorState(State):
@@ -28,7 +27,10 @@ class MonitorState(State):
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
     ) -> None:
-        """``cond_cb`` gets the userdata and a message; -1 checks: until a message does not meet the condition."""
+        """Create the state. ``cond_cb`` is called with the userdata and a message.
+
+        ``max_checks``: -1 means that it continues until a message does not meet the condition.
+        """
         super().__init__(
             outcomes=["valid", "invalid", "preempted"], input_keys=input_keys, output_keys=output_keys
         )
@@ -40,7 +42,7 @@ class MonitorState(State):
         self._trigger_event = threading.Event()
 
     def execute(self, ud: Values) -> str:
-        """Check the messages of the topic until an outcome is certain; "preempted" at a shutdown, too."""
+        """Check the topic's messages until the outcome is known; "preempted" also at a shutdown."""
         if self.preempt_requested():
             self.service_preempt()
             return "preempted"
@@ -73,6 +75,6 @@ class MonitorState(State):
             self._trigger_event.set()
 
     def request_preempt(self) -> None:
-        """Request the state to end, which it does without another message."""
+        """Preempt the state; it ends without waiting for another message."""
         super().request_preempt()
         self._trigger_event.set()

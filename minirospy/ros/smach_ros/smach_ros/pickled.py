@@ -1,6 +1,6 @@
-"""Userdata as text on a topic: pickled, in base64, as ROS's smach has it.
+"""Userdata as a string on a topic: pickled and base64-encoded, as in ROS's smach.
 
-What comes in was written by another node: only plain values, arrays and messages are made of it, and no other code runs.
+The data comes from another node, so only plain values, arrays and messages are created from it; no other code is executed.
 """
 
 from __future__ import annotations
@@ -21,15 +21,14 @@ from minirospy.core.idl.load import get_message_class, get_service_class
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
 _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
-"""Python 2's and older numpy's names of modules."""
+"""Module names of Python 2 and of older numpy."""
 _MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
 _TEXTS = "SU"
-_SIMPLE = "biufc" + _TEXTS
-"""Kinds of numpy's types: numbers and texts. Others may have pointers in their bytes."""
+_SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds: numbers and strings; other kinds may contain pointers
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
-    """Return the values as text, and the keys of those that cannot be pickled, which are left out."""
+    """Return the values as a string, and the keys of values that cannot be pickled, which are omitted."""
     try:
         return _encoded(dict(data)), []
     except Exception:  # noqa: BLE001 - values of the user's: pickle raises what their classes raise
@@ -46,7 +45,7 @@ def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
 
 
 def unpickle_userdata(text: str) -> dict[str, object]:
-    """Return the values of a text. Raise ValueError for what is not one, or holds values that may not be made."""
+    """Return the values in a string. Raise ValueError if it is invalid or contains values that are not allowed."""
     try:
         data = _Unpickler(io.BytesIO(base64.b64decode(text, validate=True))).load()
     except Exception as error:
@@ -64,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """Python's own in Python: what it does to an object can be looked at before."""
+    """The unpickler that is written in Python, so that its operations can be checked before they run."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -77,14 +76,14 @@ class _Unpickler(pickle._Unpickler):
         if made := _MAKERS.get(f"{module}.{name}"):
             return made
         if match := _MESSAGE.fullmatch(module):
-            # By the name of its type: to import any module that a text names would be to execute it.
+            # Find the class by its message type: importing any module named in the data would execute the module.
             for found in _classes(f"{match[1]}/{match[3]}", match[2]):
                 if found.__name__ == name:
                     return found
         raise pickle.UnpicklingError(f"{module}.{name} is not a plain value or a message")
 
     def load_build(self) -> None:
-        """Set an object's state; of a class, which belongs to all, or of numpy's types it would be theirs to change memory."""
+        """Set an object's state. Refuse classes, which are shared, and numpy dtypes, whose state could corrupt memory."""
         target, state = self.stack[-2:]
         if callable(target):
             raise pickle.UnpicklingError("the state of a class")
@@ -93,7 +92,7 @@ class _Unpickler(pickle._Unpickler):
         _set_state(self)  # type: ignore[arg-type]
 
     def load_bytearray8(self) -> None:
-        """Make a bytearray of the bytes that are there; pickle's own has the size that the text names, before it reads them."""
+        """Create a bytearray from the available bytes; pickle itself first allocates the size given in the data."""
         size = int.from_bytes(self.read(8), "little")
         self.append(bytearray(self.read(size)))
 
@@ -113,8 +112,8 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 
 def _check_dtype(target: Any, state: Any) -> None:
-    """Raise UnpicklingError unless a state leaves a type of numpy as it is, but for its byte order."""
-    # As numpy writes it. It would take over any size of a text, also a negative one, and any flags.
+    """Raise UnpicklingError unless the state leaves a numpy dtype unchanged except for its byte order."""
+    # The values that numpy writes. numpy would accept any size of a string, even a negative one, and any flags.
     size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
     allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
     if target.kind not in _SIMPLE or tuple(state) not in allowed:
@@ -122,7 +121,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Return what makes a value out of these: not of a number, which would be its size, nor of a range."""
+    """Wrap a constructor so that it accepts only these types: not a number, which would be its size, nor a range."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -150,7 +149,7 @@ def _simple_dtype(name: object, *_: object) -> Any:
     found = np.dtype(name if isinstance(name, str) else "O")
     if found.kind not in _SIMPLE:
         raise pickle.UnpicklingError(f"an array of {name}")
-    # A copy: its state follows, and that of numpy's own is not changed.
+    # A copy, because the state that follows must not change numpy's own dtype.
     return np.dtype(found.str, copy=True)
 
 
@@ -171,7 +170,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Not of another array: a state that follows would free its memory.
+    # Another array is refused: a state that follows could free its memory.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)
@@ -202,4 +201,4 @@ _MAKERS: Mapping[str, Callable[..., object]] = {
     "numpy._core.multiarray.scalar": _scalar,
     "numpy._core.numeric._frombuffer": _array,
 }
-"""What makes a value of each class that a text may name."""
+"""The constructor for each class that the data may name."""

@@ -15,7 +15,7 @@ __all__ = ["ServiceState"]
 
 
 class ServiceState(State):
-    """Outcomes: "succeeded", "aborted" (no request, no answer, an error of a callback), "preempted", and the callback's."""
+    """Outcomes: "succeeded", "aborted" (no request, no response, or a callback's exception), "preempted", and the callback's."""
 
     def __init__(
         self,
@@ -36,10 +36,10 @@ class ServiceState(State):
         output_keys: Iterable[str] = (),
         outcomes: Iterable[str] = (),
     ) -> None:
-        """Take the request from ``request``, from the userdata (the whole, or fields of it), and from ``request_cb``.
+        """Create the state. The request is built from ``request``, the userdata (a whole request or fields), and ``request_cb``.
 
         ``request_cb(userdata, request)`` may change the request or return another one. ``response_cb(userdata, response)``
-        may return an outcome. ``response_key`` and ``response_slots``: what is put into the userdata.
+        may return an outcome. ``response_key`` and ``response_slots`` select what is stored in the userdata.
         """
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._service_name = service_name
@@ -81,7 +81,7 @@ class ServiceState(State):
         return self._take_response(ud, response)
 
     def _connect(self) -> str | None:
-        """Wait for the service; return an outcome where that fails."""
+        """Wait for the service; return an outcome if that fails."""
         while self._proxy is None:
             if self.preempt_requested():
                 rospy.loginfo(f"Preempting while waiting for service '{self._service_name}'.")
@@ -101,7 +101,7 @@ class ServiceState(State):
         return None
 
     def _make_request(self, ud: Values) -> str | None:
-        """Put the request together; return an outcome where that fails."""
+        """Build the request; return an outcome if that fails."""
         if self._request_key is not None:
             if self._request_key not in ud:
                 rospy.logerr(

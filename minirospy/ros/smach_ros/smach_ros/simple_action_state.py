@@ -1,4 +1,4 @@
-"""A state that sends a goal to an action server, and waits for its result."""
+"""A state that sends a goal to an action server and waits for its result."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from minirospy.ros.smach_ros.smach_ros.callbacks import StateCallback
 
 __all__ = ["SimpleActionState"]
 
-_LOOK = 0.1
-"""Seconds between two looks at the timeouts and for a shutdown."""
+_LOOK = 0.1  # seconds between two checks of the timeouts and for a shutdown
 _MINUTE = rospy.Duration(60.0)
 
 
 class SimpleActionState(State):
-    """Outcomes: "succeeded", "preempted", "aborted" (whatever else happens), and those of the callback."""
+    """Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and those of the callback."""
 
     WAITING_FOR_SERVER = 0
     INACTIVE = 1
@@ -56,11 +55,11 @@ class SimpleActionState(State):
         preempt_timeout: rospy.Duration = _MINUTE,
         server_wait_timeout: rospy.Duration = _MINUTE,
     ) -> None:
-        """Take the goal from ``goal``, from the userdata (the whole, or fields of it), and from ``goal_cb``.
+        """Create the state. The goal is built from ``goal``, the userdata (a whole goal or fields), and ``goal_cb``.
 
         ``goal_cb(userdata, goal)`` may change the goal or return another one. ``result_cb(userdata, status, result)`` may
-        return an outcome. ``result_key`` and ``result_slots``: what is put into the userdata. A goal is cancelled after
-        ``exec_timeout``, given up ``preempt_timeout`` after it was cancelled.
+        return an outcome. ``result_key`` and ``result_slots`` select what is stored in the userdata. A goal is cancelled after
+        ``exec_timeout``, and given up ``preempt_timeout`` after the cancellation.
         """
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._action_name = action_name
@@ -80,7 +79,7 @@ class SimpleActionState(State):
         self._goal_cb = StateCallback(
             self, "Goal", goal_cb, input_keys, output_keys, goal_cb_args, goal_cb_kwargs
         )
-        # As in ROS, the callback of the result gets no arguments of its own.
+        # As in ROS, the result callback receives no extra arguments.
         self._result_cb = StateCallback(self, "Result", result_cb, input_keys, output_keys)
         if not set(result_slots) <= set(spec.action_result.result.__slots__):
             raise InvalidStateError("Result slots specified are not valid slots.")
@@ -119,7 +118,7 @@ class SimpleActionState(State):
                 return
 
     def request_preempt(self) -> None:
-        """Request the state to end, and cancel its goal."""
+        """Preempt the state, and cancel its goal."""
         rospy.loginfo(f"Preempt requested on action '{self._action_name}'")
         super().request_preempt()
         if self._status == SimpleActionState.ACTIVE:
@@ -127,7 +126,7 @@ class SimpleActionState(State):
             self._action_client.cancel_goal()
 
     def execute(self, ud: Values) -> str:
-        """Send the goal, and wait for its result."""
+        """Send the goal and wait for its result."""
         failure = self._connect() or self._make_goal(ud)
         if failure:
             return failure
@@ -142,7 +141,7 @@ class SimpleActionState(State):
         return self._take_result(ud) if is_done else "aborted"
 
     def _connect(self) -> str | None:
-        """Wait for the server; return an outcome where that fails."""
+        """Wait for the server; return an outcome if that fails."""
         if self._status == SimpleActionState.WAITING_FOR_SERVER:
             rospy.logwarn(f"Still waiting for action server '{self._action_name}' to start... is it running?")
             if self._action_wait_thread.is_alive():
@@ -161,7 +160,7 @@ class SimpleActionState(State):
         return None
 
     def _make_goal(self, ud: Values) -> str | None:
-        """Put the goal together; return an outcome where that fails."""
+        """Build the goal; return an outcome if that fails."""
         if self._goal_key is not None:
             self._goal = ud[self._goal_key]
         for key in self._goal_slots:
@@ -174,7 +173,7 @@ class SimpleActionState(State):
         return None
 
     def _wait_for_result(self) -> bool:
-        """Return whether the result has come; cancel the goal where it takes too long."""
+        """Return whether the result has arrived; cancel the goal if it takes too long."""
         cancelled: rospy.Time | None = None
 
         while not self._done.wait(_LOOK):
@@ -189,7 +188,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # The request may have come just before the goal was sent.
+                # The preemption may have arrived just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:
@@ -214,7 +213,7 @@ class SimpleActionState(State):
 
         if self._result_key is not None:
             ud[self._result_key] = self._goal_result
-        # A goal that is lost has no result.
+        # A lost goal has no result.
         if self._goal_result is not None:
             for key in self._result_slots:
                 ud[key] = getattr(self._goal_result, key)

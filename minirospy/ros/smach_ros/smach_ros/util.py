@@ -1,4 +1,4 @@
-"""Containers that end with their node."""
+"""Preempts containers when their node shuts down."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["set_preempt_handler"]
 
 
 def set_preempt_handler(sc: StateMachine | Concurrence | Iterator) -> None:
-    """Request a container to end when the node shuts down, and wait until it has.
+    """Preempt a container when the node shuts down, and wait until it has ended.
 
-    One that executes in the thread that handles the shutdown cannot end meanwhile: it is not waited for.
+    A container that executes in the thread that handles the shutdown cannot end in the meantime, so it is not waited for.
     """
 
     def handler() -> None:

@@ -1,4 +1,4 @@
-"""The client of sound_play: plays files and sounds, and says texts, by a topic or an action.
+"""The client of sound_play: plays files and sounds, and speaks texts, through a topic or an action.
 
 Source: http://wiki.ros.org/sound_play.
 """
@@ -23,7 +23,7 @@ __all__ = ["Sound", "SoundClient"]
 
 
 class Options(TypedDict, total=False):
-    """What each method that plays takes in addition."""
+    """Additional arguments of every method that plays a sound."""
 
     blocking: bool
     replace: bool
@@ -41,24 +41,26 @@ class Sound:
         self.vol = volume
 
     def play(self, **kwargs: Unpack[Options]) -> None:
-        """Play it once."""
+        """Play the sound once."""
         self.client.sendMsg(self.snd, SoundRequest.PLAY_ONCE, self.arg, vol=self.vol, **kwargs)
 
     def repeat(self, **kwargs: Unpack[Options]) -> None:
-        """Play it again and again."""
+        """Play the sound repeatedly."""
         self.client.sendMsg(self.snd, SoundRequest.PLAY_START, self.arg, vol=self.vol, **kwargs)
 
     def stop(self) -> None:
-        """Stop it."""
+        """Stop the sound."""
         self.client.sendMsg(self.snd, SoundRequest.PLAY_STOP, self.arg)
 
 
 class SoundClient:
     """Sends requests to soundplay_node.
 
-    Each method that plays takes ``blocking`` (True: wait until the sound has ended), ``replace`` (False: wait until no other
-    sound plays), ``server_timeout`` and ``result_timeout``. Files are on the machine of that node; without a folder they
-    are those of the package.
+    Each method that plays a sound accepts ``blocking`` (True: wait until the sound has ended), ``replace`` (False: wait
+    until no
+    other sound is playing), ``server_timeout`` and ``result_timeout``. Files are on the machine of soundplay_node; a file
+    without
+    a folder is one of the package's.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class SoundClient:
         self.sub = rospy.Subscriber(f"{sound_action}/status", GoalStatusArray, self._action_status_cb)
 
     def voiceSound(self, s: str, volume: float = 1.0) -> Sound:
-        """Return a text as a sound."""
+        """Return a spoken text as a sound."""
         return Sound(self, SoundRequest.SAY, s, volume=volume)
 
     def waveSound(self, sound: str, volume: float = 1.0) -> Sound:
@@ -79,19 +81,19 @@ class SoundClient:
         return Sound(self, SoundRequest.PLAY_FILE, _place(sound), volume=volume)
 
     def builtinSound(self, id: int, volume: float = 1.0) -> Sound:
-        """Return a sound of the package."""
+        """Return a built-in sound of the package."""
         return Sound(self, id, "", volume)
 
     def say(self, text: str, voice: str = "", volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Say a text."""
+        """Speak a text."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_ONCE, text, voice, volume, **kwargs)
 
     def repeat(self, text: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Say a text again and again."""
+        """Speak a text repeatedly."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_START, text, vol=volume, **kwargs)
 
     def stopSaying(self, text: str) -> None:
-        """Stop saying a text."""
+        """Stop speaking a text."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_STOP, text)
 
     def playWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
@@ -99,39 +101,39 @@ class SoundClient:
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, _place(sound), vol=volume, **kwargs)
 
     def startWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a file again and again."""
+        """Play a file repeatedly."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, _place(sound), vol=volume, **kwargs)
 
     def stopWave(self, sound: str) -> None:
-        """Stop a file."""
+        """Stop playing a file."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, _place(sound))
 
     def playWaveFromPkg(
         self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
     ) -> None:
-        """Play a file of a package."""
+        """Play a file from a package."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, sound, package, volume, **kwargs)
 
     def startWaveFromPkg(
         self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
     ) -> None:
-        """Play a file of a package again and again."""
+        """Play a file from a package repeatedly."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, sound, package, volume, **kwargs)
 
     def stopWaveFromPkg(self, sound: str, package: str) -> None:
-        """Stop a file of a package."""
+        """Stop playing a file from a package."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, sound, package)
 
     def play(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a sound of the package, such as SoundRequest.BACKINGUP."""
+        """Play a built-in sound, for example SoundRequest.BACKINGUP."""
         self.sendMsg(sound, SoundRequest.PLAY_ONCE, "", vol=volume, **kwargs)
 
     def start(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a sound of the package again and again."""
+        """Play a built-in sound repeatedly."""
         self.sendMsg(sound, SoundRequest.PLAY_START, "", vol=volume, **kwargs)
 
     def stop(self, sound: int) -> None:
-        """Stop a sound of the package."""
+        """Stop a built-in sound."""
         self.sendMsg(sound, SoundRequest.PLAY_STOP, "")
 
     def stopAll(self) -> None:
@@ -151,7 +153,7 @@ class SoundClient:
         blocking: bool | None = None,
         **kwargs: object,
     ) -> None:
-        """Send a request. A timeout of None waits until the server is there, or the sound has ended."""
+        """Send a request. A timeout of None waits without limit for the server, or for the end of the sound."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
         if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)
@@ -181,7 +183,7 @@ def _waits(timeout: times.Duration | None) -> bool:
 
 
 def _place(sound: str) -> str:
-    """Return where a file is: without a folder, among those of the package."""
+    """Return the path of a file; without a folder, it is one of the package's."""
     if sound.startswith("/") or Path(sound).is_absolute():
         return sound
     return f"{RosPack().get_path('sound_play')}/sounds/{sound}"

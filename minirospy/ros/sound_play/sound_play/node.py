@@ -1,6 +1,6 @@
-"""soundplay_node.py: plays what comes on robotsound, and by the action sound_play, with a player of this machine.
+"""soundplay_node.py: plays requests from robotsound and from the action sound_play, with a player program of this machine.
 
-Parameters: ~default_voice, ~loop_rate (100 Hz, of the action's feedback). Source: http://wiki.ros.org/sound_play.
+Parameters: ~default_voice, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ Key = tuple[int, str, str]
 
 
 class SoundError(Exception):
-    """A sound cannot be played; the text says why, and what to do."""
+    """A sound cannot be played; the message gives the reason and a remedy."""
 
 
 class PlayingSound:
-    """A program that plays a sound, once or again and again, in a separate thread."""
+    """A program that plays a sound, once or repeatedly, controlled by a separate thread."""
 
     def __init__(self, command: Command, repeats: bool) -> None:
         self._command = command
@@ -59,11 +59,11 @@ class PlayingSound:
 
     @property
     def is_playing(self) -> bool:
-        """Return whether it has not ended."""
+        """Return whether the sound is still playing."""
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """End it."""
+        """Stop the sound."""
         with self._lock:
             self._is_stopped = True
             if self._process is not None:
@@ -99,10 +99,10 @@ class PlayingSound:
 
 
 class SoundNode:
-    """The sounds that play, by what they are."""
+    """The playing sounds, by request."""
 
     def __init__(self, folder: Path) -> None:
-        """``folder``: where the sounds of the package are put."""
+        """Create the node; ``folder`` is the folder for the package's sound files."""
         self._folder = folder
         self._default_voice = str(rospy.get_param("~default_voice", "") or "")
         self._feedback_pause = 1.0 / max(1.0, float(rospy.get_param("~loop_rate", 100)))
@@ -118,7 +118,7 @@ class SoundNode:
         self._server.start()
 
     def handle(self, request: SoundRequest) -> PlayingSound | None:
-        """Play or stop what a request says; return the sound that plays. Raise SoundError if it cannot."""
+        """Play or stop the sound of a request; return the playing sound. Raise SoundError if that fails."""
         with self._lock:
             key = (request.sound, request.arg, request.arg2)
             if request.command == SoundRequest.PLAY_STOP:
@@ -183,7 +183,7 @@ class SoundNode:
             rospy.logerr(str(error))
 
     def _execute(self, goal: SoundRequestGoal) -> None:
-        """Play one sound and no other, with feedback, until it has ended."""
+        """Stop all other sounds, and play one with feedback until it has ended."""
         self.close()
         start = rospy.Time.now()
         feedback = SoundRequestFeedback()
@@ -207,7 +207,7 @@ class SoundNode:
         self._server.set_succeeded(SoundRequestResult(playing=False, stamp=_time_since(start)))
 
     def publish_state(self) -> None:
-        """Publish how many sounds play."""
+        """Publish the number of playing sounds."""
         with self._lock:
             self._sounds = {key: sound for key, sound in self._sounds.items() if sound.is_playing}
             count = len(self._sounds)

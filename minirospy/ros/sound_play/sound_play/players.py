@@ -1,4 +1,4 @@
-"""Which program of this machine plays a file or says a text, and how it is called. Pure."""
+"""Choose the program of this machine that plays a file or speaks a text, and its arguments. Pure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Which = Callable[[str], "str | None"]
 
 @dataclass(frozen=True)
 class Command:
-    """A program with its arguments, and what it reads on its standard input."""
+    """A program with its arguments and its standard input."""
 
     words: Sequence[str]
     text: str | None = None
@@ -22,7 +22,7 @@ def _powershell(script: str) -> list[str]:
     return ["-NoProfile", "-NonInteractive", "-Command", script]
 
 
-# The file is the last word, or $args[0].
+# The file is the last argument, or $args[0].
 PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
     "paplay": lambda file, volume: [f"--volume={round(volume * 65536)}", file],
     "pw-play": lambda file, volume: [f"--volume={volume:.3f}", file],
@@ -37,7 +37,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Players in order of preference -> the arguments for a file and a volume from 0 to 1."""
+"""Player, in order of preference -> its arguments for a file and a volume from 0 to 1."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,13 +53,13 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Programs that say a text, in order of preference."""
+"""Programs that speak a text, in order of preference."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names such as voice_kal_diphone are festival's.
+    # Names such as voice_kal_diphone are for festival.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 
@@ -69,12 +69,12 @@ def _festival(voice: str) -> list[str]:
 
 
 def installable(programs: Iterable[str], platform: str) -> list[str]:
-    """Return which programs can be installed on a platform (``sys.platform``)."""
+    """Return the programs that can be installed on a platform (``sys.platform``)."""
     return [name for name in programs if _ONLY_ON.get(name, platform) == platform]
 
 
 def play_command(file: str, volume: float, which: Which) -> Command | None:
-    """Return what plays a file; None without a player."""
+    """Return the command that plays a file; None if there is no player."""
     for name, arguments in PLAYERS.items():
         program = which(name)
         if program:
@@ -83,7 +83,7 @@ def play_command(file: str, volume: float, which: Which) -> Command | None:
 
 
 def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
-    """Return what says a text; None without a program for it."""
+    """Return the command that speaks a text; None if there is no program for it."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:

@@ -1,4 +1,4 @@
-"""say.py, play.py and their kin: one request each to soundplay_node. Source: http://wiki.ros.org/sound_play."""
+"""say.py, play.py and similar programs: each sends one request to soundplay_node. Source: http://wiki.ros.org/sound_play."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _VOICE = "voice_kal_diphone"
 
 
 def say() -> int:
-    """Say the text of the command line, or of the standard input; return the exit status."""
+    """Speak the text from the command line or stdin; return the exit status."""
     words = rospy.myargv()[1:]
     if words[:1] == ["--help"] or len(words) > 3:
         return _usage(
@@ -55,7 +55,7 @@ def play() -> int:
 
 
 def playbuiltin() -> int:
-    """Play a sound of the package, by its number; return the exit status."""
+    """Play a built-in sound, given by its number; return the exit status."""
 
     def request(client: SoundClient, words: list[str], volume: float) -> None:
         rospy.loginfo(f"Playing sound {words[0]}.")
@@ -71,7 +71,7 @@ def playbuiltin() -> int:
 
 
 def playpackage() -> int:
-    """Play a file of a package; return the exit status."""
+    """Play a file from a package; return the exit status."""
 
     def request(client: SoundClient, words: list[str], volume: float) -> None:
         rospy.loginfo(f'Playing "{words[1]}" from pkg "{words[0]}".')
@@ -99,7 +99,7 @@ def shutup() -> int:
 
 
 def is_speaking() -> int:
-    """Publish on ~output/is_speaking whether an action of ~robotsound is active; return the exit status."""
+    """Publish on ~output/is_speaking whether the action of ~robotsound is active; return the exit status."""
     rospy.init_node("is_speaking")
     active = {GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
     state = {"is_speaking": False}
@@ -122,7 +122,7 @@ def _play(
     request: Callable[[SoundClient, list[str], float], object],
     is_right: Callable[[str], bool] = lambda word: word != "--help",
 ) -> int:
-    """Send a request with the words of the command line, ``count`` and a volume; return the exit status."""
+    """Send a request with the first ``count`` arguments of the command line and a volume; return the exit status."""
     words = rospy.myargv()[1:]
     if not count <= len(words) <= count + 1 or not is_right(words[0]):
         return _usage(usage, text)
@@ -138,7 +138,7 @@ def _request(name: str, request: Callable[[SoundClient], object]) -> int:
     with suppress(rospy.ROSInterruptException):
         _connect(client)
         request(client)
-        # The message leaves before the node does.
+        # Give the message time to be sent before the node exits.
         rospy.sleep(0.2)
     return 0
 
@@ -150,7 +150,7 @@ def _connect(client: SoundClient) -> None:
 
 
 def _volume(words: list[str]) -> float | None:
-    """Return the volume of the command line; None, and print an error, where it is not a number."""
+    """Return the volume from the command line; print an error and return None if it is not a number."""
     try:
         return float(words[0]) if words else 1.0
     except ValueError:

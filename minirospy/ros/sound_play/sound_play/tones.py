@@ -1,4 +1,4 @@
-"""The sounds of the package: short melodies, made when they are needed, as WAV files."""
+"""The package's sounds: short melodies, generated on demand as WAV files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BUILTIN: dict[int, tuple[float, ...]] = {
     SoundRequest.NEEDS_UNPLUGGING_BADLY: (523, 659, 784, 0, 523, 659, 784),
     SoundRequest.NEEDS_PLUGGING_BADLY: (784, 659, 523, 0, 784, 659, 523),
 }
-"""The notes of each sound, in Hz; 0 is a rest."""
+"""The notes of each built-in sound, in Hz; 0 is a rest."""
 
 
 def wav_of(notes: tuple[float, ...]) -> bytes:
@@ -31,7 +31,7 @@ def wav_of(notes: tuple[float, ...]) -> bytes:
     samples = array.array("h")
     for note in notes:
         for at in range(count):
-            # Faded in and out, so that it does not click.
+            # Fade in and out, to avoid clicks.
             loudness = min(1.0, at / 200, (count - at) / 200)
             samples.append(int(12000 * loudness * math.sin(2 * math.pi * note * at / _RATE)))
     if sys.byteorder == "big":

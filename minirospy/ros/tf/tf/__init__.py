@@ -1,6 +1,6 @@
 """tf, the older API: transformers, listeners and broadcasters, on the buffer of tf2.
 
-A leading slash of a frame's name is dropped, where tf2 refuses it. Source: http://wiki.ros.org/tf.
+A leading slash in a frame's name is removed, because tf2 rejects it. Source: http://wiki.ros.org/tf.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""tf.TransformBroadcaster: transforms as tuples -> /tf. Source: http://wiki.ros.org/tf."""
+"""tf.TransformBroadcaster: publishes transforms, given as tuples, on /tf. Source: http://wiki.ros.org/tf."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["TransformBroadcaster"]
 
 
 class TransformBroadcaster:
-    """Publishes transforms on /tf. ``queue_size`` has no effect, as with the real one."""
+    """Publishes transforms on /tf. ``queue_size`` has no effect, as in real ROS."""
 
     def __init__(self, queue_size: int = 100) -> None:
         self.tf2_broadcaster = broadcasters.TransformBroadcaster()

@@ -1,4 +1,4 @@
-"""Matrices of several transformations: taken apart, put together, fitted to points; and a trackball.
+"""Composite transformation matrices: decompose, compose, fit to points; and a virtual trackball.
 
 numpy is imported when a function is called.
 """
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
 
-    Floats: TypeAlias = NDArray[numpy.float64]
-    """Vectors and matrices."""
+    Floats: TypeAlias = NDArray[numpy.float64]  # vectors and matrices
 
 __all__ = [
     "Arcball",
@@ -44,14 +43,14 @@ _Axis = TypeVar("_Axis", bound="ArrayLike")
 
 
 def concatenate_matrices(*matrices: ArrayLike) -> Floats:
-    """Return the product of matrices: the last is done first."""
+    """Return the product of matrices; the last one is applied first."""
     import numpy
 
     return functools.reduce(numpy.dot, matrices, numpy.identity(4))
 
 
 def inverse_matrix(matrix: ArrayLike) -> Floats:
-    """Return the inverse. Raise LinAlgError."""
+    """Return the inverse matrix. Raise LinAlgError."""
     import numpy
 
     inverse: Floats = numpy.linalg.inv(numpy.asarray(matrix))
@@ -59,7 +58,7 @@ def inverse_matrix(matrix: ArrayLike) -> Floats:
 
 
 def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
-    """Return whether two matrices are the same up to a factor."""
+    """Return whether two matrices are the same up to a scale factor."""
     import numpy
 
     first, second = numpy.array(matrix0, dtype=numpy.float64), numpy.array(matrix1, dtype=numpy.float64)
@@ -69,7 +68,7 @@ def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
 def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float], Floats, Floats]:
     """Return scale, shear (x-y, x-z, y-z), angles about the static axes, translation and perspective.
 
-    Raise ValueError if the matrix cannot be taken apart. Source: Thomas, "Decomposing a matrix into simple
+    Raise ValueError if the matrix cannot be decomposed. Source: Thomas, "Decomposing a matrix into simple
     transformations", Graphics Gems II (1991).
     """
     import numpy
@@ -88,7 +87,7 @@ def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float
         perspective = numpy.dot(m[:, 3], numpy.linalg.inv(affine.T))
     translate = m[3, :3].copy()
 
-    # Gram and Schmidt: what a row has of the rows before it is shear.
+    # Gram-Schmidt process: a row's components along earlier rows are the shear.
     rows = m[:3, :3].copy()
     scale, shear = numpy.zeros(3), [0.0, 0.0, 0.0]
     scale[0] = vector_norm(rows[0])
@@ -125,7 +124,7 @@ def compose_matrix(
     translate: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
 ) -> Floats:
-    """Return the matrix of what :func:`decompose_matrix` returns."""
+    """Return the matrix from the values that :func:`decompose_matrix` returns."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -151,7 +150,7 @@ def compose_matrix(
 
 
 def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
-    """Return the matrix from a crystal cell's coordinates to orthogonal ones; angles in degrees."""
+    """Return the matrix that converts a crystal cell's coordinates to orthogonal ones; angles in degrees."""
     import numpy
 
     a, b, c = numpy.asarray(lengths)[:3]
@@ -192,7 +191,7 @@ def superimposition_matrix(
         u, _, vh = numpy.linalg.svd(numpy.dot(second, first.T))
         rotation = numpy.dot(u, vh)
         if numpy.linalg.det(rotation) < 0.0:
-            # A reflection: turn the direction that counts least.
+            # This is a reflection: negate the direction of the smallest singular value.
             rotation -= numpy.outer(u[:, 2], vh[2, :] * 2.0)
         matrix[:3, :3] = rotation
     else:
@@ -204,7 +203,7 @@ def superimposition_matrix(
 
 
 def _horn(first: Floats, second: Floats) -> Floats:
-    """Return the quaternion of the best rotation: the eigenvector of the largest eigenvalue of Horn's matrix."""
+    """Return the quaternion of the best rotation: the eigenvector for the largest eigenvalue of Horn's matrix."""
     import numpy
 
     s = numpy.dot(first, second.T)
@@ -223,7 +222,7 @@ def _horn(first: Floats, second: Floats) -> Floats:
 
 
 class Arcball:
-    """A virtual trackball: a mouse's way in a window -> a rotation. Source: Shoemake, Graphics Gems IV (1994)."""
+    """A virtual trackball: converts mouse movements in a window to rotations. Source: Shoemake, Graphics Gems IV (1994)."""
 
     def __init__(self, initial: ArrayLike | None = None) -> None:
         """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError."""
@@ -250,18 +249,18 @@ class Arcball:
         self._qnow = self._qpre = self._qdown
 
     def place(self, center: ArrayLike, radius: float) -> None:
-        """Put the ball at a place of the window; both in its units."""
+        """Set the ball's center and radius, in window coordinates."""
         import numpy
 
         self._radius = float(radius)
         self._center = numpy.asarray(center, dtype=numpy.float64)[:2]
 
     def setaxes(self, *axes: ArrayLike) -> None:
-        """Set the axes that rotations can be constrained to; none: no constraint."""
+        """Set the axes to which rotations can be constrained; without arguments, remove the constraint."""
         self._axes = [unit_vector(axis) for axis in axes] if axes else None
 
     def setconstrain(self, constrain: bool) -> None:
-        """Constrain rotations to the nearest of the axes, or not."""
+        """Set whether rotations are constrained to the nearest axis."""
         self._constrain = constrain is True
 
     def getconstrain(self) -> bool:
@@ -269,7 +268,7 @@ class Arcball:
         return self._constrain
 
     def down(self, point: ArrayLike) -> None:
-        """Take the ball at a point of the window."""
+        """Start a drag at a point of the window."""
         self._vdown = arcball_map_to_sphere(point, self._center, self._radius)
         self._qdown = self._qpre = self._qnow
         if self._constrain and self._axes is not None:
@@ -279,7 +278,7 @@ class Arcball:
             self._axis = None
 
     def drag(self, point: ArrayLike) -> None:
-        """Move the point that was taken."""
+        """Continue the drag to another point."""
         import numpy
 
         now = arcball_map_to_sphere(point, self._center, self._radius)
@@ -294,7 +293,7 @@ class Arcball:
             self._qnow = quaternion_multiply(turn, self._qdown)
 
     def next(self, acceleration: float = 0.0) -> None:
-        """Go on turning as at the last drag."""
+        """Continue the rotation of the last drag."""
         self._qpre, self._qnow = (
             self._qnow,
             quaternion_slerp(self._qpre, self._qnow, 2.0 + acceleration, 0, False),
@@ -306,7 +305,7 @@ class Arcball:
 
 
 def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> Floats:
-    """Return the point of the unit sphere under a point of the window; beside the ball, that of its rim."""
+    """Return the point of the unit sphere under a point of the window; outside the ball, the nearest point on its rim."""
     import numpy
 
     at, centre = numpy.asarray(point), numpy.asarray(center)
@@ -319,7 +318,7 @@ def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) ->
 
 
 def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> Floats:
-    """Return the point of the sphere at right angles to an axis that is nearest to a point."""
+    """Return the point of the sphere, perpendicular to an axis, that is nearest to a point."""
     import numpy
 
     along = numpy.array(axis, dtype=numpy.float64)
@@ -337,7 +336,7 @@ def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> Floats:
 
 
 def arcball_nearest_axis(point: ArrayLike, axes: Iterable[_Axis]) -> _Axis:
-    """Return that of the axes whose circle is nearest to a point."""
+    """Return the axis whose great circle is nearest to a point."""
     import numpy
 
     place = numpy.asarray(point)

@@ -1,6 +1,6 @@
-"""Euler angles -> rotations and back, with the 24 sequences of axes; no array library is needed for a quaternion's angles.
+"""Conversions between Euler angles and rotations, with the 24 sequences of axes; a quaternion's angles need no numpy.
 
-An axes string is a frame (s: static, r: rotating) and three axes in the order of the rotations. The general algorithm
+An axes string consists of a frame (s: static, r: rotating) and three axes in the order of the rotations. The algorithm
 over (first axis, parity, repetition, frame) is Shoemake's, "Euler angle conversion", Graphics Gems IV (1994).
 """
 
@@ -26,16 +26,15 @@ __all__ = [
     "rotation_rows",
 ]
 
-EPSILON = 4.0 * 2.220446049250313e-16
-"""Four times the distance from 1 to the next float."""
+EPSILON = 4.0 * 2.220446049250313e-16  # four times the machine epsilon of a float
 NEXT_AXIS = [1, 2, 0, 1]
 Axes = str | tuple[int, int, int, int]
 
 
 def _sequences() -> dict[str, tuple[int, int, int, int]]:
-    """Return (first axis, parity, repetition, frame) of each axes string.
+    """Return (first axis, parity, repetition, frame) for each axes string.
 
-    The angles about rotating axes are those about static ones in reverse order.
+    The angles about rotating axes are those about static axes in reverse order.
     """
     found = {}
     for first in range(3):
@@ -82,7 +81,7 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArra
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, float, float]:
-    """Return the angles of a rotation matrix, 3x3 or larger; one of many triples that make it. Raise KeyError."""
+    """Return the angles of a rotation matrix, 3x3 or larger; one of several possible triples. Raise KeyError."""
     import numpy
 
     rows: list[list[float]] = numpy.asarray(matrix, dtype=numpy.float64)[:3, :3].tolist()
@@ -126,7 +125,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
 
 
 def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
-    """Return the rows of the 3x3 matrix of a quaternion of any length; of a zero one, those of the identity."""
+    """Return the rows of the 3x3 matrix of a quaternion of any length; for the zero quaternion, the identity's."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
     if square < EPSILON:
@@ -156,7 +155,7 @@ def _angles(m: list[list[float]], axes: Axes) -> tuple[float, float, float]:
     if is_regular:
         ax, az = math.atan2(ends[0], ends[1]), math.atan2(ends[2], ends[3])
     else:
-        # Two axes have become one: the first angle takes all of the turn.
+        # Gimbal lock: two axes coincide, so the first angle describes the whole rotation.
         ax, az = math.atan2(-m[j][k], m[j][j]), 0.0
     if parity:
         ax, middle, az = -ax, -middle, -az

@@ -1,6 +1,6 @@
-"""tf.Transformer and its kin: lookups as tuples, and messages transformed. Source: http://wiki.ros.org/tf.
+"""tf.Transformer, TransformerROS and TransformListener: lookups as tuples, and transformed messages.
 
-What needs matrices imports numpy when it is called.
+Methods that need matrices import numpy when they are called. Source: http://wiki.ros.org/tf.
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
 
 
 def strip_leading_slash(s: str) -> str:
-    """Return a frame's name as tf2 knows it."""
+    """Return a frame's name as tf2 expects it."""
     return s[1:] if s.startswith("/") else s
 
 
 class Transformer:
-    """Keeps transforms that it is given, and answers lookups. ``interpolate`` has no effect."""
+    """Stores transforms and answers lookups. ``interpolate`` has no effect."""
 
     def __init__(self, interpolate: bool = True, cache_time: Moment | None = None) -> None:
         self._buffer = Buffer(cache_time, debug=False)
         self._using_dedicated_thread = False
 
     def allFramesAsDot(self, current_time: Moment | None = None) -> str:
-        """Return the tree as a graph for graphviz."""
+        """Return the tree as a graphviz graph."""
         return self._buffer._allFramesAsDot(current_time) if current_time else self._buffer._allFramesAsDot()
 
     def allFramesAsString(self) -> str:
@@ -72,7 +72,7 @@ class Transformer:
     def setTransform(
         self, transform: geometry_msgs.msg.TransformStamped, authority: str = "default_authority"
     ) -> None:
-        """Take a transform."""
+        """Insert a transform."""
         self._buffer.set_transform(transform, authority)
 
     def canTransform(self, target_frame: str, source_frame: str, time: Moment) -> int | tuple[int, str]:
@@ -96,7 +96,7 @@ class Transformer:
         timeout: Moment,
         polling_sleep_duration: Moment | None = None,
     ) -> None:
-        """Wait until there is a transform, for ``timeout``; ``polling_sleep_duration`` has no effect. Raise tf.Exception."""
+        """Wait up to ``timeout`` for a transform; ``polling_sleep_duration`` has no effect. Raise tf.Exception."""
         self._check_thread()
         target, source = strip_leading_slash(target_frame), strip_leading_slash(source_frame)
         self._raise_unless(
@@ -115,7 +115,7 @@ class Transformer:
         timeout: Moment,
         polling_sleep_duration: Moment | None = None,
     ) -> None:
-        """Wait until there is a transform between two times; as :meth:`waitForTransform`."""
+        """Wait for a transform between two times, as :meth:`waitForTransform` does."""
         self._check_thread()
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         self._raise_unless(
@@ -127,11 +127,11 @@ class Transformer:
     def chain(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> list[str]:
-        """Return the frames on the way from the source to the fixed frame, and from there to the target."""
+        """Return the frames on the path from the source to the fixed frame, and from there to the target."""
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
-        """Forget all transforms."""
+        """Remove all transforms."""
         self._buffer.clear()
 
     def frameExists(self, frame_id: str) -> bool:
@@ -151,7 +151,7 @@ class Transformer:
         )
 
     def lookupTransform(self, target_frame: str, source_frame: str, time: Moment) -> Tuples:
-        """Return the pose of the source in the target: [x, y, z] and the quaternion [x, y, z, w].
+        """Return the pose of the source frame in the target frame: [x, y, z] and the quaternion [x, y, z, w].
 
         Raise tf.LookupException, tf.ConnectivityException, tf.ExtrapolationException.
         """
@@ -161,7 +161,7 @@ class Transformer:
     def lookupTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> Tuples:
-        """Return the pose between two times; as :meth:`lookupTransform`."""
+        """Return the pose between two times, as :meth:`lookupTransform` does."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return _tuples(self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed))
 
@@ -193,10 +193,10 @@ class Transformer:
         time: times.Time,
         averaging_interval: times.Duration,
     ) -> tuple[Vector, Vector]:
-        """Return the velocities of ``tracking_frame`` seen from ``observation_frame``, in ``reference_frame``.
+        """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
         They are those of the origin of ``reference_point_frame``, over ``averaging_interval`` around ``time`` (0: until the
-        newest data). ``ref_point`` has no effect, as with the real one.
+        newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy
 
@@ -226,16 +226,16 @@ class Transformer:
             transformations.translation_matrix(point_place), transformations.quaternion_matrix(point_turn)
         )
         moved = numpy.dot(to_point, (*place, 1.0))[:3] - place
-        # The real one has a dot product here, where a cross product is meant: as it does.
+        # Real ROS uses a dot product here, although a cross product would be correct; the results must match.
         linear = linear + numpy.dot(angular, moved)
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def setUsingDedicatedThread(self, value: bool) -> None:
-        """Say whether another thread inserts transforms, so that waiting makes sense."""
+        """Set whether another thread inserts transforms, so that a lookup may wait."""
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:
-        """Return "": tf2 has no prefixes."""
+        """Return "", because tf2 has no prefixes."""
         return ""
 
     def _check_thread(self) -> None:
@@ -253,13 +253,13 @@ class TransformerROS(Transformer):
     """A transformer of stamped messages."""
 
     def asMatrix(self, target_frame: str, hdr: Header) -> NDArray[numpy.float64]:
-        """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``. Raise as lookupTransform."""
+        """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``. Raise as lookupTransform does."""
         return self.fromTranslationRotation(*self.lookupTransform(target_frame, hdr.frame_id, hdr.stamp))
 
     def fromTranslationRotation(
         self, translation: Sequence[float], rotation: Sequence[float]
     ) -> NDArray[numpy.float64]:
-        """Return the 4x4 matrix of (x, y, z) and a quaternion (x, y, z, w)."""
+        """Return the 4x4 matrix of a translation (x, y, z) and a quaternion (x, y, z, w)."""
         return transformations.concatenate_matrices(
             transformations.translation_matrix(translation), transformations.quaternion_matrix(rotation)
         )
@@ -267,7 +267,7 @@ class TransformerROS(Transformer):
     def transformPoint(
         self, target_frame: str, ps: geometry_msgs.msg.PointStamped
     ) -> geometry_msgs.msg.PointStamped:
-        """Return a point in another frame."""
+        """Return a point transformed into another frame."""
         point = _moved(self.asMatrix(target_frame, ps.header), ps.point)
         return geometry_msgs.msg.PointStamped(
             _header(target_frame, ps.header), geometry_msgs.msg.Point(*point)
@@ -276,7 +276,7 @@ class TransformerROS(Transformer):
     def transformVector3(
         self, target_frame: str, v3s: geometry_msgs.msg.Vector3Stamped
     ) -> geometry_msgs.msg.Vector3Stamped:
-        """Return a vector, turned into another frame."""
+        """Return a vector rotated into another frame."""
         matrix = self.asMatrix(target_frame, v3s.header)
         matrix[:3, 3] = 0.0
         vector = geometry_msgs.msg.Vector3(*_moved(matrix, v3s.vector))
@@ -285,7 +285,7 @@ class TransformerROS(Transformer):
     def transformQuaternion(
         self, target_frame: str, ps: geometry_msgs.msg.QuaternionStamped
     ) -> geometry_msgs.msg.QuaternionStamped:
-        """Return an orientation in another frame."""
+        """Return an orientation transformed into another frame."""
         matrix = transformations.concatenate_matrices(
             self.asMatrix(target_frame, ps.header), xyzw_to_mat44(ps.quaternion)
         )
@@ -295,7 +295,7 @@ class TransformerROS(Transformer):
     def transformPose(
         self, target_frame: str, ps: geometry_msgs.msg.PoseStamped
     ) -> geometry_msgs.msg.PoseStamped:
-        """Return a pose in another frame."""
+        """Return a pose transformed into another frame."""
         matrix = transformations.concatenate_matrices(
             self.asMatrix(target_frame, ps.header),
             xyz_to_mat44(ps.pose.position),
@@ -311,9 +311,9 @@ class TransformerROS(Transformer):
     def transformPointCloud(
         self, target_frame: str, point_cloud: sensor_msgs.msg.PointCloud
     ) -> sensor_msgs.msg.PointCloud:
-        """Return a PointCloud (not PointCloud2) in another frame."""
+        """Return a PointCloud (not PointCloud2) transformed into another frame."""
         matrix = self.asMatrix(target_frame, point_cloud.header)
-        # Points of 64 bits, as the real one gives: they have the fields of a Point32.
+        # 64-bit Points, as in real ROS; they have the fields of a Point32.
         points: list[Any] = [geometry_msgs.msg.Point(*_moved(matrix, point)) for point in point_cloud.points]
         return sensor_msgs.msg.PointCloud(
             _header(target_frame, point_cloud.header), points, point_cloud.channels
@@ -321,9 +321,9 @@ class TransformerROS(Transformer):
 
 
 class TransformListener(TransformerROS):
-    """A transformer that gets what is published on /tf and /tf_static.
+    """A transformer that receives the transforms on /tf and /tf_static.
 
-    Arguments are those of :class:`Transformer`, and ``queue_size``, ``buff_size``, ``tcp_nodelay`` of the subscribers.
+    The arguments are those of :class:`Transformer`, and the subscribers' ``queue_size``, ``buff_size`` and ``tcp_nodelay``.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:

@@ -1,4 +1,4 @@
-"""Homogeneous 4x4 matrices of single transformations, and what they are made of.
+"""Homogeneous 4x4 matrices of single transformations, and the parameters of such matrices.
 
 A plane is given by a point and a normal. numpy is imported when a function is called.
 """
@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
 
-    Floats: TypeAlias = NDArray[numpy.float64]
-    """Vectors and matrices."""
+    Floats: TypeAlias = NDArray[numpy.float64]  # vectors and matrices
 
 __all__ = [
     "clip_matrix",
@@ -46,7 +45,7 @@ def identity_matrix() -> Floats:
 
 
 def translation_matrix(direction: ArrayLike) -> Floats:
-    """Return the matrix that moves by a vector."""
+    """Return the matrix that translates by a vector."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -55,7 +54,7 @@ def translation_matrix(direction: ArrayLike) -> Floats:
 
 
 def translation_from_matrix(matrix: ArrayLike) -> Floats:
-    """Return the vector that a matrix moves by."""
+    """Return the translation vector of a matrix."""
     import numpy
 
     moved: Floats = numpy.array(matrix)[:3, 3].copy()
@@ -63,7 +62,7 @@ def translation_from_matrix(matrix: ArrayLike) -> Floats:
 
 
 def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> Floats:
-    """Return the matrix that mirrors at a plane."""
+    """Return the matrix of a reflection in a plane."""
     import numpy
 
     across = unit_vector(numpy.asarray(normal)[:3])
@@ -74,7 +73,7 @@ def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> Floats:
 
 
 def reflection_from_matrix(matrix: ArrayLike) -> tuple[Floats, Floats]:
-    """Return a point and the normal of the plane that a matrix mirrors at. Raise ValueError."""
+    """Return a point and the normal of a reflection's plane. Raise ValueError."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -84,7 +83,7 @@ def reflection_from_matrix(matrix: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def rotation_matrix(angle: float, direction: ArrayLike, point: ArrayLike | None = None) -> Floats:
-    """Return the matrix that turns by ``angle`` radians about an axis, which passes through ``point``."""
+    """Return the matrix that rotates by ``angle`` radians about an axis through ``point`` (default: the origin)."""
     import numpy
 
     sine, cosine = math.sin(angle), math.cos(angle)
@@ -100,7 +99,7 @@ def rotation_matrix(angle: float, direction: ArrayLike, point: ArrayLike | None 
 
 
 def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
-    """Return the angle, the axis, and a point of the axis. Raise ValueError."""
+    """Return the angle, the axis, and a point on the axis. Raise ValueError."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -122,7 +121,7 @@ def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
 def scale_matrix(
     factor: float, origin: ArrayLike | None = None, direction: ArrayLike | None = None
 ) -> Floats:
-    """Return the matrix that scales about ``origin``, in all directions or along one; -1: point symmetry."""
+    """Return the matrix that scales about ``origin``, in all directions or along one; the factor -1 is a point reflection."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -140,7 +139,7 @@ def scale_matrix(
 
 
 def scale_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats | None]:
-    """Return the factor, the origin and the direction (None: all) of a scaling. Raise ValueError."""
+    """Return the factor, the origin and the direction (None: all) of a scaling matrix. Raise ValueError."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -164,7 +163,7 @@ def projection_matrix(
     perspective: ArrayLike | None = None,
     pseudo: bool = False,
 ) -> Floats:
-    """Return the matrix that projects onto a plane: from a perspective point, along a direction, or at right angles.
+    """Return the matrix that projects onto a plane: from a perspective point, along a direction, or orthogonally.
 
     ``pseudo``: a perspective projection keeps the relative depths.
     """
@@ -199,7 +198,7 @@ def projection_matrix(
 def projection_from_matrix(
     matrix: ArrayLike, pseudo: bool = False
 ) -> tuple[Floats, Floats, Floats | None, Floats | None, bool]:
-    """Return the arguments of :func:`projection_matrix` that make the matrix. Raise ValueError."""
+    """Return the arguments of :func:`projection_matrix` for this matrix. Raise ValueError."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -229,7 +228,10 @@ def projection_from_matrix(
 def clip_matrix(
     left: float, right: float, bottom: float, top: float, near: float, far: float, perspective: bool = False
 ) -> Floats:
-    """Return the matrix from a view's volume to the cube from -1 to 1; ``perspective``: from a frustum. Raise ValueError."""
+    """Return the matrix from a view volume to the cube from -1 to 1. Raise ValueError.
+
+    ``perspective``: the volume is a frustum.
+    """
     import numpy
 
     if left >= right or bottom >= top or near >= far:
@@ -257,7 +259,7 @@ def clip_matrix(
 
 
 def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike) -> Floats:
-    """Return the matrix that shears by ``angle`` radians along a direction in a plane.
+    """Return the matrix that shears by the angle ``angle`` (radians) along a direction in a plane.
 
     Raise ValueError if the direction is not in the plane.
     """
@@ -302,7 +304,7 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]
 
 
 def _eigenvector(matrix: Floats, value: float, missing: str, *, last: bool = True) -> Floats:
-    """Return the real part of the last (or first) eigenvector of an eigenvalue. Raise ValueError(missing)."""
+    """Return the real part of the last (or first) eigenvector for an eigenvalue. Raise ValueError(missing)."""
     import numpy
 
     values, vectors = numpy.linalg.eig(matrix)

@@ -1,7 +1,7 @@
 """tf.transformations: homogeneous matrices, Euler angles and quaternions [x, y, z, w].
 
-Source: http://docs.ros.org/en/noetic/api/tf/html/python/transformations.html, of which the functions' names, arguments and
-meanings are. numpy is imported by the first function that returns an array.
+The functions have the names, arguments and meanings of
+http://docs.ros.org/en/noetic/api/tf/html/python/transformations.html. The first function that returns an array imports numpy.
 """
 
 from __future__ import annotations

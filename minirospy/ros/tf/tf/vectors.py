@@ -1,4 +1,4 @@
-"""Vectors and quaternions [x, y, z, w] as numpy arrays -> the same; numpy is imported when a function is called."""
+"""Functions on vectors and quaternions [x, y, z, w] as numpy arrays; numpy is imported when a function is called."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def vector_norm(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
-    """Return the length of a vector, or of those along ``axis``; with ``out``, put them there and return None."""
+    """Return the length of a vector, or the lengths along ``axis``; with ``out``, store them there and return None."""
     import numpy
 
     squared = numpy.square(numpy.asarray(data, dtype=numpy.float64))
@@ -54,7 +54,7 @@ def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) 
 def unit_vector(
     data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None
 ) -> NDArray[numpy.float64] | None:
-    """Return vectors divided by their lengths; with ``out``, put them there and return None."""
+    """Return vectors divided by their lengths; with ``out``, store them there and return None."""
     import numpy
 
     vectors = numpy.array(data, dtype=numpy.float64)
@@ -72,7 +72,7 @@ def unit_vector(
 
 
 def random_vector(size: int | Sequence[int]) -> NDArray[numpy.float64]:
-    """Return random numbers from 0 to below 1 in the given shape."""
+    """Return random numbers in [0, 1) in the given shape."""
     import numpy
 
     numbers: NDArray[numpy.float64] = numpy.random.random(size)
@@ -80,7 +80,7 @@ def random_vector(size: int | Sequence[int]) -> NDArray[numpy.float64]:
 
 
 def quaternion_about_axis(angle: float, axis: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the quaternion of a turn by ``angle`` radians about an axis of any length."""
+    """Return the quaternion of a rotation by ``angle`` radians about an axis of any length."""
     import numpy
 
     quaternion = numpy.zeros(4)
@@ -93,7 +93,7 @@ def quaternion_about_axis(angle: float, axis: ArrayLike) -> NDArray[numpy.float6
 
 
 def quaternion_matrix(quaternion: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the 4x4 rotation matrix of a quaternion of any length."""
+    """Return the 4x4 rotation matrix of a quaternion, which need not be normalized."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -125,7 +125,7 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def quaternion_multiply(quaternion1: ArrayLike, quaternion0: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the product of two quaternions: the rotation ``quaternion0``, then ``quaternion1``."""
+    """Return the product of two quaternions: rotates by ``quaternion0``, then by ``quaternion1``."""
     import numpy
 
     x0, y0, z0, w0 = numpy.asarray(quaternion0).tolist()
@@ -142,7 +142,7 @@ def quaternion_multiply(quaternion1: ArrayLike, quaternion0: ArrayLike) -> NDArr
 
 
 def quaternion_conjugate(quaternion: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the quaternion with the opposite axis."""
+    """Return the conjugate of a quaternion."""
     import numpy
 
     x, y, z, w = numpy.asarray(quaternion).tolist()
@@ -150,7 +150,7 @@ def quaternion_conjugate(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def quaternion_inverse(quaternion: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the quaternion whose product with this one is 1."""
+    """Return the multiplicative inverse of a quaternion."""
     import numpy
 
     inverse: NDArray[numpy.float64] = quaternion_conjugate(quaternion) / numpy.dot(quaternion, quaternion)
@@ -160,7 +160,7 @@ def quaternion_inverse(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 def quaternion_slerp(
     quat0: ArrayLike, quat1: ArrayLike, fraction: float, spin: float = 0, shortestpath: bool = True
 ) -> NDArray[numpy.float64]:
-    """Return the quaternion at ``fraction`` of the way from ``quat0`` to ``quat1``, with ``spin`` half turns more."""
+    """Return the interpolation at ``fraction`` between ``quat0`` and ``quat1``, with ``spin`` additional half turns."""
     import numpy
 
     q0: NDArray[numpy.float64] = unit_vector(numpy.asarray(quat0)[:4])
@@ -182,7 +182,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return a random rotation, uniform over all; ``rand``: three numbers from 0 to 1 to make it of."""
+    """Return a uniformly distributed random rotation; ``rand``: three numbers from 0 to 1 to compute it from."""
     import numpy
 
     numbers = numpy.random.rand(3) if rand is None else numpy.asarray(rand)

@@ -1,1 +1,1 @@
-"""tf2_geometry_msgs: points, vectors and poses for tf2_ros; importing it registers them."""
+"""tf2_geometry_msgs: registers points, vectors and poses with tf2_ros when it is imported."""

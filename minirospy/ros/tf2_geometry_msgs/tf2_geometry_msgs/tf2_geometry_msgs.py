@@ -1,6 +1,6 @@
-"""tf2_geometry_msgs: points, vectors, poses and wrenches that tf2_ros transforms. Source: http://wiki.ros.org/tf2_geometry_msgs.
+"""tf2_geometry_msgs: transforms points, vectors, poses and wrenches for tf2_ros.
 
-Importing it registers the types with tf2_ros.
+Importing it registers the types with tf2_ros. Source: http://wiki.ros.org/tf2_geometry_msgs.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ _M = TypeVar("_M")
 
 
 def to_msg_msg(msg: _M) -> _M:
-    """Return a message as itself."""
+    """Return a message unchanged."""
     return msg
 
 
 def from_msg_msg(msg: _M) -> _M:
-    """Return a message as itself."""
+    """Return a message unchanged."""
     return msg
 
 
 def transform_to_kdl(t: TransformStamped) -> PyKDL.Frame:
-    """Return a transform as a PyKDL.Frame."""
+    """Convert a transform to a PyKDL.Frame."""
     where, turn = t.transform.translation, t.transform.rotation
     return PyKDL.Frame(
         PyKDL.Rotation.Quaternion(turn.x, turn.y, turn.z, turn.w), PyKDL.Vector(where.x, where.y, where.z)
@@ -55,18 +55,18 @@ def transform_to_kdl(t: TransformStamped) -> PyKDL.Frame:
 
 
 def do_transform_point(point: PointStamped, transform: TransformStamped) -> PointStamped:
-    """Return a point as the transform moves it, with the transform's header."""
+    """Return the transformed point, with the transform's header."""
     moved = transform_to_kdl(transform) * PyKDL.Vector(point.point.x, point.point.y, point.point.z)
     return PointStamped(transform.header, Point(moved[0], moved[1], moved[2]))
 
 
 def do_transform_vector3(vector3: Vector3Stamped, transform: TransformStamped) -> Vector3Stamped:
-    """Return a vector as the transform turns it, with the transform's header."""
+    """Return the rotated vector, with the transform's header."""
     return Vector3Stamped(transform.header, _turned(vector3.vector, transform))
 
 
 def do_transform_pose(pose: PoseStamped, transform: TransformStamped) -> PoseStamped:
-    """Return a pose as the transform moves it, with the transform's header."""
+    """Return the transformed pose, with the transform's header."""
     position, orientation = pose.pose.position, pose.pose.orientation
     frame = transform_to_kdl(transform) * PyKDL.Frame(
         PyKDL.Rotation.Quaternion(orientation.x, orientation.y, orientation.z, orientation.w),
@@ -79,7 +79,7 @@ def do_transform_pose(pose: PoseStamped, transform: TransformStamped) -> PoseSta
 
 
 def do_transform_wrench(wrench: WrenchStamped, transform: TransformStamped) -> WrenchStamped:
-    """Return force and torque as the transform turns them, with the transform's header; the point stays as it is."""
+    """Return the rotated force and torque, with the transform's header; the reference point is not changed."""
     force, torque = (_turned(each, transform) for each in (wrench.wrench.force, wrench.wrench.torque))
     return WrenchStamped(transform.header, Wrench(force, torque))
 

@@ -1,1 +1,1 @@
-"""tf2_kdl: PyKDL's types for tf2_ros; importing it registers them."""
+"""tf2_kdl: registers PyKDL's types with tf2_ros when it is imported."""

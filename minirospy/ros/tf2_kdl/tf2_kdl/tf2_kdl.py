@@ -1,6 +1,6 @@
-"""tf2_kdl: PyKDL's vectors, frames, twists and wrenches that tf2_ros transforms. Source: http://wiki.ros.org/tf2_kdl.
+"""tf2_kdl: transforms PyKDL's vectors, frames, twists and wrenches for tf2_ros. Source: http://wiki.ros.org/tf2_kdl.
 
-Importing it registers the types with tf2_ros. Objects to transform need a ``header``: tf2_ros.Stamped gives them one.
+Importing it registers the types with tf2_ros. Objects to transform need a ``header``, which tf2_ros.Stamped adds.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _G = TypeVar("_G", PyKDL.Vector, PyKDL.Frame, PyKDL.Twist, PyKDL.Wrench)
 
 
 class _StampedVector(Protocol):
-    """What tf2_ros.Stamped makes of a Vector."""
+    """The return type of tf2_ros.Stamped for a Vector."""
 
     header: Header
 
@@ -37,32 +37,32 @@ class _StampedVector(Protocol):
 
 
 def do_transform_vector(vector: PyKDL.Vector, transform: TransformStamped) -> PyKDL.Vector:
-    """Return a point as the transform moves it, with the transform's header."""
+    """Return the transformed point, with the transform's header."""
     return _moved(vector, transform)
 
 
 def do_transform_frame(frame: PyKDL.Frame, transform: TransformStamped) -> PyKDL.Frame:
-    """Return a pose as the transform moves it, with the transform's header."""
+    """Return the transformed pose, with the transform's header."""
     return _moved(frame, transform)
 
 
 def do_transform_twist(twist: PyKDL.Twist, transform: TransformStamped) -> PyKDL.Twist:
-    """Return a twist in the transform's target frame, with its header."""
+    """Return a twist in the transform's target frame, with the transform's header."""
     return _moved(twist, transform)
 
 
 def do_transform_wrench(wrench: PyKDL.Wrench, transform: TransformStamped) -> PyKDL.Wrench:
-    """Return a wrench in the transform's target frame, with its header."""
+    """Return a wrench in the transform's target frame, with the transform's header."""
     return _moved(wrench, transform)
 
 
 def to_msg_vector(vector: _StampedVector) -> PointStamped:
-    """Return a stamped Vector as a PointStamped."""
+    """Convert a stamped Vector to a PointStamped."""
     return PointStamped(vector.header, Point(vector[0], vector[1], vector[2]))
 
 
 def from_msg_vector(msg: PointStamped) -> PyKDL.Vector:
-    """Return a PointStamped as a stamped Vector."""
+    """Convert a PointStamped to a stamped Vector."""
     vector = PyKDL.Vector(msg.point.x, msg.point.y, msg.point.z)
     return Stamped(vector, msg.header.stamp, msg.header.frame_id)
 

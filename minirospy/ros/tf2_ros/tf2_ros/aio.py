@@ -1,4 +1,4 @@
-"""Transforms for asyncio programs: the twins of tf2_ros's buffer, listener and broadcasters, on a `minirospy.Node`.
+"""Transforms for asyncio programs: tf2_ros's buffer, listener and broadcasters as coroutines, on a `minirospy.Node`.
 
 ::
 
@@ -40,14 +40,13 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-_MAX_WAITING = 1000
-"""So many messages wait while the program is busy; older ones are dropped."""
+_MAX_WAITING = 1000  # messages that are queued while the program is busy; older ones are dropped
 
 
 class Buffer:
     """The frames that are published on /tf and /tf_static, over the last ``cache_time`` seconds.
 
-    It listens inside ``async with Buffer(node) as buffer:``. Where time jumps back, what is not static is forgotten.
+    It listens inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms are cleared.
     """
 
     def __init__(self, node: Node, cache_time: float = 10.0) -> None:
@@ -68,13 +67,13 @@ class Buffer:
         await self.close()
 
     async def start(self) -> None:
-        """Listen from now on; what ``async with`` does first."""
+        """Start listening; ``async with`` calls this first."""
         for topic, is_static in (("/tf", False), ("/tf_static", True)):
             subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MAX_WAITING)
             self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
 
     async def close(self) -> None:
-        """Stop listening; what has come can still be looked up. Idempotent."""
+        """Stop listening; received transforms can still be looked up. Idempotent."""
         listening, self._listening = self._listening, []
         for task in listening:
             task.cancel()
@@ -87,9 +86,9 @@ class Buffer:
     ) -> TransformStamped:
         """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; by default the latest.
 
-        Wait for it for ``timeout`` seconds of the node's time (None: for as long as the node runs). Raise
+        Wait for it for ``timeout`` seconds of the node's time (None: until the node shuts down). Raise
         LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException, and
-        ROSInterruptException where the node ends meanwhile.
+        ROSInterruptException if the node shuts down in the meantime.
         """
         stamp = nanoseconds(time)
         found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
@@ -105,9 +104,9 @@ class Buffer:
         *,
         timeout: float | None = 0.0,
     ) -> TransformStamped:
-        """Return where ``source`` was at ``source_time``, seen from ``target`` at ``target_time``.
+        """Return the pose of ``source`` at ``source_time``, relative to ``target`` at ``target_time``.
 
-        The frame ``fixed`` does not move meanwhile. Wait and raise as :meth:`lookup` does.
+        The frame ``fixed`` is assumed not to move between the two times. Wait and raise as :meth:`lookup` does.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         found = await self._wait_for(
@@ -116,18 +115,18 @@ class Buffer:
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
-        """Return None if :meth:`lookup` would succeed now, else why it would not."""
+        """Return None if :meth:`lookup` would succeed now, else the reason for its failure."""
         try:
             return self._tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:
             return str(error)
 
     async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
-        """Yield the latest pose of ``source`` in ``target``, and each later one; while the program is busy, the newest.
+        """Yield the latest pose of ``source`` in ``target``, then each change; skip to the newest if the program is busy.
 
-        Ends where the node ends. Raise InvalidArgumentException.
+        Stops when the node shuts down. Raise InvalidArgumentException.
         """
-        # Refuses names that no frame can have.
+        # Raises for invalid frame names.
         self._tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None
@@ -145,7 +144,7 @@ class Buffer:
             end.cancel()
 
     def frames_as_yaml(self) -> str:
-        """Return parent, broadcaster, rate and times of each frame, as view_frames reads them."""
+        """Return parent, broadcaster, rate and times of each frame, in the format that view_frames reads."""
         return frames_as_yaml(self._tree)
 
     # --- within
@@ -201,7 +200,7 @@ class Buffer:
 
 
 class Broadcaster:
-    """Publishes transforms on /tf, and those that hold at every time on /tf_static."""
+    """Publishes transforms on /tf, and static transforms on /tf_static."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -216,7 +215,7 @@ class Broadcaster:
         await self._moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
-        """Publish transforms on /tf_static, latched, with all that were sent before; of a child frame the last counts."""
+        """Publish transforms on /tf_static, latched, together with all earlier ones; a child frame's last transform wins."""
         if self._static is None:
             self._static = self._node.advertise("/tf_static", TFMessage, queue_size=100, latch=True)
         self._kept |= {each.child_frame_id: each for each in transforms}
@@ -231,7 +230,7 @@ class Broadcaster:
 
 
 async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
-    """Return when the event is set, or the future is done."""
+    """Wait until the event is set or the future is done."""
     arrival = asyncio.ensure_future(changed.wait())
     waits: list[asyncio.Future[Literal[True]] | asyncio.Future[None]] = [arrival, end]
     try:
@@ -241,6 +240,6 @@ async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
 
 
 async def _quietly(pause: Coroutine[object, object, None]) -> None:
-    """Wait, and let the end of the node or a jump of its time end the wait."""
+    """Wait; return early if the node shuts down or its time jumps."""
     with contextlib.suppress(ROSInterruptException):
         await pause

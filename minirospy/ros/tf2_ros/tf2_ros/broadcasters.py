@@ -30,29 +30,29 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Publishes transforms that hold at every time on /tf_static, latched: listeners that come later get all of them.
+    """Publishes static transforms on /tf_static, latched: later listeners receive all of them.
 
-    A transform replaces the one that was sent before of the same child frame. The broadcasters of a process share what they
-    have sent, since a node has one latched message a topic: with the real ones, that of the last broadcaster.
+    A transform replaces an earlier one for the same child frame. The broadcasters of a process share their transforms,
+    because a node has one latched message per topic: in real ROS it contains only the last broadcaster's transforms.
     """
 
     _lock = threading.Lock()
     _sent: WeakKeyDictionary[object, dict[str, TransformStamped]] = WeakKeyDictionary()
-    """By the topic that a node's broadcasters share: the transforms by child frame."""
+    """The transforms by child frame, for each topic that a node's broadcasters share."""
 
     def __init__(self) -> None:
         self.pub_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=100, latch=True)
 
     @property
     def net_message(self) -> TFMessage:
-        """All that was sent."""
+        """The message with all transforms that were sent."""
         return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:
-        """Publish a transform, or several, together with all that were sent before."""
+        """Publish a transform, or several, together with all earlier ones."""
         with self._lock:
             sent = self._sent.setdefault(self.pub_tf.impl, {})
-            # Copies: a program may fill the same message again.
+            # Copy, because a program may reuse its message object.
             sent |= {each.child_frame_id: copy.deepcopy(each) for each in _listed(transform)}
             self.pub_tf.publish(self.net_message)
 

@@ -1,4 +1,4 @@
-"""tf2_ros.Buffer: lookups that may wait for their data. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.Buffer: lookups that can wait for their data. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 
 
 class Buffer(BufferCore, BufferInterface):
-    """The frames of the last ``cache_time`` (a Duration; 10 s), and lookups that wait for their data.
+    """The frames of the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
 
-    ``debug``: offer the service ``~tf2_frames``, which lists the frames, where this node does not yet. A wait ends at
-    the insertion that makes the lookup possible; CAN_TRANSFORM_POLLING_SCALE is the part of the timeout that a
-    jump of simulated time must reach back beyond to end the wait by an exception. Safe for threads.
+    ``debug``: offer the service ``~tf2_frames``, which lists the frames, unless this node already does. A wait ends with
+    the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by more than
+    the fraction CAN_TRANSFORM_POLLING_SCALE of its timeout. Thread-safe.
     """
 
     def __init__(self, cache_time: Moment | None = None, debug: bool = True) -> None:
@@ -38,11 +38,11 @@ class Buffer(BufferCore, BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest that all have.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
 
-        Wait for ``timeout`` (a Duration of ROS time) until there is one. Raise LookupException, ConnectivityException,
+        Wait for it for ``timeout`` (a Duration of ROS time). Raise LookupException, ConnectivityException,
         ExtrapolationException, InvalidArgumentException, ROSInterruptException at a shutdown, and
-        ROSTimeMovedBackwardsException where simulated time jumps back during the wait.
+        ROSTimeMovedBackwardsException if simulated time jumps back during the wait.
         """
         if nanoseconds(timeout) <= 0:
             return self.lookup_transform_core(target_frame, source_frame, time)
@@ -61,9 +61,9 @@ class Buffer(BufferCore, BufferInterface):
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> TransformStamped:
-        """Return where ``source_frame`` was at ``source_time``, seen from ``target_frame`` at ``target_time``.
+        """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` does not move meanwhile. Wait and raise as :meth:`lookup_transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Wait and raise as :meth:`lookup_transform` does.
         """
         if nanoseconds(timeout) > 0:
             self.can_transform_full(
@@ -81,7 +81,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), after at most ``timeout``; as a tuple also why not.
+        """Return whether there is a transform (1 or 0), after at most ``timeout``; with the reason if a tuple is requested.
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """
@@ -101,7 +101,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform between two times (1 or 0); wait and return as :meth:`can_transform`."""
+        """Return whether there is a transform between two times (1 or 0); wait and return as :meth:`can_transform` does."""
 
         def possible() -> tuple[int, str]:
             return self.can_transform_full_core(

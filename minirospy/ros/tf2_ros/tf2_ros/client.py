@@ -33,9 +33,9 @@ _ERRORS: dict[int, type[TransformException]] = {
 
 
 class BufferClient(BufferInterface):
-    """Looks transforms up at the buffer server in the namespace ``ns``: no /tf comes to this node.
+    """Looks up transforms at the buffer server in the namespace ``ns``, so that this node need not subscribe to /tf.
 
-    ``timeout_padding`` (a Duration) is waited in addition to a lookup's own timeout. ``check_frequency`` has no effect.
+    ``timeout_padding`` (a Duration) is added to a lookup's own timeout. ``check_frequency`` has no effect.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class BufferClient(BufferInterface):
             rospy.logwarn("Argument check_frequency is deprecated and should not be used.")
 
     def wait_for_server(self, timeout: times.Duration = NO_WAIT) -> bool:
-        """Return whether the server is connected, within ``timeout`` (a zero Duration: whenever)."""
+        """Wait for the server; return whether it is connected within ``timeout`` (zero: no limit)."""
         return self.client.wait_for_server(timeout)
 
     def lookup_transform(
@@ -56,7 +56,7 @@ class BufferClient(BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; wait for it for ``timeout``.
 
-        Raise the server's LookupException, ..., and TimeoutException where it does not answer.
+        Raise the server's LookupException, ..., and TimeoutException if it does not answer.
         """
         goal = LookupTransformGoal(
             target_frame=target_frame,
@@ -75,7 +75,7 @@ class BufferClient(BufferInterface):
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> TransformStamped:
-        """Return where ``source_frame`` was at ``source_time``, seen from ``target_frame`` at ``target_time``.
+        """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
         Raise as :meth:`lookup_transform` does.
         """

@@ -1,4 +1,4 @@
-"""tf2_py: the buffer on the level of messages, safe for threads. Source: http://wiki.ros.org/tf2_py."""
+"""tf2_py: the thread-safe buffer, which reads and returns messages. Source: http://wiki.ros.org/tf2_py."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def _write(text: str, is_error: bool) -> None:
 class BufferCore:
     """The tree of frames over the last ``cache_time`` (a Duration; 10 s).
 
-    Stamps are exact; those of the real tf2_py are rounded to what a float of seconds holds (about 0.2 us today).
-    What cannot be taken is logged, of each frame and fault at most once a second, with a count.
+    Stamps are exact; the real tf2_py rounds them to the precision of a float in seconds (about 0.2 us today).
+    Rejected transforms are logged, at most once a second per frame and error, with a count.
     """
 
     def __init__(self, cache_time: Moment | None = None) -> None:
@@ -46,15 +46,15 @@ class BufferCore:
     # --- transforms in
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """Take a transform, from the node ``authority``."""
+        """Insert a transform that was received from the node ``authority``."""
         self._insert(transform, authority, False)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
-        """Take a transform that holds at every time."""
+        """Insert a static transform, which is valid at all times."""
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Take a serialised TFMessage; of those that came in the same form before, without decoding it now.
+        """Insert a serialised TFMessage. If earlier messages had the same layout, it is not decoded now.
 
         Not in the real tf2_py. Raise DeserializationError.
         """
@@ -63,14 +63,14 @@ class BufferCore:
         self._after_insertion()
 
     def clear(self) -> None:
-        """Forget all transforms but the static ones."""
+        """Remove all transforms except static ones."""
         with self._lock:
             self._tree.clear()
 
     # --- lookups out
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest that all have.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
 
         Raise LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException.
         """
@@ -85,9 +85,9 @@ class BufferCore:
     def lookup_transform_full_core(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> TransformStamped:
-        """Return where ``source_frame`` was at ``source_time``, seen from ``target_frame`` at ``target_time``.
+        """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` does not move meanwhile. Raise as :meth:`lookup_transform_core` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise as :meth:`lookup_transform_core` does.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
@@ -98,7 +98,7 @@ class BufferCore:
         return transform_stamped(target_frame, source_frame, found)
 
     def can_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> tuple[int, str]:
-        """Return whether a lookup would succeed (1 or 0), and why not."""
+        """Return whether a lookup would succeed (1 or 0), and the reason if not."""
         stamp = nanoseconds(time)
         _check_names(target_frame, source_frame)
         return self._possible(lambda: self._tree.why_not(target_frame, source_frame, stamp))
@@ -106,7 +106,7 @@ class BufferCore:
     def can_transform_full_core(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> tuple[int, str]:
-        """Return whether a lookup with a fixed frame would succeed (1 or 0), and why not."""
+        """Return whether a lookup with a fixed frame would succeed (1 or 0), and the reason if not."""
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
         return self._possible(
@@ -114,9 +114,9 @@ class BufferCore:
         )
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
-        """Return the newest time at which a lookup succeeds; zero where all between the frames is static.
+        """Return the newest time at which a lookup succeeds; zero if all transforms between the frames are static.
 
-        Raise LookupException, InvalidArgumentException; TransformException where they are not connected.
+        Raise LookupException, InvalidArgumentException; TransformException if the frames are not connected.
         """
         _check_names(target_frame, source_frame)
         with self._lock:
@@ -125,7 +125,7 @@ class BufferCore:
     # --- what there is
 
     def all_frames_as_yaml(self, time: Moment | float = 0.0) -> str:
-        """Return parent, broadcaster, rate and times of each frame; ``time`` has no effect, as with the real one."""
+        """Return parent, broadcaster, rate and times of each frame; ``time`` has no effect, as in real ROS."""
         with self._lock:
             return frames_as_yaml(self._tree)
 
@@ -135,7 +135,7 @@ class BufferCore:
             return self._tree.frames_as_string()
 
     def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
-        """Return the tree as a graph for graphviz, with each frame's age where a time is given."""
+        """Return the tree as a graphviz graph, with each frame's age if a time is given."""
         stamp = nanoseconds(time)
         with self._lock:
             return frames_as_dot(self._tree, stamp)
@@ -158,7 +158,7 @@ class BufferCore:
     # --- within
 
     def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
-        """Call ``function`` after each insertion, in the thread that inserts; return what ends it."""
+        """Call ``function`` after each insertion, in the inserting thread; return a function that stops this."""
         with self._lock:
             self._changed = (*self._changed, function)
 
@@ -180,7 +180,7 @@ class BufferCore:
                 parent,
                 child,
                 nanoseconds(header.stamp),
-                # A lookup gives floats, whatever was set: integers, or numpy's numbers.
+                # A lookup returns floats, even if integers or numpy numbers were inserted.
                 (float(where.x), float(where.y), float(where.z)),
                 (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
                 authority,
@@ -206,7 +206,7 @@ class BufferCore:
         return int(why is None), why or ""
 
     def _report(self) -> None:
-        """Log what was refused. Without the lock: a handler of log lines may look something up."""
+        """Log rejected transforms. The lock is not held, because a log handler may call lookups."""
         with self._lock:
             refused = self._refused[:]
             del self._refused[: len(refused)]

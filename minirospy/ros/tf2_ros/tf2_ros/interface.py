@@ -1,4 +1,4 @@
-"""The common part of a buffer and a client of a buffer server: transforming whole messages, and conversions between types.
+"""The base class of the buffer and of the buffer client: transforms whole messages, and converts between types.
 
 Source: http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2/Tutorials/Transforming%20your%20own%20datatypes.
 """
@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """A type for which nothing is registered; programs import the package that registers it."""
+    """Nothing is registered for this type; programs import the package that registers it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)
@@ -42,7 +42,7 @@ class TypeException(Exception):
 
 
 class NotImplementedException(Exception):
-    """A method that a subclass of BufferInterface has to have."""
+    """A method that a subclass of BufferInterface must implement."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class NotImplementedException(Exception):
 
 
 class _Registry:
-    """Functions by type, or by a pair of types, for the whole process."""
+    """Functions by type, or by a pair of types, shared by the whole process."""
 
     def __init__(self) -> None:
         self.functions: dict[object, _Function] = {}
@@ -68,7 +68,7 @@ class TransformRegistration:
     _registry = _Registry()
 
     def print_me(self) -> None:
-        """Print what is registered."""
+        """Print the registered types."""
         print(self._registry.functions)
 
     def add(self, key: type[_T], callback: Callable[[_T, TransformStamped], _T]) -> None:
@@ -81,18 +81,18 @@ class TransformRegistration:
 
 
 class ConvertRegistration:
-    """Functions that convert between types, directly or by way of a message; shared by all instances."""
+    """Functions that convert between types, directly or through a message; shared by all instances."""
 
     _to_msg = _Registry()
     _from_msg = _Registry()
     _convert = _Registry()
 
     def add_from_msg(self, key: type[_T], callback: Callable[..., _T]) -> None:
-        """Register how a message becomes an object of the type."""
+        """Register the function that converts a message to an object of the type."""
         self._from_msg.functions[key] = callback
 
     def add_to_msg(self, key: type[_A], callback: Callable[[_A], object]) -> None:
-        """Register how an object of the type becomes a message."""
+        """Register the function that converts an object of the type to a message."""
         self._to_msg.functions[key] = callback
 
     def add_convert(self, key: tuple[type[_A], type[_T]], callback: Callable[[_A], _T]) -> None:
@@ -100,11 +100,11 @@ class ConvertRegistration:
         self._convert.functions[key] = callback
 
     def get_from_msg(self, key: type[_T]) -> Callable[..., _T]:
-        """Return what makes an object of a message. Raise TypeException."""
+        """Return the function that converts a message to the type. Raise TypeException."""
         return self._from_msg.get(key)
 
     def get_to_msg(self, key: type[_A]) -> Callable[[_A], object]:
-        """Return what makes a message of an object. Raise TypeException."""
+        """Return the function that converts an object of the type to a message. Raise TypeException."""
         return self._to_msg.get(key)
 
     def get_convert(self, key: tuple[type[_A], type[_T]]) -> Callable[[_A], _T]:
@@ -113,7 +113,7 @@ class ConvertRegistration:
 
 
 def convert(a: object, b_type: type[_T]) -> _T:
-    """Return ``a`` as an object of the type: directly, as a copy, or by way of a message. Raise TypeException."""
+    """Return ``a`` as an object of the type: converted directly, copied, or through a message. Raise TypeException."""
     registration = ConvertRegistration()
     try:
         directly = registration.get_convert((type(a), b_type))
@@ -132,7 +132,7 @@ def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:
 
 
 class BufferInterface:
-    """Lookups that a subclass provides, and what is built on them."""
+    """The lookups, which a subclass implements, and the methods that use them."""
 
     def __init__(self) -> None:
         self.registration = TransformRegistration()
@@ -156,7 +156,7 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> object:
-        """Return a stamped object in ``target_frame``, at its own stamp, as ``new_type`` where that is given.
+        """Return a stamped object in ``target_frame``, at its own stamp, converted to ``new_type`` if that is given.
 
         Raise TypeException for a type that is not registered, else as :meth:`lookup_transform` does.
         """
@@ -175,9 +175,9 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> Any:
-        """Return a stamped object in ``target_frame`` at ``target_time``; ``fixed_frame`` does not move meanwhile.
+        """Return a stamped object in ``target_frame`` at ``target_time``.
 
-        Raise as :meth:`transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise as :meth:`transform` does.
         """
         do_transform = self.registration.get(type(object_stamped))
         header = object_stamped.header
@@ -190,7 +190,7 @@ class BufferInterface:
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return a transform; a subclass has it."""
+        """Return a transform; a subclass implements it."""
         raise NotImplementedException
 
     def lookup_transform_full(
@@ -202,13 +202,13 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> TransformStamped:
-        """Return a transform between two times; a subclass has it."""
+        """Return a transform between two times; a subclass implements it."""
         raise NotImplementedException
 
     def can_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> object:
-        """Return whether there is a transform; a subclass has it."""
+        """Return whether there is a transform; a subclass implements it."""
         raise NotImplementedException
 
     def can_transform_full(
@@ -220,5 +220,5 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> object:
-        """Return whether there is a transform between two times; a subclass has it."""
+        """Return whether there is a transform between two times; a subclass implements it."""
         raise NotImplementedException

@@ -1,4 +1,4 @@
-"""tf2_ros.TransformListener: what comes on /tf and /tf_static -> a buffer. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.TransformListener: inserts /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ __all__ = ["TransformListener"]
 
 
 class TransformSink(Protocol):
-    """The target of a listener's transforms: a Buffer, or a program's own object."""
+    """The target of a listener's transforms: a Buffer or the program's own object."""
 
     def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
-        """Take a transform."""
+        """Insert a transform."""
 
     def set_transform_static(self, transform: TransformStamped, authority: str, /) -> object:
-        """Take a transform that holds at every time."""
+        """Insert a static transform, which is valid at all times."""
 
     def clear(self) -> object:
-        """Forget all."""
+        """Remove all transforms."""
 
 
 class TransformListener:
-    """Puts every transform of /tf and /tf_static into ``buffer``; a time that jumps back clears the buffer.
+    """Inserts every transform of /tf and /tf_static into ``buffer``; clears the buffer if time jumps back.
 
-    ``queue_size``, ``buff_size`` and ``tcp_nodelay`` are those of the Subscribers.
+    ``queue_size``, ``buff_size`` and ``tcp_nodelay`` are passed to the Subscribers.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class TransformListener:
         )
 
     def __del__(self) -> None:
-        # In a constructor that failed, or at the end of the interpreter.
+        # The constructor may have failed, or the interpreter may be exiting.
         with contextlib.suppress(Exception):
             self.unregister()
 
@@ -65,8 +65,8 @@ class TransformListener:
         self.tf_static_sub.unregister()
 
     def check_for_reset(self) -> None:
-        """Clear the buffer where time has jumped back since the last message."""
-        # The time is taken within the lock: else a thread that is overtaken sees a jump.
+        """Clear the buffer if time has jumped back since the last message."""
+        # Read the time inside the lock: otherwise a thread that is overtaken by another would detect a jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
@@ -76,15 +76,15 @@ class TransformListener:
 
     @property
     def last_update(self) -> rospy.Time:
-        """When the last message came."""
+        """The time of the last message."""
         return rospy.Time.from_sec(self._last)
 
     def callback(self, data: LazyTFMessage) -> None:
-        """Take a message of /tf."""
+        """Insert the transforms of a message on /tf."""
         self._take(data, is_static=False)
 
     def static_callback(self, data: LazyTFMessage) -> None:
-        """Take a message of /tf_static."""
+        """Insert the transforms of a message on /tf_static."""
         self._take(data, is_static=True)
 
     def _take(self, data: LazyTFMessage, *, is_static: bool) -> None:
@@ -107,7 +107,7 @@ class TransformListener:
 
 
 def _takes_bytes(buffer: TransformSink) -> bool:
-    """Return whether a buffer takes messages undecoded: ours, unless a subclass sees to each transform itself."""
+    """Return whether a buffer accepts undecoded messages: a BufferCore whose subclass does not override set_transform."""
     kind = type(buffer)
     return (
         issubclass(kind, BufferCore)

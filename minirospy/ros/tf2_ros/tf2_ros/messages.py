@@ -1,4 +1,4 @@
-"""Between messages and the buffer's numbers: TransformStamped, times, and /tf's messages that stay bytes."""
+"""Conversions between messages and the buffer's numbers: TransformStamped, times, and /tf messages that stay undecoded."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _new: Any = object.__new__
 
 
 class Moment(Protocol):
-    """A time or a duration of rospy's, genpy's or the like."""
+    """A time or duration of rospy, genpy or a similar module."""
 
     def to_sec(self) -> float:
-        """Return the seconds."""
+        """Return the time in seconds."""
 
 
 def nanoseconds(time: Moment) -> int:
-    """Return a time in nanoseconds: exact where it has ``secs`` and ``nsecs``. Raise TypeError as tf2_py does."""
+    """Return a time in nanoseconds; exact if it has ``secs`` and ``nsecs``. Raise TypeError as tf2_py does."""
     try:
         return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]
     except AttributeError:
@@ -37,8 +37,8 @@ def nanoseconds(time: Moment) -> int:
 
 
 def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
-    """Return the answer to a lookup as a message."""
-    # Without the constructors, which take longer than the lookup.
+    """Return a lookup's result as a message."""
+    # Skip the constructors, which take longer than the lookup.
     message: TransformStamped = _new(TransformStamped)
     message.header = header = _new(Header)
     header.seq = 0
@@ -55,7 +55,7 @@ def transform_stamped(target: str, source: str, found: StampedTransform) -> Tran
 
 
 class LazyTFMessage(TFMessage):
-    """A TFMessage as bytes (``raw``), decoded when its ``transforms`` are read: a buffer takes the bytes."""
+    """A TFMessage that keeps its bytes (``raw``) for the buffer, and is decoded only when ``transforms`` is read."""
 
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types
@@ -66,7 +66,7 @@ class LazyTFMessage(TFMessage):
         self.raw: bytes | None = None
 
     def deserialize(self, data: Any) -> LazyTFMessage:
-        """Keep the bytes."""
+        """Store the bytes without decoding them."""
         self.raw = data
         return self
 

@@ -1,4 +1,4 @@
-"""tf2_ros.BufferServer: answers the lookups of BufferClients as actions. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.BufferServer: answers the lookups of BufferClients through an action. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _CODES: list[tuple[type[TransformException], int]] = [
 
 
 class BufferServer:
-    """Answers lookups in ``buffer`` as the action ``ns`` (tf2_msgs/LookupTransform), each when it is possible.
+    """Answers lookups in ``buffer`` through the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
 
-    A goal waits until an insertion makes it possible, or its timeout is over; its result then says what is wrong.
-    ``check_period`` (a Duration) is how often simulated time is looked at. The real one is C++ alone.
+    A goal waits until an insertion makes its lookup possible or its timeout expires; then the result contains the error.
+    ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only in C++.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class BufferServer:
         self._check_seconds = check_period.to_sec()
         self._lock = threading.Lock()
         self._pending: list[tuple[actionlib.ServerGoalHandle, times.Time]] = []
-        """The goals that wait, and when their timeouts are over."""
+        """The waiting goals, with the ends of their timeouts."""
         self._news = SignalSafeEvent()
         self._server = actionlib.ActionServer(
             ns, LookupTransformAction, self._take_goal, self._cancel, auto_start=False
@@ -61,7 +61,7 @@ class BufferServer:
             self.start()
 
     def start(self) -> None:
-        """Take goals from now on, until the node shuts down."""
+        """Accept goals until the node shuts down."""
         self.buffer.on_change(self._news.set)
         with naming_thread_limit():
             threading.Thread(target=self._work, name="buffer server", daemon=True).start()
@@ -87,7 +87,7 @@ class BufferServer:
             handle.set_canceled()
 
     def _work(self) -> None:
-        """Answer what has become possible, after each insertion and at each timeout."""
+        """Answer due goals after each insertion and at each timeout."""
         with rospy.interrupting(self._news.set):
             while not rospy.is_down():
                 self._news.clear()
@@ -96,7 +96,7 @@ class BufferServer:
                 wait_for_event(self._news, self._next_look())
 
     def _due(self) -> list[actionlib.ServerGoalHandle]:
-        """Remove and return the goals that are possible, or too late."""
+        """Remove and return the goals that are possible or have timed out."""
         now = rospy.get_rostime()
         with self._lock:
             waiting, self._pending = self._pending, []

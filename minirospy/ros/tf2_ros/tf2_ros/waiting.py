@@ -1,4 +1,4 @@
-"""Waiting for a transform: until an insertion, a shutdown, the timeout, or a jump of time."""
+"""Waiting for a transform: until an insertion, a shutdown, the timeout, or a jump in time."""
 
 from __future__ import annotations
 
@@ -14,18 +14,16 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)
-"""A wall clock that goes back by more ends a wait."""
-_SIMULATED_SLICE = 0.01
-"""Seconds. Nothing notifies a waiting thread of simulated time."""
+_JUMP = times.Duration(3)  # a wall clock that is set back by more than this ends a wait
+_SIMULATED_SLICE = 0.01  # seconds; a change of simulated time does not wake a waiting thread
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
-    """Return when ``is_possible()``, looked at after each insertion, or after ``timeout`` of ROS time.
+    """Wait until ``is_possible()`` is true, called after each insertion, or until ``timeout`` of ROS time has passed.
 
-    ``step`` is the part of the timeout for which the real one sleeps between its looks. Raise
-    ROSTimeMovedBackwardsException where simulated time jumps back to before the start of such a sleep,
-    ROSInterruptException where the node shuts down meanwhile, ROSInitException before init_node.
+    ``step`` is the fraction of the timeout that the real implementation sleeps between two checks. Raise
+    ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep,
+    ROSInterruptException if the node shuts down in the meantime, ROSInitException before init_node.
     """
     start = slept = rospy.get_rostime()
     length = times.Duration(*divmod(nanoseconds(timeout), 1_000_000_000))

@@ -1,4 +1,4 @@
-"""Quaternions as angles, in the steps of ROS's two programs that print them, so that zeros have their signs."""
+"""Conversion of quaternions to angles, in the same steps as ROS's two programs, so that the signs of zeros match."""
 
 from __future__ import annotations
 

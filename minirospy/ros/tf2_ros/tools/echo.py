@@ -1,4 +1,4 @@
-"""tf_echo of tf, and echo.py of tf2_tools: a transform between two frames, printed again and again.
+"""tf_echo of tf, and echo.py of tf2_tools: print a transform between two frames periodically.
 
 Source: http://wiki.ros.org/tf#tf_echo, http://wiki.ros.org/tf2_tools.
 """
@@ -37,12 +37,12 @@ _MAX_DIGITS = 17
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf_echo: SOURCE TARGET [RATE], the parameters ~rate and ~precision; return the exit status."""
+    """Run tf_echo: SOURCE TARGET [RATE], parameters ~rate and ~precision; return the exit status."""
     return run_program(_run_tf, words)
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_tools' echo.py, by its options; return the exit status."""
+    """Run tf2_tools' echo.py with its options; return the exit status."""
     return run_program(_run_tf2, words)
 
 
@@ -93,7 +93,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
     buffer = Buffer(rospy.Duration.from_sec(options.cache_time) if options.cache_time else None)
     TransformListener(buffer)
-    # As the timer there: the first look is after one period.
+    # The original uses a timer, so its first lookup is after one period.
     rospy.sleep(1 / options.rate)
     looks = 0
 
@@ -127,7 +127,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _repeat(rate: float, echo: Callable[[], bool]) -> None:
-    """Call ``echo`` at a rate until it returns False, or the node is shut down."""
+    """Call ``echo`` at a rate until it returns False or the node is shut down."""
     rhythm = rospy.Rate(rate)
     while not rospy.is_shutdown() and echo():
         try:
@@ -137,7 +137,7 @@ def _repeat(rate: float, echo: Callable[[], bool]) -> None:
 
 
 def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion], Vector]) -> str:
-    """Return the lines about a pose, the last without its end."""
+    """Return the lines that describe a pose, without the last line break."""
     place, turn = found.transform.translation, found.transform.rotation
     rpy = angles((turn.x, turn.y, turn.z, turn.w))
     rows = (
@@ -152,7 +152,7 @@ def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion]
 
 
 def _rounded(nanoseconds: int, digits: int) -> str:
-    """Return a time in seconds with so many digits, exact where a float would not be."""
+    """Return a time in seconds with ``digits`` decimals, without the rounding errors of a float."""
     if digits > 6:
         return f"{nanoseconds / 1e9:.{digits}f}"
     scaled = round(nanoseconds / 10 ** (9 - digits))

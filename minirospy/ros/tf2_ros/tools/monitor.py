@@ -1,6 +1,6 @@
-"""tf_monitor: how late the transforms of each frame come, and how often each node sends them.
+"""tf_monitor: how late each frame's transforms arrive, and how often each node sends them.
 
-Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by their names, which the real one knew before tf2.
+Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as the real program did before tf2.
 """
 
 from __future__ import annotations
@@ -24,22 +24,20 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000
-"""Delays that an average is made of, and messages that a rate is."""
+_KEPT = 1000  # number of delays in an average, and of messages in a rate
 _STEP = 0.01
-_STEPS = 20
-"""Looks at the delay between two frames, for each report."""
+_STEPS = 20  # measurements of the delay between two frames per report
 _SMOOTHING = 0.01
 _SHORTEST = 1e-8
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run tf_monitor, of all frames or of those between two; return the exit status."""
+    """Run tf_monitor, for all frames or for those between two; return the exit status."""
     return run_program(_run, words)
 
 
 class Delays:
-    """The delays of each frame and of each node. Pure: the caller gives the times, in seconds."""
+    """The delays of each frame and each node. Pure: the caller passes the times, in seconds."""
 
     def __init__(self) -> None:
         self._sender: dict[str, str] = {}
@@ -48,7 +46,7 @@ class Delays:
         self._node_times: dict[str, deque[float]] = {}
 
     def add(self, sender: str, frames: Sequence[tuple[str, float]], now: float, *, is_static: bool) -> None:
-        """Take a message: each child frame with its stamp. Static ones are never late."""
+        """Record a message: each child frame with its stamp. Static transforms are never late."""
         sender = sender + "(static)" * is_static
         late = [(child, 0.0 if is_static else now - stamp) for child, stamp in frames]
         for child, delay in late:
@@ -59,7 +57,7 @@ class Delays:
         self._node_times.setdefault(sender, deque(maxlen=_KEPT)).append(now)
 
     def frame_lines(self, chain: Sequence[str] | None = None) -> Iterator[str]:
-        """Yield a line for each frame, of those in ``chain`` where it is given."""
+        """Yield a line for each frame, only for those in ``chain`` if it is given."""
         for child in sorted(self._delays):
             if chain is None or child in chain:
                 average, most = _average_and_most(self._delays[child])
@@ -81,7 +79,7 @@ def _average_and_most(delays: deque[float]) -> tuple[float, float]:
 
 def _run(words: Sequence[str]) -> None:
     if len(words) not in (0, 2):
-        # As there, the usage is an information of the log.
+        # As in ROS, the usage is logged at level INFO.
         report(_USAGE, "INFO")
         raise ToolError("")
     rospy.init_node("tf_monitor", anonymous=True)
@@ -138,7 +136,7 @@ def _wait_for_chain(buffer: Buffer, source: str, target: str) -> None:
 
 
 class _Net:
-    """The delay between two frames: smoothed, and the longest."""
+    """The delay between two frames: its moving average and its maximum."""
 
     def __init__(self) -> None:
         self.chain: list[str] = []

@@ -1,4 +1,4 @@
-"""The common part of the programs: their words, their errors, a buffer that listens."""
+"""The common part of the programs: their arguments, their errors, a buffer with a listener."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from minirospy.base.escape import escaped
 
 __all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
 
-USAGE_STATUS = 255
-"""Of a usage error: ROS's programs return -1."""
+USAGE_STATUS = 255  # exit status of a usage error: ROS's programs return -1
 
 
 class ToolError(MinirospyError):
-    """A program cannot go on: ``text`` on stdout, then ``str()`` on stderr, and the exit status.
+    """A program cannot continue: prints ``text`` to stdout, ``str()`` to stderr, and sets the exit status.
 
-    ``level`` is that of the console's line; without one it is plain.
+    ``level`` is the log level of the line; if it is empty, the line is printed without one.
     """
 
     def __init__(
@@ -32,7 +31,7 @@ class ToolError(MinirospyError):
 
 
 def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str] | None) -> int:
-    """Run a program with its words; return its exit status. Ctrl-C, or a reader that has gone, is not an error."""
+    """Run a program with its arguments; return its exit status. Ctrl-C or a closed stdout is not an error."""
     arguments = rospy.myargv(sys.argv)[1:] if words is None else words
     try:
         return body(arguments) or 0
@@ -45,15 +44,15 @@ def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str
     except (rospy.ROSInterruptException, KeyboardInterrupt):
         return 0
     except BrokenPipeError:
-        # What is still in the buffer has no reader either.
+        # The text that is still buffered cannot be written either.
         sys.stdout = None
         return 0
 
 
 def report(line: str, level: str = "ERROR") -> None:
-    """Print a line as ROS's console prints it, also before there is a node; without a level as it is.
+    """Print a line in the format of ROS's console, even before there is a node; without a level, print it unchanged.
 
-    An information goes to stdout, the rest to stderr.
+    The level INFO goes to stdout, all others to stderr.
     """
     head = f"[{level}] [{time.time():.6f}]: " if level else ""
     print(escaped(head + line, "\n"), file=sys.stdout if level == "INFO" else sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""static_transform_publisher of tf (again and again on /tf) and of tf2_ros (once, latched, on /tf_static).
+"""static_transform_publisher of tf (periodically on /tf) and of tf2_ros (once, latched, on /tf_static).
 
 Source: http://wiki.ros.org/tf#static_transform_publisher, http://wiki.ros.org/tf2_ros#static_transform_publisher.
 """
@@ -41,9 +41,9 @@ Usage: {_NAME} /param_name
 {_ABOUT}"""  # noqa: W291
 
 _SHORTEST = 0.001
-"""Seconds between two messages: a period of 0 would keep a core busy, and all listeners."""
+"""Shortest period in seconds: a period of 0 would keep this process and all listeners busy."""
 _TOLERANCE = 0.01
-"""How far the squared length of a quaternion may be from 1: beyond, every listener ignores it."""
+"""Largest deviation of a quaternion's squared length from 1: beyond it, every listener rejects the transform."""
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
@@ -52,7 +52,7 @@ def main_tf(words: Sequence[str] | None = None) -> int:
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_ros's program: the same without a period, or the name of a parameter; return the exit status."""
+    """Run tf2_ros's program: the same arguments without a period, or a parameter's name; return the exit status."""
     return run_program(_run_tf2, words)
 
 
@@ -65,7 +65,7 @@ def _run_tf(words: Sequence[str]) -> None:
 
     rospy.init_node(_NAME, anonymous=True)
     broadcaster = TransformBroadcaster()
-    # Listeners know the frame until the next message, which comes by then.
+    # Stamp it in the future, so that the frame is known until the next message arrives.
     ahead = rospy.Duration.from_sec(seconds)
     broadcaster.pub_tf.wait_for_subscribers(timeout=seconds)
     while not rospy.is_shutdown():
@@ -124,9 +124,9 @@ def _number(text: str, what: str) -> float:
 
 
 def _checked(transform: TransformStamped) -> TransformStamped:
-    """Return a transform that listeners take. Raise ToolError."""
+    """Return the transform if listeners accept it. Raise ToolError."""
     parent, child = transform.header.frame_id, transform.child_frame_id
-    # Listeners drop a leading slash.
+    # Listeners ignore a leading slash.
     if parent.removeprefix("/") == child.removeprefix("/"):
         why = f"target_frame and source frame are the same ({parent}, {child}) this cannot work"
         raise ToolError(why, level="FATAL", status=1)
@@ -141,7 +141,7 @@ def _checked(transform: TransformStamped) -> TransformStamped:
 
 
 def _transform_of_parameter(name: str) -> TransformStamped:
-    """Return the transform of a parameter, which is as a TransformStamped in YAML. Raise ToolError."""
+    """Return the transform in a parameter, which has the fields of a TransformStamped. Raise ToolError."""
     rospy.loginfo("Looking for TF in parameter: %s", name)
     try:
         value = rospy.get_param(name, None)

@@ -1,5 +1,6 @@
-"""view_frames of tf and of tf2_tools: five seconds of transforms -> frames.gv, and frames.pdf by `dot`, else frames.svg.
+"""view_frames of tf and of tf2_tools: record transforms for five seconds and draw the tree of frames.
 
+Writes frames.gv, and frames.pdf with `dot`, else frames.svg.
 Source: http://wiki.ros.org/tf#view_frames, http://wiki.ros.org/tf2_tools.
 """
 
@@ -34,7 +35,7 @@ _VERSION = re.compile(r"version (\d+\.?\d*)")
 
 
 class FrameRecord(NamedTuple):
-    """A frame of a listing: texts as they are printed."""
+    """A frame of a listing; values are strings, as printed."""
 
     name: str
     parent: str
@@ -46,7 +47,7 @@ class FrameRecord(NamedTuple):
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's view_frames, of what comes or, with --node, of a node's buffer; return the exit status."""
+    """Run tf's view_frames, for received transforms or, with --node, for a node's buffer; return the exit status."""
     return run_program(_run_tf, words)
 
 
@@ -107,7 +108,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _listen() -> None:
-    """Wait for the transforms to come, in real time: a bag may be paused. Raise ROSInterruptException at a shutdown."""
+    """Wait for transforms to arrive, in real time, as a bag may be paused. Raise ROSInterruptException at a shutdown."""
     end = time.monotonic() + _SECONDS
     while time.monotonic() < end:
         if rospy.is_shutdown():
@@ -116,7 +117,7 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Return the graph that a node of tf or tf2 offers; wait for the service. Raise ToolError."""
+    """Return the graph that a tf or tf2 node offers; wait for its service. Raise ToolError."""
     from tf.srv import FrameGraph
 
     rospy.init_node("view_frames", anonymous=True)
@@ -141,7 +142,7 @@ def _graph_of_node(name: str) -> str:
 
 
 def read_records(listing: str) -> list[FrameRecord]:
-    """Return the frames of a buffer's listing in YAML, whatever the frames are called."""
+    """Parse a buffer's YAML listing into frames, whatever characters the frames' names contain."""
     pattern = re.compile(
         r"^(.*): \n  parent: '(.*)'\n  broadcaster: '(.*)'\n  rate: (.*)\n  most_recent_transform: (.*)\n"
         r"  oldest_transform: (.*)\n  buffer_length: (.*)\n",
@@ -151,12 +152,12 @@ def read_records(listing: str) -> list[FrameRecord]:
 
 
 def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
-    """Return the frames as text for graphviz, as tf2_tools' view_frames.py writes it."""
+    """Return the frames as a graphviz graph, in the format of tf2_tools' view_frames.py."""
     if not records:
         return 'digraph G { "No tf data received" }'
 
     names = {record.name for record in records}
-    # The legend hangs on the root that was seen last.
+    # The legend is attached to the last root.
     root = next(
         (record.parent for record in reversed(records) if record.parent not in names), records[0].name
     )
@@ -179,7 +180,7 @@ def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
 
 
 def read_edges(dot: str) -> Iterator[Edge]:
-    """Yield the edges of a graph of either program."""
+    """Yield the edges of a graph that either program wrote."""
     for parent, child, label in _EDGE.findall(dot):
         lines = [line.strip() for line in label.split("\\n") if line.strip()]
         yield Edge(_unquoted(parent), _unquoted(child), tuple(lines))
@@ -204,7 +205,7 @@ def _draw_svg(dot: str) -> None:
 
 
 def _save(name: str, text: str) -> None:
-    """Write a file of the current folder. Raise ToolError."""
+    """Write a file into the current folder. Raise ToolError."""
     try:
         Path(name).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -1,1 +1,1 @@
-"""tf2_sensor_msgs: point clouds for tf2_ros; importing it registers them."""
+"""tf2_sensor_msgs: registers point clouds with tf2_ros when it is imported."""

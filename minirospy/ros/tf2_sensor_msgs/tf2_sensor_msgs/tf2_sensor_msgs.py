@@ -1,6 +1,6 @@
-"""tf2_sensor_msgs: point clouds that tf2_ros transforms. Source: http://wiki.ros.org/tf2_sensor_msgs.
+"""tf2_sensor_msgs: transforms point clouds for tf2_ros. Source: http://wiki.ros.org/tf2_sensor_msgs.
 
-Importing it registers PointCloud2 with tf2_ros. numpy is imported by the first cloud.
+Importing it registers PointCloud2 with tf2_ros. numpy is imported when the first cloud is transformed.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _FORMATS = {
 
 
 def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> PointCloud2:
-    """Return a cloud whose x, y and z the transform has moved, with the transform's header.
+    """Return a cloud with transformed x, y and z, with the transform's header.
 
-    As with the real one the result has one row, little-endian numbers, nothing behind a point's last field, zeros between
-    its fields, and is not marked as dense. The other fields, and the points without a place (NaN), are kept. x, y and z are
-    the fields of these names, where the real one takes the first three. Raise ValueError if the cloud has no x, y and z,
-    or fewer bytes than it says.
+    As in real ROS, the result has one row, little-endian numbers, nothing behind a point's last field, zeros between
+    its fields, and is not marked as dense. The other fields, and points with NaN coordinates, are kept. x, y and z are
+    the fields of these names, while real ROS uses the first three. Raise ValueError if the cloud has no x, y and z,
+    or less data than its sizes require.
     """
     import numpy
 
@@ -61,7 +61,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
     frame = transform_to_kdl(transform)
     rotation = numpy.array(frame.M._m).reshape(3, 3)
     places = numpy.stack([points[name].astype(numpy.float64) for name in "xyz"], axis=-1)
-    # Places may be infinite, or become too large.
+    # Coordinates may be infinite, or overflow.
     with numpy.errstate(invalid="ignore", over="ignore"):
         moved = places @ rotation.T + numpy.array(frame.p._v)
         for column, name in enumerate("xyz"):
@@ -81,7 +81,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
 
 
 def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
-    """Return the points as a structured array, one after the other, without the rests of rows."""
+    """Return the points as a one-dimensional structured array, without the padding of rows."""
     import numpy
 
     try:
@@ -94,7 +94,7 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
 
 
 def _layout(fields: Sequence[PointField], order: str, step: int | None = None) -> numpy.dtype[numpy.void]:
-    """Return the layout of a point of ``step`` bytes; by default it ends with its last field. Raise ValueError."""
+    """Return the layout of a point of ``step`` bytes (default: up to its last field). Raise ValueError."""
     import numpy
 
     known = [field for field in fields if field.datatype in _FORMATS]

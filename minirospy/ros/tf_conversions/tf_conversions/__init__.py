@@ -1,1 +1,1 @@
-"""tf_conversions: PyKDL's frames as tuples, messages and matrices."""
+"""tf_conversions: converts PyKDL's frames to tuples, messages and matrices."""

@@ -1,4 +1,4 @@
-"""tf_conversions.posemath: PyKDL's frames <-> tuples of tf, Pose messages and 4x4 matrices.
+"""tf_conversions.posemath: converts PyKDL's frames to and from tf's tuples, Pose messages and 4x4 matrices.
 
 Source: http://wiki.ros.org/tf_conversions.
 """
@@ -28,18 +28,18 @@ Tuples = tuple[Sequence[float], Sequence[float]]
 
 
 def fromTf(tf: Tuples) -> Frame:
-    """Return what lookupTransform returns, (x, y, z) and (x, y, z, w), as a Frame."""
+    """Convert the result of lookupTransform, (x, y, z) and (x, y, z, w), to a Frame."""
     (x, y, z), (qx, qy, qz, qw) = tf
     return Frame(Rotation.Quaternion(qx, qy, qz, qw), Vector(x, y, z))
 
 
 def toTf(f: Frame) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Return a Frame as (x, y, z) and (x, y, z, w)."""
+    """Convert a Frame to (x, y, z) and (x, y, z, w)."""
     return (f.p[0], f.p[1], f.p[2]), f.M.GetQuaternion()
 
 
 def fromMsg(p: Pose) -> Frame:
-    """Return a Pose as a Frame."""
+    """Convert a Pose to a Frame."""
     position, orientation = p.position, p.orientation
     return fromTf(
         (
@@ -50,25 +50,25 @@ def fromMsg(p: Pose) -> Frame:
 
 
 def toMsg(f: Frame) -> Pose:
-    """Return a Frame as a Pose."""
+    """Convert a Frame to a Pose."""
     return Pose(Point(f.p[0], f.p[1], f.p[2]), Quaternion(*f.M.GetQuaternion()))
 
 
 def fromMatrix(m: NDArray[numpy.floating]) -> Frame:
-    """Return a 4x4 matrix as a Frame."""
+    """Convert a 4x4 matrix to a Frame."""
     rotation = [float(m[row, column]) for row in range(3) for column in range(3)]
     return Frame(Rotation(*rotation), Vector(float(m[0, 3]), float(m[1, 3]), float(m[2, 3])))
 
 
 def toMatrix(f: Frame) -> NDArray[numpy.float64]:
-    """Return a Frame as a 4x4 matrix."""
+    """Convert a Frame to a 4x4 matrix."""
     import numpy
 
     return numpy.array([*([f[row, column] for column in range(4)] for row in range(3)), [0.0, 0.0, 0.0, 1.0]])
 
 
 def fromCameraParams(cv: _OpenCV, rvec: NDArray[numpy.floating], tvec: NDArray[numpy.floating]) -> Frame:
-    """Return the Frame of OpenCV's rotation and translation vectors; ``cv`` is its (old) module."""
+    """Convert OpenCV's rotation and translation vectors to a Frame; ``cv`` is its (old) module."""
     import numpy
 
     matrix = numpy.zeros((4, 4), dtype=numpy.float32)

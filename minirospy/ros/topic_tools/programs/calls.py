@@ -1,6 +1,6 @@
-"""mux_select, mux_add, mux_delete, mux_list: call a service of a mux that runs; and demux_select and its kin.
+"""mux_select, mux_add, mux_delete, mux_list: call a service of a running mux; demux_select and so on do so for a demux.
 
-The kin of demux are ours; ROS has none. The exit status is 1 where the call fails (ROS: 0).
+The demux programs exist only in minirospy. The exit status is 1 if the call fails (ROS: 0).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class _Verb(NamedTuple):
     service: type
     takes_topic: bool
     text: Callable[[str, str, str], str]
-    """The line before the call, of the program (mux or demux), the node's name and the topic."""
+    """Returns the line to print before the call, from the program (mux or demux), the node's name and the topic."""
 
 
 _VERBS = {
@@ -30,7 +30,7 @@ _VERBS = {
     "delete": _Verb(MuxDelete, True, lambda kind, name, topic: f'Deleting "{topic}" from {kind} "{name}"'),
     "list": _Verb(MuxList, False, lambda kind, name, topic: f'Listing topics from {kind} "{name}"'),
 }
-"""demux's services have the fields, and so the md5sums, of mux's."""
+"""demux's services have the same fields as mux's, and so the same md5sums."""
 
 
 def main(program: str) -> int:

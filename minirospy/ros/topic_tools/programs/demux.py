@@ -1,4 +1,4 @@
-"""demux: pass a topic on to one of several others; services choose which.
+"""demux: forward a topic to one of several others, which services select.
 
 Topic demux/selected (latched); services demux/select, demux/add, demux/list, demux/delete; ``__none`` selects no output.
 """
@@ -32,7 +32,7 @@ __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Seconds that the first message on an output waits for a subscriber, which connects after the topic is advertised."""
+"""Seconds that an output's first message waits for a subscriber to connect, after the topic is advertised."""
 
 
 def main() -> int:
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Demux:
-    """Passes the messages of a topic on to the selected output, byte by byte."""
+    """Forwards the messages of a topic to the selected output, unchanged."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()

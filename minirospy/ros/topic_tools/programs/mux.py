@@ -1,7 +1,7 @@
-"""mux: pass on one of several topics; services choose which.
+"""mux: forward one of several topics, which services select.
 
 Topic mux/selected (latched); services mux/select, mux/add, mux/list, mux/delete, OUT_select; ``__none`` selects no input.
-Parameters: ~lazy (subscribe only to the chosen topic, while the output has subscribers), ~latch, ~initial_topic.
+Parameters: ~lazy (subscribe only to the selected topic, while the output has subscribers), ~latch, ~initial_topic.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Mux:
-    """Passes the messages of the selected topic on, byte by byte."""
+    """Forwards the messages of the selected topic, unchanged."""
 
     def __init__(self, target: str, sources: Sequence[str], *, is_lazy: bool, latch: bool) -> None:
         self._is_lazy = is_lazy

@@ -1,4 +1,4 @@
-"""The common part of the programs: messages of any type come in and go out as the bytes that they are."""
+"""The common part of the programs: messages of any type are received and sent as bytes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from minirospy.client.topics import AnyMsg, SubscribeListener
 
 __all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
 
-NONE = "__none"
-"""The name that selects no topic, of mux and demux."""
+NONE = "__none"  # the name that selects no topic of a mux or demux
 _QUEUE_SIZE = 10
 
 
 class _Connected(SubscribeListener):
-    """Calls a function with each new subscriber."""
+    """Calls a function for each new subscriber."""
 
     def __init__(self, call: Callable[[], object]) -> None:
         super().__init__()
@@ -30,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic that has the type of the first message that is passed on, and is latched where that was."""
+    """A topic with the type of the first forwarded message; latched if the input was, unless ``latch`` is given."""
 
     def __init__(
         self,
@@ -40,7 +39,7 @@ class Output:
         on_subscriber: Callable[[], object] = lambda: None,
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
-        """``latch``: None as the input. ``on_advertised`` is called after the first message has come."""
+        """Create the output. ``latch``: None means as the input; ``on_advertised`` is called after the first message."""
         self.topic = _checked(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
@@ -50,16 +49,16 @@ class Output:
 
     @property
     def is_advertised(self) -> bool:
-        """Return whether a message has come."""
+        """Return whether a first message has arrived."""
         return self._publisher is not None
 
     @property
     def has_subscribers(self) -> bool:
-        """Return whether a node subscribes to it."""
+        """Return whether a node subscribes to the output."""
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:
-        """Advertise the topic with the type of a message, once."""
+        """Advertise the topic with the type of a message; later calls have no effect."""
         with self._lock:
             if self._publisher is not None:
                 return
@@ -78,13 +77,13 @@ class Output:
         self._on_advertised()
 
     def close(self) -> None:
-        """Unregister the topic, where it is advertised."""
+        """Unregister the topic if it is advertised."""
         with self._lock:
             if self._publisher is not None:
                 self._publisher.unregister()
 
     def publish(self, message: AnyMsg) -> None:
-        """Publish a message after ``advertise``; one of another type is left out, with a warning."""
+        """Publish a message after ``advertise``; drop a message of another type with a warning."""
         assert self._publisher is not None
         header = message._connection_header
         if header["md5sum"] not in ("*", self._publisher.md5sum):
@@ -97,7 +96,7 @@ class Output:
 
 
 class Input:
-    """A subscription that can be given up and taken again."""
+    """A subscription that can be closed and opened again."""
 
     def __init__(self, topic: str, callback: Callable[[AnyMsg], object]) -> None:
         self.topic = _checked(topic)
@@ -107,11 +106,11 @@ class Input:
 
     @property
     def is_open(self) -> bool:
-        """Return whether it is subscribed."""
+        """Return whether the topic is subscribed."""
         return self._subscriber is not None
 
     def open(self) -> None:
-        """Subscribe, where it is not."""
+        """Subscribe if not subscribed."""
         with self._lock:
             if self._subscriber is None:
                 self._subscriber = rospy.Subscriber(
@@ -119,7 +118,7 @@ class Input:
                 )
 
     def close(self) -> None:
-        """Unsubscribe, where it is subscribed."""
+        """Unsubscribe if subscribed."""
         with self._lock:
             subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
@@ -127,7 +126,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, of which the node's name is made. Raise ValueError if it has none."""
+    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it has none."""
     name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -135,14 +134,14 @@ def base_name(topic: str) -> str:
 
 
 def _checked(topic: str) -> str:
-    """Return a topic's name. Raise ValueError if it is not legal."""
+    """Return a topic's name. Raise ValueError if it is invalid."""
     if not is_legal_name(topic):
         raise ValueError(f"[{topic}] is not the name of a topic")
     return topic
 
 
 def flag(name: str) -> bool:
-    """Return a private parameter that is true or false; false without it."""
+    """Return a boolean private parameter; False if it is not set."""
     return bool(rospy.get_param(f"~{name}", False))
 
 
@@ -151,15 +150,15 @@ def run_node(
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``start`` get the words of the command line; a ValueError of theirs is printed with the usage.
-    ``counts``: how many words there may be.
+    ``name`` and ``start`` are called with the command line's arguments; their ValueError is printed with the usage.
+    ``counts``: the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]
     try:
         if len(words) not in counts:
             raise ValueError("")
         rospy.init_node(name(words), anonymous=True)
-        # It keeps what it starts: a subscription, services.
+        # Keep a reference to the subscription or services.
         running = start(words)
         rospy.spin()
         del running

@@ -1,4 +1,4 @@
-"""relay: pass a topic on under another name.
+"""relay: forward a topic under another name.
 
 Parameters: ~lazy (subscribe only while the output has subscribers); ~stealth with ~monitor_topic and ~monitor_rate
 (subscribe only while another node subscribes to that topic; the rate is a period in seconds, as in ROS).
@@ -35,19 +35,19 @@ def _start(words: Sequence[str]) -> Relay:
 
 
 class Relay:
-    """Passes messages on, byte by byte."""
+    """Forwards messages unchanged."""
 
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # A subscriber that comes as the input is given up opens it again.
+        # Covers a new subscriber that arrives while the input is being closed: it opens the input again.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)
         self._input.open()
 
     def monitor(self, topic: str, period: float) -> None:
-        """Subscribe only while another node subscribes to a topic; look every ``period`` seconds."""
+        """Subscribe only while another node subscribes to a topic; check this every ``period`` seconds."""
         self._is_stealthy = True
         self._master = MasterProxy(Environment.read().master_uri, rospy.get_name())
         self._timer = rospy.Timer(rospy.Duration.from_sec(period), lambda _event: self._look_for(topic))

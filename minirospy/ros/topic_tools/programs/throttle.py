@@ -1,7 +1,7 @@
-"""throttle: pass on no more than so many messages, or bytes, a second. drop: pass on the rest of each so many messages.
+"""throttle: forward a limited number of messages or bytes per second. drop: drop X of every Y messages.
 
-Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (the machine's time, whatever the
-node's), ~force_latch and ~force_latch_value (whether the output is latched, whatever the input is).
+Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (use the machine's time, even if
+the node's is simulated), ~force_latch and ~force_latch_value (whether the output is latched, regardless of the input).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Whether a message passes, by the time in seconds and its bytes; notes it as passed."""
+"""Return whether a message passes, given the time in seconds and its size in bytes; count it if it does."""
 
 
 def main() -> int:
@@ -93,7 +93,7 @@ def _count(word: str) -> int:
 
 
 class MessageLimit:
-    """Lets a message pass when more than ``period`` seconds have gone by since the last one."""
+    """Lets a message pass if more than ``period`` seconds have passed since the last one."""
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -111,7 +111,7 @@ class MessageLimit:
 
 
 class ByteLimit:
-    """Lets a message pass where fewer than ``limit`` bytes have passed in the last ``window`` seconds."""
+    """Lets a message pass if fewer than ``limit`` bytes have passed in the last ``window`` seconds."""
 
     def __init__(self, limit: int, window: float) -> None:
         self._limit = limit
@@ -129,7 +129,7 @@ class ByteLimit:
 
 
 def every(dropped: int, of: int) -> Passes:
-    """Return what leaves out the first ``dropped`` of each ``of`` messages."""
+    """Return a filter that drops the first ``dropped`` of every ``of`` messages."""
     seen = 0
 
     def passes(now: float, size: int) -> bool:
@@ -143,7 +143,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Passes some of the messages on, byte by byte."""
+    """Forwards some of the messages, unchanged."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # A subscriber that comes as the input is given up opens it again.
+        # Covers a new subscriber that arrives while the input is being closed: it opens the input again.
         self._lock = threading.Lock()
 
         self._output = Output(

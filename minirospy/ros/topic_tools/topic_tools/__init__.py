@@ -1,6 +1,6 @@
-"""topic_tools: the class for lazy nodes, and its programs that evaluate expressions of Python.
+"""topic_tools: the base class of lazy nodes, and programs that evaluate Python expressions.
 
-Those that pass bytes on are in minirospy.ros.topic_tools.programs. Source: http://wiki.ros.org/topic_tools.
+The programs that forward bytes are in minirospy.ros.topic_tools.programs. Source: http://wiki.ros.org/topic_tools.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _WARN_SECONDS = 5
 
 
 class MetaLazyTransport(type):
-    """Calls ``_post_init`` after the constructors of all derived classes, whose publishers are there then."""
+    """Calls ``_post_init`` after the constructors of all subclasses, when their publishers exist."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
@@ -27,17 +27,17 @@ class MetaLazyTransport(type):
 
 
 class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
-    """Base of nodes that subscribe only while their own topics have subscribers.
+    """Base class of nodes that subscribe only while their own topics have subscribers.
 
-    Derive from it, make publishers by ``advertise``, and write ``subscribe`` and ``unsubscribe``. With the parameter
-    ``~lazy`` false it subscribes when it is made, and stays subscribed.
+    Subclass it, create publishers with ``advertise``, and implement ``subscribe`` and ``unsubscribe``. If the parameter
+    ``~lazy`` is false, it subscribes when it is created, and stays subscribed.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._publishers: list[Publisher[Message]] = []
         self._connection_status: bool | None = None
-        """Whether it is subscribed; None: it has never been."""
+        """Whether it is subscribed; None before the first subscription."""
         self._changing = threading.RLock()
         rospy.Timer(rospy.Duration(_WARN_SECONDS), self._warn_never_subscribed_cb, oneshot=True)
 
@@ -53,20 +53,20 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
             )
 
     def subscribe(self) -> None:
-        """Subscribe to the inputs. A derived class writes it."""
+        """Subscribe to the inputs; a subclass implements it."""
         raise NotImplementedError("Please overwrite this method")
 
     def unsubscribe(self) -> None:
-        """Unregister the subscribers of the inputs. A derived class writes it."""
+        """Unregister the subscribers of the inputs; a subclass implements it."""
         raise NotImplementedError("Please overwrite this method")
 
     def peer_subscribe(self, *args: object, **kwargs: object) -> None:
-        """Subscribe when one of its topics gets a subscriber."""
+        """Subscribe when one of the topics gets a subscriber."""
         rospy.logdebug(f"[{args[0]}] is subscribed")
         self._subscribe_once()
 
     def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
-        """Unsubscribe when none of its topics has a subscriber left."""
+        """Unsubscribe when none of the topics has a subscriber left."""
         rospy.logdebug(f"[{args[0]}] is unsubscribed")
         if not rospy.get_param("~lazy", True):
             return
@@ -77,7 +77,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
                 self._connection_status = False
 
     def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Message]:
-        """Return a publisher, with the arguments of ``rospy.Publisher`` but ``subscriber_listener``, which is this object."""
+        """Return a publisher; accepts the arguments of ``rospy.Publisher`` except ``subscriber_listener``."""
         assert len(args) < 3 or args[2] is None, "subscriber_listener is this object"
         assert kwargs.get("subscriber_listener") is None, "subscriber_listener is this object"
         if len(args) < 3:
@@ -90,7 +90,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         return publisher
 
     def _subscribe_once(self) -> None:
-        # The constructor's thread and that of the listener's events may come together.
+        # The constructor's thread and the listener's thread may get here at the same time.
         with self._changing:
             if self._connection_status is not True:
                 self.subscribe()

@@ -1,4 +1,4 @@
-"""transform and relay_field: publish what an expression of Python makes of a topic's messages, or of a field of them.
+"""transform and relay_field: publish the result of a Python expression on a topic's messages or on one of their fields.
 
 The expression is the user's own, from the command line or a launch file; ``m`` is the message or the field.
 Source: http://wiki.ros.org/topic_tools/transform, http://wiki.ros.org/topic_tools/relay_field.
@@ -91,7 +91,7 @@ def _transform(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # Of tf.transformations the expression sees tf.
+            # For tf.transformations, the expression can use the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:
@@ -130,7 +130,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
 
 
 def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:
-    """Call a function with each message, or with the field of it that is named. Raise MinirospyError without the topic."""
+    """Call a function with each message, or with the given field of it. Raise MinirospyError if the topic does not exist."""
     name = rospy.resolve_name(options.input)
     cls, topic, field = rostopic.get_topic_class(name, blocking=options.wait_for_start)
     if cls is None or topic is None:
@@ -153,7 +153,7 @@ def _compiled(expression: str) -> CodeType:
 
 
 def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
-    """Return the fields with their texts evaluated; a text that is not an expression, or names nothing, stays."""
+    """Return the fields with their strings evaluated; keep a string that is not a valid expression."""
     found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):

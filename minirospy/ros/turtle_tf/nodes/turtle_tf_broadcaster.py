@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The pose of the turtle ~turtle -> its frame in `world`, on /tf; see http://wiki.ros.org/turtle_tf."""
+"""Publishes the pose of the turtle ~turtle as its frame in `world`, on /tf; see http://wiki.ros.org/turtle_tf."""
 
 import rospy
 import tf

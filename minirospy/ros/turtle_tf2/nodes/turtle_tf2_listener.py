@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Spawns turtle2, which follows turtle1 by its frame; see http://wiki.ros.org/turtle_tf2."""
+"""Spawns turtle2, which follows turtle1's frame; see http://wiki.ros.org/turtle_tf2."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: a robot description's tree.
+"""`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: print or draw a robot description's tree.
 
-What is printed is what those of liburdfdom-tools print, with the line of the description instead of one of their
-source; exit status 255 where it cannot be read, as theirs. Source: http://wiki.ros.org/urdf#Verification.
+The output is that of liburdfdom-tools, but with line numbers of the description instead of its own source code.
+The exit status is 255 if the description cannot be read, as there. Source: http://wiki.ros.org/urdf#Verification.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ _NO_OUTPUT = "WARNING: OUTPUT not given. This type of usage is deprecated!"
 
 
 def check_urdf(argv: Sequence[str] | None = None) -> int:
-    """Run check_urdf; return 0, or 255 where the description does not read."""
+    """Run check_urdf; return 0, or 255 if the description cannot be read."""
     return CHECK.main(argv)
 
 
 def urdf_to_graphviz(argv: Sequence[str] | None = None) -> int:
-    """Run urdf_to_graphviz; return 0, or 255 where the description does not read."""
+    """Run urdf_to_graphviz; return 0, or 255 if the description cannot be read."""
     return GRAPHVIZ.main(argv)
 
 
 def urdf_to_graphiz(argv: Sequence[str] | None = None) -> int:
-    """Run urdf_to_graphiz, which warns of its name."""
+    """Run urdf_to_graphiz, which prints a warning about its old name."""
     return GRAPHIZ.main(argv)
 
 
@@ -88,7 +88,7 @@ def _graph(file: str | None, output: str | None) -> None:
         print(_NO_OUTPUT + _USAGE, file=sys.stderr)
     robot = _read(file)
     name = robot.name if output is None else output
-    # The name is that of a stranger's file: it does not say where files are written.
+    # The file may come from a stranger, so the robot's name must not decide where files are written.
     if output is None and (not name or name != Path(name).name or name.startswith(".") or "\\" in name):
         raise UsageError(f"the robot's name [{name}] is not a file's name: name the OUTPUT")
 
@@ -112,13 +112,13 @@ def _picture(robot: Robot) -> str:
         x, y, z = joint.origin.xyz
         roll, pitch, yaw = rpy_from_quaternion(quaternion_from_rpy(*joint.origin.rpy))
         pose = (f"xyz: {x:g} {y:g} {z:g}", f"rpy: {roll:g} {pitch:g} {yaw:g}")
-        # Joints and links may share names.
+        # A joint and a link may have the same name.
         edges += [Edge(joint.parent, f" {name} ", pose), Edge(f" {name} ", joint.child)]
     return tree_svg(edges, robot.name, alone=[robot.root], round_=[f" {name} " for name in robot.joints])
 
 
 def _read(file: str) -> Robot:
-    """Return the robot of a file, its problems printed. Raise WordedError."""
+    """Return the robot from a file, and print its problems. Raise WordedError."""
     from minirospy.core.urdf.read import read_robot
 
     try:

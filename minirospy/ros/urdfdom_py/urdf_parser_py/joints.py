@@ -1,4 +1,4 @@
-"""Joints and transmissions as urdf_parser_py's objects. Source: http://wiki.ros.org/urdf/XML/joint."""
+"""The classes of urdf_parser_py for joints and transmissions. Source: http://wiki.ros.org/urdf/XML/joint."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class JointDynamics(Object):
 
 
 class JointCalibration(Object):
-    """Positions at which a sensor's signal changes."""
+    """The positions at which a joint's reference sensor changes its signal."""
 
     TAG = "calibration"
     FIELDS = (Attribute("rising", _NUMBER, False, 0), Attribute("falling", _NUMBER, False, 0))
@@ -74,7 +74,7 @@ class JointLimit(Object):
 
 
 class JointMimic(Object):
-    """The joint that a joint follows."""
+    """The joint whose position this joint follows."""
 
     TAG = "mimic"
     FIELDS = (
@@ -92,7 +92,7 @@ class JointMimic(Object):
 
 
 class SafetyController(Object):
-    """Limits that a controller keeps."""
+    """The limits that a controller enforces."""
 
     TAG = "safety_controller"
     FIELDS = (
@@ -116,7 +116,7 @@ class SafetyController(Object):
 
 
 class Joint(Object):
-    """A joint between two links, by their names."""
+    """A joint between two links, which are given by name."""
 
     TYPES = ["unknown", "revolute", "continuous", "prismatic", "floating", "planar", "fixed"]
     TAG = "joint"
@@ -162,13 +162,13 @@ class Joint(Object):
         self.mimic = mimic
 
     def check_valid(self) -> None:
-        """Raise AssertionError for a type that no joint has."""
+        """Raise AssertionError if the type is unknown."""
         if self.type not in self.TYPES:
             raise AssertionError(f"Invalid joint type: {self.type}")
 
     @property
     def joint_type(self) -> str | None:
-        """``type`` by its old name."""
+        """The former name of ``type``."""
         return self.type
 
     @joint_type.setter
@@ -177,7 +177,7 @@ class Joint(Object):
 
 
 class PR2Transmission(Object):
-    """A transmission of the PR2's."""
+    """A transmission of the PR2."""
 
     TAG = "pr2_transmission"
     FIELDS = (
@@ -226,7 +226,7 @@ class TransmissionJoint(Object):
         self.hardwareInterfaces: list[str] = []
 
     def check_valid(self) -> None:
-        """Raise AssertionError without an interface."""
+        """Raise AssertionError if there is no hardware interface."""
         if not self.hardwareInterfaces:
             raise AssertionError("no hardwareInterface defined")
 
@@ -250,7 +250,7 @@ class Transmission(Object):
         self.actuators: list[Actuator] = []
 
     def check_valid(self) -> None:
-        """Raise AssertionError without a joint or an actuator."""
+        """Raise AssertionError if there is no joint or no actuator."""
         if not self.joints:
             raise AssertionError("no joint defined")
         if not self.actuators:

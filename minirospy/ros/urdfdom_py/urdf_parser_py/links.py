@@ -1,4 +1,4 @@
-"""Links and what is in them, as urdf_parser_py's objects. Source: http://wiki.ros.org/urdf/XML/link."""
+"""The classes of urdf_parser_py for links and their parts. Source: http://wiki.ros.org/urdf/XML/link."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Pose(Object):
         self.rpy = rpy
 
     def check_valid(self) -> None:
-        """Raise AssertionError if the vectors have not three numbers."""
+        """Raise AssertionError if a vector does not have three numbers."""
         if any(vector is not None and len(vector) != 3 for vector in (self.xyz, self.rpy)):
             raise AssertionError
 
     @property
     def rotation(self) -> Sequence[float] | None:
-        """``rpy`` by its old name."""
+        """The former name of ``rpy``."""
         return self.rpy
 
     @rotation.setter
@@ -57,7 +57,7 @@ class Pose(Object):
 
     @property
     def position(self) -> Sequence[float] | None:
-        """``xyz`` by its old name."""
+        """The former name of ``xyz``."""
         return self.xyz
 
     @position.setter
@@ -69,7 +69,7 @@ _ORIGIN = Element("origin", ObjectOf(Pose), False)
 
 
 class Color(Object):
-    """A colour: red, green, blue and opacity from 0 to 1, as four or three numbers or as one list."""
+    """A colour: red, green, blue and opacity from 0 to 1, as three or four numbers or as one list."""
 
     TAG = "color"
     FIELDS = (Attribute("rgba", VectorOf(4)),)
@@ -84,7 +84,7 @@ class Color(Object):
 
 
 class Box(Object):
-    """A box, by its three sides."""
+    """A box, given by its three side lengths."""
 
     TAG = "box"
     FIELDS = (Attribute("size", _VECTOR),)
@@ -94,7 +94,7 @@ class Box(Object):
 
 
 class Cylinder(Object):
-    """A cylinder along z."""
+    """A cylinder along the z axis."""
 
     TAG = "cylinder"
     FIELDS = (Attribute("radius", _NUMBER), Attribute("length", _NUMBER))
@@ -105,7 +105,7 @@ class Cylinder(Object):
 
 
 class Sphere(Object):
-    """A ball."""
+    """A sphere."""
 
     TAG = "sphere"
     FIELDS = (Attribute("radius", _NUMBER),)
@@ -115,7 +115,7 @@ class Sphere(Object):
 
 
 class Mesh(Object):
-    """A shape in a file."""
+    """A shape in a mesh file."""
 
     TAG = "mesh"
     FIELDS = (Attribute("filename", _TEXT), Attribute("scale", _VECTOR, False))
@@ -126,12 +126,12 @@ class Mesh(Object):
 
 
 class GeometricType(Codec[Object]):
-    """The one shape in a ``<geometry>``."""
+    """The single shape in a ``<geometry>``."""
 
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the shape. Raise AssertionError if there is not one."""
+        """Return the shape. Raise AssertionError if there is not exactly one."""
         if len(node) != 1:
             raise AssertionError("One element only for geometric")
         kind = self._KINDS.get(node[0].tag)
@@ -147,7 +147,7 @@ class GeometricType(Codec[Object]):
 
 
 class Collision(Object):
-    """A shape to be collided with."""
+    """A shape for collision checking."""
 
     TAG = "collision"
     FIELDS = (_OPTIONAL_NAME, _ORIGIN, Element("geometry", GeometricType()))
@@ -161,7 +161,7 @@ class Collision(Object):
 
 
 class Texture(Object):
-    """A picture on a shape."""
+    """An image on a shape."""
 
     TAG = "texture"
     FIELDS = (Attribute("filename", _TEXT),)
@@ -171,7 +171,7 @@ class Texture(Object):
 
 
 class Material(Object):
-    """A colour or a texture with a name."""
+    """A named colour or texture."""
 
     TAG = "material"
     FIELDS = (_NAME, Element("color", ObjectOf(Color), False), Element("texture", ObjectOf(Texture), False))
@@ -184,20 +184,20 @@ class Material(Object):
         self.texture = texture
 
     def check_valid(self) -> None:
-        """Report a material without a look."""
+        """Report a material that has neither a colour nor a texture."""
         if self.color is None and self.texture is None:
             report("Material has neither a color nor texture.")
 
 
 class LinkMaterial(Material):
-    """A material of a shape, which may be a name alone."""
+    """The material of a shape, which may be only a name."""
 
     def check_valid(self) -> None:
-        """Accept a name alone."""
+        """Accept a material that is only a name."""
 
 
 class Visual(Object):
-    """A shape to be seen."""
+    """A visible shape."""
 
     TAG = "visual"
     FIELDS = (
@@ -240,7 +240,7 @@ class Inertia(Object):
         self.iyy, self.iyz, self.izz = iyy, iyz, izz
 
     def to_matrix(self) -> list[list[float]]:
-        """Return the symmetric matrix."""
+        """Return the symmetric inertia matrix."""
         return [
             [self.ixx, self.ixy, self.ixz],
             [self.ixy, self.iyy, self.iyz],
@@ -249,7 +249,7 @@ class Inertia(Object):
 
 
 class Inertial(Object):
-    """The mass of a link, and its inertia."""
+    """The mass and inertia of a link."""
 
     TAG = "inertial"
     FIELDS = (
@@ -265,7 +265,7 @@ class Inertial(Object):
 
 
 class Link(Object):
-    """A link; ``visual`` and ``collision`` are the first of its shapes."""
+    """A link; ``visual`` and ``collision`` are the first shape of each kind."""
 
     TAG = "link"
     FIELDS = (
@@ -297,7 +297,7 @@ class Link(Object):
 
     @property
     def visual(self) -> Visual | None:
-        """The first shape to be seen."""
+        """The first visible shape."""
         return self.visuals[0] if self.visuals else None
 
     @visual.setter
@@ -309,7 +309,7 @@ class Link(Object):
 
     @property
     def collision(self) -> Collision | None:
-        """The first shape to be collided with."""
+        """The first shape for collision checking."""
         return self.collisions[0] if self.collisions else None
 
     @collision.setter

@@ -1,4 +1,4 @@
-"""A robot as urdf_parser_py's object, and all that it consists of. Source: http://wiki.ros.org/urdf/XML."""
+"""The class of urdf_parser_py for a robot, with all of its parts. Source: http://wiki.ros.org/urdf/XML."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _NAME = Attribute("name", _TEXT)
 
 
 class _Transmissions(Codec[Object]):
-    """A transmission of either form."""
+    """A transmission in either of its two formats."""
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
         for kind in (Transmission, PR2Transmission):
@@ -80,7 +80,7 @@ class _Transmissions(Codec[Object]):
 
 
 class Robot(Object):
-    """A robot: its parts in lists, and ``joint_map``, ``link_map`` by name.
+    """A robot: its parts as lists, and by name in ``joint_map`` and ``link_map``.
 
     ``parent_map``: link -> (joint, parent link); ``child_map``: link -> [(joint, child link), ...].
     """
@@ -114,7 +114,7 @@ class Robot(Object):
 
     @classmethod
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
-        """Return the robot of a parameter. Raise KeyError if it is not set, and as from_xml_string."""
+        """Return the robot in a parameter. Raise KeyError if it is not set; else raise as from_xml_string does."""
         from minirospy import client as rospy
 
         return cls.from_xml_string(rospy.get_param(key))
@@ -140,7 +140,7 @@ class Robot(Object):
     def get_chain(
         self, root: str, tip: str, joints: bool = True, links: bool = True, fixed: bool = True
     ) -> list[str]:
-        """Return the names from the link ``root`` down to ``tip``, of joints (those that are ``fixed``, too) and links.
+        """Return the names of joints (including ``fixed`` ones) and links from the link ``root`` down to ``tip``.
 
         Raise KeyError if ``tip`` is not below ``root``.
         """
@@ -158,7 +158,7 @@ class Robot(Object):
         return chain[::-1]
 
     def get_root(self) -> str:
-        """Return the one link without a parent. Raise AssertionError if there is not one."""
+        """Return the only link without a parent. Raise AssertionError if there is not exactly one."""
         roots = [name for name in self.link_map if name not in self.parent_map]
         if len(roots) > 1:
             raise AssertionError("Multiple roots detected, invalid URDF.")
@@ -167,7 +167,7 @@ class Robot(Object):
         return roots[0]
 
     def post_read_xml(self) -> None:
-        """Raise ValueError for a version that is not supported."""
+        """Raise ValueError if the version is not supported."""
         if self.version is None:
             self.version = "1.0"
         numbers = self.version.split(".")

@@ -1,7 +1,8 @@
-"""`xacro`: macros of robot descriptions, by the package of the same name, with `$(find PACKAGE)` answered by our packages.
+"""`xacro`: expands the macros of robot descriptions with the Python package xacro.
 
-Its options, texts and exit statuses (2 where a file cannot be processed) are the package's. Options of earlier releases
-that ask for what has become the only behaviour are accepted. Source: http://wiki.ros.org/xacro.
+`$(find PACKAGE)` finds minirospy's packages.
+The options, messages and exit statuses (2 if a file cannot be processed) are that package's. Options of earlier releases
+for behaviour that is now the only one are accepted. Source: http://wiki.ros.org/xacro.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""What has been the only behaviour since ROS Melodic."""
+"""Options that choose the only behaviour since ROS Melodic."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _xacro(words: Sequence[str]) -> int:
-    # The package names xml.parsers in an `except` clause, and relies on another module's import of it.
+    # The package uses xml.parsers in an `except` clause without importing it.
     import xml.parsers.expat  # noqa: F401
 
     try:
@@ -41,12 +42,12 @@ def _xacro(words: Sequence[str]) -> int:
         ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as such.
+        # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as UTF-8.
         sys.stdout.reconfigure(encoding="utf-8")
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`; of a package that is not found, only say that: xacro adds a Python class, and says it twice."""
+        """Evaluate `$(...)`. Shorten the error for a package that is not found: xacro prints it twice, with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:
@@ -57,9 +58,9 @@ def _xacro(words: Sequence[str]) -> int:
     parse = xacro.parse
 
     def checked_parse(inp: object, filename: str | None = None) -> object:
-        """Parse a file or text, after it was checked for what unfolds to gigabytes."""
+        """Parse a file or string after checking that its entities do not expand to gigabytes."""
         if inp is None and filename is not None:
-            # A file that cannot be opened is left to xacro, which has its own error for it.
+            # A file that cannot be opened is left to xacro, which reports it.
             with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
                 inp = file.read()
         if isinstance(inp, str):

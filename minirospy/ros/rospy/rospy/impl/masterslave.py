@@ -1,6 +1,6 @@
-"""rospy.impl.masterslave: the Slave API of this process's node, as an object with a method for each call.
+"""rospy.impl.masterslave: the Slave API of this process's node, as an object with one method per call.
 
-The server itself is ``runtime/node/slave.py``; this answers programs that call its methods within the process.
+The server itself is ``runtime/node/slave.py``; this object is for programs that call the methods within the process.
 Source: http://wiki.ros.org/ROS/Slave_API.
 """
 
@@ -20,7 +20,10 @@ Answer = tuple[int, str, Any]
 
 
 class ROSHandler(XmlRpcHandler):
-    """The Slave API of a node called ``name``: each method takes the caller's name first, and returns (code, text, value)."""
+    """The Slave API of the node ``name``.
+
+    Each method's first argument is the caller's name; it returns (code, status message, value).
+    """
 
     _remap_table = {"requestTopic": [0]}
 
@@ -40,20 +43,20 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getName", args, value=self.name)
 
     def getUri(self, *args: object) -> Answer:
-        """Return the address of the server that this handler was given to; None before."""
+        """Return the URI of the server that uses this handler; None before."""
         return self._call("getUri", args, value=self.uri)
 
     def getMasterUri(self, *args: object) -> Answer:
-        """Return the master's address."""
+        """Return the master's URI."""
         code, _, value = self._call("getMasterUri", args, value=self.masterUri)
         return code, str(value), value
 
     def getPid(self, *args: object) -> Answer:
-        """Return the process number."""
+        """Return the process id."""
         return self._call("getPid", args)
 
     def getBusStats(self, *args: object) -> Answer:
-        """Return transferred bytes and messages."""
+        """Return the transferred bytes and messages."""
         return self._call("getBusStats", args)
 
     def getBusInfo(self, *args: object) -> Answer:
@@ -69,19 +72,19 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getSubscriptions", args)
 
     def paramUpdate(self, *args: object) -> Answer:
-        """Take a parameter's new value."""
+        """Update the cached value of a parameter."""
         return self._call("paramUpdate", args)
 
     def publisherUpdate(self, *args: object) -> Answer:
-        """Take the publishers of a topic."""
+        """Update the publishers of a topic."""
         return self._call("publisherUpdate", args)
 
     def requestTopic(self, *args: object) -> Answer:
-        """Return where a topic of this node is."""
+        """Return the address of a topic of this node."""
         return self._call("requestTopic", args)
 
     def shutdown(self, *args: object) -> Answer:
-        """End the node."""
+        """Shut the node down."""
         return self._call("shutdown", args)
 
     def _ready(self, uri: str) -> None:
@@ -94,7 +97,7 @@ class ROSHandler(XmlRpcHandler):
         self.done = True
 
     def _call(self, method: str, args: tuple[object, ...], **known: object) -> Answer:
-        """Return the answer of the node's own API; with ``value``, of a call that any handler can answer."""
+        """Return the answer of the node's own API; ``value``, if given, replaces the answer's value."""
         session = current_session()
         if session.node is None:
             return -1, "the node has not been initialized", known.get("value", 0)

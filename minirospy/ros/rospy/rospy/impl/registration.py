@@ -1,4 +1,4 @@
-"""The topics and services of this node, as rospy.impl.registration returns them."""
+"""This node's topics and services, in the form of rospy.impl.registration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Registration", "ServiceManager", "TopicManager", "get_service_manage
 
 
 class Registration:
-    """A kind of registration with the master."""
+    """The kinds of registration with the master."""
 
     PUB = "pub"
     SUB = "sub"
@@ -19,7 +19,7 @@ class Registration:
 
 
 class TopicManager:
-    """Lists what this node publishes and subscribes to, and its connections."""
+    """Lists the node's publications, subscriptions and connections."""
 
     def get_publications(self) -> list[list[str]]:
         """Return [topic, type] of each topic that this node publishes."""
@@ -42,11 +42,11 @@ class TopicManager:
         return any(topic == resolved_name for topic, _ in self.get_subscriptions())
 
     def get_pub_sub_info(self) -> list[tuple[object, ...]]:
-        """Return a row for each connection: (id, other end, direction, transport, topic, connected, what)."""
+        """Return a row for each connection: (id, peer, direction, transport, topic, connected, description)."""
         return [tuple(row) for row in self._query("get_bus_info")]
 
     def get_pub_sub_stats(self) -> tuple[list[object], list[object]]:
-        """Return the statistics of publications and of subscriptions, as getBusStats does."""
+        """Return the statistics of publications and of subscriptions, in the format of getBusStats."""
         stats = self._query("get_bus_stats")
         return (stats[0], stats[1]) if stats else ([], [])
 
@@ -67,15 +67,15 @@ class ServiceManager:
         return [(name, service.uri) for name, service in list(current_session().offered.items())]
 
     def get_service(self, resolved_service_name: str) -> Service[object] | None:
-        """Return the service of this name; None if this node does not offer it."""
+        """Return the service of this name; None if this node does not provide it."""
         return current_session().offered.get(resolved_service_name)
 
 
 def get_service_manager() -> ServiceManager:
-    """Return the list of this process's services."""
+    """Return this process's service manager."""
     return ServiceManager()
 
 
 def get_topic_manager() -> TopicManager:
-    """Return the list of this process's topics and connections."""
+    """Return this process's topic manager."""
     return TopicManager()

@@ -1,4 +1,4 @@
-"""rospy.impl.rosout: the handler that publishes log records, and the levels' numbers."""
+"""rospy.impl.rosout: the handler that publishes log records, and the numeric levels."""
 
 from minirospy.base.log_levels import PYTHON_LEVELS
 

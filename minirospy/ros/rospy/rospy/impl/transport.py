@@ -9,7 +9,7 @@ DEFAULT_BUFF_SIZE = 65536
 
 
 def __getattr__(name: str) -> object:
-    # Programs name them in annotations. Imported on use, as asyncio comes with them.
+    # Programs use them in annotations. Imported on use, because they import asyncio.
     if name in ("Transport", "DeadTransport"):
         from minirospy.runtime.transport.links import OutLink
 

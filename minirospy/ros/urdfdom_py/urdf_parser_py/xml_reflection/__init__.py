@@ -1,1 +1,1 @@
-"""urdf_parser_py.xml_reflection: objects that are read from XML and written to it."""
+"""urdf_parser_py.xml_reflection: objects that can be read from XML and written to it."""

@@ -1,6 +1,6 @@
-"""Objects between XML and Python, by a table of what each has: attributes, elements, and lists of elements.
+"""Objects that convert to and from XML, driven by a table of their attributes, elements, and lists of elements.
 
-Errors and their places (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
+Error messages and their paths (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ _V = TypeVar("_V")
 
 
 def on_error_stderr(message: str) -> None:
-    """Print what a description has and a robot does not know."""
+    """Print an error about an unknown or invalid part of a description."""
     sys.stderr.write(message + "\n")
 
 
 on_error: Callable[[str], object] = on_error_stderr
-"""What is done about it: programs replace it, here or in the module that they import."""
+"""The error handler. Programs replace it, here or in the module that they import."""
 
 
 def report(message: str) -> None:
-    """Call what programs have put in the place of on_error."""
+    """Call the program's replacement of on_error, else on_error."""
     module = sys.modules.get("urdf_parser_py.xml_reflection.core")
     replaced = getattr(module, "on_error", on_error_stderr)
     (on_error if replaced is on_error_stderr else replaced)(message)
 
 
 class Path:
-    """Where in a description an element is."""
+    """The path of an element in a description."""
 
     def __init__(self, tag: str, parent: Path | None = None, suffix: str = "") -> None:
         self.tag = tag
@@ -54,7 +54,7 @@ class Path:
 
 
 class ParseError(Exception):
-    """A description does not read: what is wrong (``e``), and where (``path``)."""
+    """A description cannot be read: the error (``e``) and its place (``path``)."""
 
     def __init__(self, e: Exception, path: Path) -> None:
         self.e = e
@@ -63,18 +63,18 @@ class ParseError(Exception):
 
 
 class Codec(Generic[_V]):
-    """Between an element, or an attribute's text, and a value."""
+    """Converts between a value and an element or an attribute's string."""
 
     def from_string(self, text: str) -> _V:
-        """Return the value of a text. Raise ValueError."""
+        """Convert a string to a value. Raise ValueError."""
         raise NotImplementedError
 
     def to_string(self, value: _V) -> str:
-        """Return the text of a value."""
+        """Convert a value to a string."""
         return str(value)
 
     def from_xml(self, node: ET.Element, path: Path) -> _V:
-        """Return the value of an element."""
+        """Convert an element to a value."""
         return self.from_string(node.text or "")
 
     def write_xml(self, node: ET.Element, value: _V) -> None:
@@ -83,10 +83,10 @@ class Codec(Generic[_V]):
 
 
 class Text(Codec[str]):
-    """A text as it is."""
+    """A string, unchanged."""
 
     def from_string(self, text: str) -> str:
-        """Return the text."""
+        """Return the string."""
         return text
 
 
@@ -94,25 +94,25 @@ class Number(Codec[float]):
     """A number."""
 
     def from_string(self, text: str) -> float:
-        """Return the number. Raise ValueError."""
+        """Convert a string to a number. Raise ValueError."""
         return float(text)
 
 
 class VectorOf(Codec[Iterable[float]]):
-    """So many numbers."""
+    """A list of numbers of a fixed length."""
 
     def __init__(self, count: int) -> None:
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Return the numbers. Raise AssertionError if they are too few or too many, ValueError."""
+        """Convert a string to numbers. Raise AssertionError if their count is wrong, ValueError if one is invalid."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
         return [float(word) for word in words]
 
     def to_string(self, value: Iterable[float]) -> str:
-        """Return the numbers with blanks between them."""
+        """Return the numbers separated by spaces."""
         words = [str(number) for number in value]
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
@@ -139,7 +139,7 @@ class NamedAttribute(Codec[_V]):
 
 
 class Raw(Codec[ET.Element]):
-    """An element as it is."""
+    """An element, unchanged."""
 
     def from_xml(self, node: ET.Element, path: Path) -> ET.Element:
         """Return the element."""
@@ -153,7 +153,7 @@ class Raw(Codec[ET.Element]):
 
 
 class ObjectOf(Codec["Object"]):
-    """An element that is an object of a class."""
+    """An element that is represented by an object of a class."""
 
     def __init__(self, kind: type[Object]) -> None:
         self.kind = kind
@@ -171,7 +171,7 @@ class ObjectOf(Codec["Object"]):
 
 @dataclass(frozen=True)
 class Attribute:
-    """An attribute of an element, and of its object."""
+    """An attribute of an element, stored as an attribute of its object."""
 
     name: str
     codec: Codec[Any]
@@ -182,7 +182,7 @@ class Attribute:
 
 @dataclass(frozen=True)
 class Element:
-    """An element in an element, at most once."""
+    """A child element that occurs at most once."""
 
     name: str
     codec: Codec[Any]
@@ -193,14 +193,14 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Elements in an element, any number of them: a list of the object's, called ``name`` + s."""
+    """Child elements that occur any number of times, stored as a list in the attribute that is called ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
 
 
 class Object:
-    """An element as an object: ``TAG`` is its tag, ``FIELDS`` what it has."""
+    """An element as an object: ``TAG`` is its tag, ``FIELDS`` describes its attributes and children."""
 
     TAG: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[Attribute | Element | Many, ...]] = ()
@@ -209,23 +209,23 @@ class Object:
 
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
-        """Return the object of an XML text. Raise ParseError, xml.etree.ElementTree.ParseError."""
+        """Return the object from an XML string. Raise ParseError, xml.etree.ElementTree.ParseError."""
         return cls.from_xml(_root(xml_string), Path(cls.TAG))
 
     @classmethod
     def from_xml_file(cls: type[_T], file_path: str) -> _T:
-        """Return the object of a file. Raise as from_xml_string, and OSError."""
+        """Return the object from a file. Raise OSError; else raise as from_xml_string does."""
         return cls.from_xml_string(File(file_path).read_bytes())
 
     @classmethod
     def from_xml(cls: type[_T], node: ET.Element, path: Path) -> _T:
-        """Return the object of an element. Raise ParseError."""
+        """Return the object from an element. Raise ParseError."""
         found = cls()
         found.read_xml(node, path)
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML text into this object, and return it. Raise as from_xml_string."""
+        """Read an XML string into this object; return the object. Raise as from_xml_string does."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
@@ -291,13 +291,13 @@ class Object:
         setattr(self, field.name, [*default] if isinstance(default, list) else default)
 
     def post_read_xml(self) -> None:
-        """Do what follows the reading; classes of programs override it."""
+        """Do nothing; programs' classes override it to react after reading."""
 
     def check_valid(self) -> None:
-        """Raise an exception where the object is wrong."""
+        """Raise an exception if the object is invalid."""
 
     def pre_write_xml(self) -> None:
-        """Do what precedes the writing; classes of programs override it."""
+        """Do nothing; programs' classes override it to prepare for writing."""
 
     # --- XML out
 
@@ -308,11 +308,11 @@ class Object:
         return node
 
     def to_xml_string(self, addHeader: bool = True) -> str:
-        """Return the object as XML, indented."""
+        """Return the object as an indented XML string."""
         return xml_string(self.to_xml(), addHeader)
 
     def write_xml(self, node: ET.Element) -> None:
-        """Write the object into an element. Raise an exception where a required part is None."""
+        """Write the object into an element. Raise an exception if a required part is None."""
         self.check_valid()
         self.pre_write_xml()
 
@@ -337,17 +337,17 @@ class Object:
     # --- lists of elements, in the order in which they were added
 
     def aggregate_init(self) -> None:
-        """Start without elements in lists."""
+        """Reset the lists of elements."""
         self.aggregate_order: list[object] = []
         self.aggregate_type: dict[object, str] = {}
 
     def get_aggregate_list(self, xml_var: str) -> list[object]:
-        """Return the list of the elements of a tag."""
+        """Return the list of elements with this tag."""
         found: list[object] = getattr(self, f"{xml_var}s")
         return found
 
     def add_aggregate(self, xml_var: str, obj: object) -> None:
-        """Add an element of a tag."""
+        """Add an element with this tag."""
         self.get_aggregate_list(xml_var).append(obj)
         self.aggregate_order.append(obj)
         self.aggregate_type[obj] = xml_var
@@ -358,7 +358,7 @@ class Object:
         self.get_aggregate_list(self.aggregate_type.pop(obj)).remove(obj)
 
     def lump_aggregates(self) -> None:
-        """Put the elements of each tag together."""
+        """Group the elements by tag."""
         self.aggregate_init()
         for field in self.FIELDS:
             if isinstance(field, Many):
@@ -372,7 +372,7 @@ class Object:
     # --- for people
 
     def to_yaml(self) -> object:
-        """Return the object as what YAML has."""
+        """Return the object as data that YAML can represent."""
         names = [f"{each.name}s" if isinstance(each, Many) else each.name for each in self.FIELDS]
         return to_yaml({name: getattr(self, name) for name in names})
 
@@ -383,7 +383,7 @@ class Object:
 
 
 def to_yaml(obj: object) -> object:
-    """Return a value as what YAML has."""
+    """Return a value as data that YAML can represent."""
     if isinstance(obj, bool | int | float):
         return obj
     if isinstance(obj, Object):
@@ -406,7 +406,7 @@ def _root(xml_string: str | bytes) -> ET.Element:
 
 
 def xml_string(rootXml: ET.Element, addHeader: bool = True) -> str:
-    """Return an element as XML, indented, without blank lines."""
+    """Return an element as an indented XML string, without blank lines."""
     lines = minidom.parseString(ET.tostring(rootXml)).toprettyxml(indent="  ").split("\n")
     if lines[0].startswith("<?xml") and not addHeader:
         del lines[0]
