@@ -42,10 +42,9 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def mergeSummary(self, level: int, message: str, /) -> None: ...
 
     def mergeSummary(self, *args: object) -> None:
-        """Merge a summary: use the higher level; join the messages if both are OK or neither is, else keep the one that is
-        not OK.
+        """Merge a level and a message; the arguments are those of ``summary``.
 
-        The arguments are those of ``summary``.
+        The higher level is used. The messages are joined if both are OK or neither is, else the one that is not OK is used.
         """
         level, message = _summary_of(args)
         if (level > OK) == (self.level > OK):
