@@ -44,7 +44,7 @@ _TOO_LATE = (
 )
 _FEW_STATUSES = 50  # up to this many statuses are published immediately at each change
 
-# If there are more: pause after a list, per status in it. Publishing them must not use all the server's time.
+# Pause after a longer list, per status in it: publishing lists must not use all the server's time.
 _SECONDS_A_STATUS = 1e-4
 
 

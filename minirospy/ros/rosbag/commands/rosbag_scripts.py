@@ -31,7 +31,10 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def _copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> _Script:
-    """Return a program that copies a bag, changing its connections. The bags are words 2 and 4 of four, else words 1 and 2."""
+    """Return a program that copies a bag and changes its connections.
+
+    Source and target are its second and fourth argument if it has four, else its first and second.
+    """
 
     def script(words: list[str]) -> int:
         from minirospy.introspect.bags import copy_bag

@@ -182,7 +182,7 @@ class MessageUpdateRule:
 
 
 def clean_name(name: str, top_name: str) -> str:
-    """Return a type's name without the package if that is std_msgs, or the package of the enclosing message ``top_name``."""
+    """Remove the package from a type's name if it is std_msgs, or that of the enclosing message ``top_name``."""
     parts = name.split("/")
     for package in ("std_msgs", top_name.split("/", maxsplit=1)[0]):
         if package in parts:

@@ -388,7 +388,7 @@ class Bag(OpenedBag):
         """Create ``_reader``, which programs use to access the bag's internals; a subclass may set another one."""
         self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
-    # -- inside ---------------------------------------------------------------------------------------------------
+    # -- internal -------------------------------------------------------------------------------------------------
 
     def _read(
         self,
