@@ -1,6 +1,6 @@
-"""Modules that programs import and minirospy does not have: importing one raises ImportError with what to do.
+"""Modules that programs import but minirospy does not provide: importing one raises ImportError with advice.
 
-The names and the texts are in `workspace/elsewhere.py`. The real module, where it is installed, comes first.
+The names and the messages are in `workspace/elsewhere.py`. If the real module is installed, it takes precedence.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ __all__: list[str] = []
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise ImportError for a module of the tables (``pkg_sub`` is ``pkg.sub``), AttributeError for any other name."""
+    """Raise ImportError for a module in the tables (``pkg_sub`` is ``pkg.sub``), AttributeError for any other name."""
     if name in IMPORTED:
         raise ImportError(f"No module named '{name}': {advice(name)}", name=name)
     submodule = name.replace("_", ".", 1)

@@ -1,4 +1,4 @@
-"""The functions that rosgraph.names and rospy.names share.
+"""The functions shared by rosgraph.names and rospy.names.
 
 Source: http://wiki.ros.org/Names and the behaviour of rosgraph.names, also for None and other types.
 """
@@ -27,17 +27,17 @@ def isstring(s: object) -> bool:
 
 
 def is_global(name: str | None) -> bool | str | None:
-    """Return whether a name starts at the root; None and an empty name as they are."""
+    """Return whether a name is global (starts with ``/``); return None and an empty name unchanged."""
     return name and name[0] == SEP
 
 
 def is_private(name: str | None) -> bool | str | None:
-    """Return whether a name starts with ``~``; None and an empty name as they are."""
+    """Return whether a name is private (starts with ``~``); return None and an empty name unchanged."""
     return name and name[0] == PRIV_NAME
 
 
 def namespace(name: str) -> str:
-    """Return the namespace of a name, with a trailing slash. Raise ValueError on None, TypeError on another type."""
+    """Return the namespace of a name, with a trailing slash. Raise ValueError for None, TypeError for another type."""
     if name is None:
         raise ValueError("name")
     if not isinstance(name, str):
@@ -46,31 +46,31 @@ def namespace(name: str) -> str:
 
 
 def ns_join(ns: str | None, name: str) -> str:
-    """Return a name below a namespace; global and private names stay what they are."""
+    """Join a namespace and a name; return global and private names unchanged."""
     if is_private(name) or is_global(name) or not ns:
         return name
     return ns + name if ns == PRIV_NAME or ns[-1] == SEP else ns + SEP + name
 
 
 def canonicalize_name(name: str) -> str:
-    """Return a name without doubled or trailing slashes; None and an empty name as they are."""
+    """Return a name without doubled or trailing slashes; return None and an empty name unchanged."""
     return names.canonicalize(name)
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
-    """Return the remappings in a command line, as they are spelled, without private parameters."""
+    """Return the remappings on a command line, unresolved, without private parameters."""
     arguments = names.parse_arguments(argv)
     return {**arguments.remappings, **arguments.special}
 
 
 def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the namespace of the command line (``__ns:=``), else of the environment, with slashes around it."""
+    """Return the namespace from the command line (``__ns:=``), else from the environment, with slashes at both ends."""
     named = names.parse_arguments(sys.argv if argv is None else argv).special.get("__ns")
     return make_global_ns(named or (os.environ if env is None else env).get("ROS_NAMESPACE") or GLOBALNS)
 
 
 def make_global_ns(name: str) -> str:
-    """Return a name as a namespace, with a slash on both ends. Raise ValueError on a private one."""
+    """Return a name as a global namespace, with slashes at both ends. Raise ValueError for a private name."""
     if is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
     name = name if is_global(name) else SEP + name

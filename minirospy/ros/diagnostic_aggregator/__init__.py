@@ -1,1 +1,4 @@
-"""diagnostic_aggregator: its programs, which sort what nodes report into one tree. Source: http://wiki.ros.org/diagnostic_aggregator."""
+"""The programs of diagnostic_aggregator, which sort statuses from nodes into a tree.
+
+Source: http://wiki.ros.org/diagnostic_aggregator.
+"""

@@ -1,4 +1,4 @@
-"""The program add_analyzers: adds analyzers to the aggregator for as long as it runs.
+"""The program add_analyzers: adds analyzers to the aggregator while it runs.
 
 Source: http://wiki.ros.org/diagnostic_aggregator/Tutorials/Adding%20analyzers%20at%20runtime.
 """

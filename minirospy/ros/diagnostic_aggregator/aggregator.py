@@ -1,7 +1,7 @@
-"""The node aggregator_node: /diagnostics -> /diagnostics_agg, /diagnostics_toplevel_state; nodes may add analyzers.
+"""The node aggregator_node: sorts /diagnostics into /diagnostics_agg and /diagnostics_toplevel_state.
 
-Parameters: ~base_path, ~pub_rate (1 Hz), ~other_as_errors, ~path, ~analyzers.
-Service: /diagnostics_agg/add_diagnostics. Source: http://wiki.ros.org/diagnostic_aggregator.
+Parameters: ~base_path, ~pub_rate (1 Hz), ~other_as_errors, ~path, ~analyzers. Other nodes add analyzers with the service
+/diagnostics_agg/add_diagnostics. Source: http://wiki.ros.org/diagnostic_aggregator.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Aggregator", "RosLog", "analyzer_loader", "load_group", "main", "top
 
 
 class RosLog:
-    """Reports faults of analyzers as log messages of the node."""
+    """Logs the analyzers' warnings and errors as messages of the node."""
 
     def warn(self, text: str) -> None:
         """Log a warning."""
@@ -51,9 +51,9 @@ def main() -> int:
 
 
 def analyzer_loader() -> int:
-    """Return 0 if all analyzers of the private parameters can be made, and 1 where they cannot.
+    """Return 0 if all analyzers in the private parameters can be created, else 1.
 
-    A test program: `<test pkg="diagnostic_aggregator" type="analyzer_loader">` in a launch file with the parameters.
+    This is a test program: `<test pkg="diagnostic_aggregator" type="analyzer_loader">` in a launch file with the parameters.
     """
     import unittest
 
@@ -63,7 +63,7 @@ def analyzer_loader() -> int:
 
     class AnalyzerLoader(unittest.TestCase):
         def runTest(self) -> None:
-            """Make the analyzers, and let them report."""
+            """Create the analyzers and get their report."""
             group = load_group("", "~")
             assert group.is_complete, "Analyzer group failed to initialize: see its log messages"
             assert group.report(rospy.get_time())
@@ -73,7 +73,7 @@ def analyzer_loader() -> int:
 
 
 def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
-    """Return the analyzers of the parameters of a namespace; what is wrong with them is logged."""
+    """Create the analyzers from the parameters in a namespace; errors are logged."""
     params = rospy.get_param(namespace, {})
     if not isinstance(params, dict):
         params = {}
@@ -81,14 +81,14 @@ def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
 
 
 def toplevel_level(levels: Iterable[int]) -> int:
-    """Return the level of the whole tree: stale only if all of it is; -1 of nothing."""
+    """Return the level of the whole tree: stale only if all levels are; -1 if there are none."""
     found = list(levels)
     highest = max(found, default=-1)
     return 2 if highest > 2 and min(found) <= 2 else highest
 
 
 class Aggregator:
-    """The tree of analyzers, and its topics."""
+    """The tree of analyzers, and the node's topics."""
 
     def __init__(self) -> None:
         base_path = str(rospy.get_param("~base_path", ""))
@@ -139,7 +139,7 @@ class Aggregator:
             self._warned.add(names)
 
     def _add(self, request: AddDiagnosticsRequest) -> AddDiagnosticsResponse:
-        """Make analyzers of another namespace, which are used while the bond with its node holds."""
+        """Create analyzers from another namespace; they are used until the bond with the requesting node breaks."""
         namespace: str = request.load_namespace
         if not namespace.startswith("/"):
             return AddDiagnosticsResponse(
@@ -151,7 +151,8 @@ class Aggregator:
                 return AddDiagnosticsResponse(
                     False, f"Requested load from namespace {namespace} which is already in use"
                 )
-            # A topic for each: heartbeats of several bonds would push each other out of the queue.
+            # One topic per bond: with a shared one, heartbeats of different bonds would displace each other in the
+            # queue.
             bond = self._bonds[namespace] = Bond(f"/diagnostics_agg/bond{namespace}", namespace)
 
         group = load_group(self._base_path, namespace)

@@ -1,6 +1,6 @@
-"""Analyzers: which statuses they take, and what they make of them. Pure: times are seconds that the caller gives.
+"""Analyzers: which statuses they accept, and what they report. Pure: times are arguments, in seconds.
 
-A tree of analyzers is made of parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and what its program publishes.
+A tree of analyzers is built from parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and the output of its program.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ Params = Mapping[str, Any]
 
 
 class Log(Protocol):
-    """Where analyzers report faults of their parameters."""
+    """Receives the analyzers' warnings and errors about parameters and statuses."""
 
     def warn(self, text: str) -> None:
-        """Report what is outdated."""
+        """Report a problem that can be ignored."""
 
     def error(self, text: str) -> None:
-        """Report what is wrong."""
+        """Report an error."""
 
 
 @dataclass
 class Item:
-    """A status as it was reported, and when."""
+    """A received status, and when it was received."""
 
     name: str
     time: float
@@ -45,7 +45,7 @@ class Item:
 
     @classmethod
     def of(cls, status: DiagnosticStatus, now: float, log: Log) -> Item:
-        """Return the item of a status; a level that is none is an error, and reported."""
+        """Create an item from a status; an invalid level is reported and becomes ERROR."""
         level = status.level
         if level not in _MESSAGES:
             log.error(
@@ -55,7 +55,7 @@ class Item:
         return cls(status.name, now, level, status.message, status.hardware_id, list(status.values))
 
     def status(self, path: str, is_stale: bool) -> DiagnosticStatus:
-        """Return the status at its place in the tree."""
+        """Return the status for the tree, named with its path."""
         return DiagnosticStatus(
             level=STALE if is_stale else self.level,
             name=f"{path.rstrip('/')}/{_shown(self.name)}",
@@ -66,23 +66,23 @@ class Item:
 
 
 class Analyzer(Protocol):
-    """A part of the tree."""
+    """A node of the tree."""
 
     path: str
     name: str
 
     def match(self, name: str) -> bool:
-        """Return whether it takes statuses of a name."""
+        """Return whether the analyzer accepts statuses with this name."""
 
     def analyze(self, item: Item) -> bool:
-        """Take a status; return whether it did."""
+        """Process a status; return whether the analyzer accepted it."""
 
     def report(self, now: float) -> list[DiagnosticStatus]:
-        """Return its part of the tree."""
+        """Return the statuses of this part of the tree."""
 
 
 class _Items:
-    """The items of one analyzer, below a header."""
+    """The items of one analyzer, with a header status."""
 
     def __init__(
         self, path: str, name: str, timeout: float, num_items: int = -1, discard_stale: bool = False
@@ -101,7 +101,7 @@ class _Items:
         return True
 
     def report(self, now: float) -> list[DiagnosticStatus]:
-        """Return the header, and a status for each item, by name."""
+        """Return the header, then a status per item, sorted by name."""
         old = {name for name, item in self._items.items() if 0 < self._timeout < now - item.time}
         if self._discard_stale:
             self._items = {name: item for name, item in self._items.items() if name not in old}
@@ -116,7 +116,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # A header without items goes, too, once it has been stale for long enough.
+        # Also omit an empty header after it has been stale for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -134,10 +134,10 @@ class _Items:
 
 
 class GenericAnalyzer(_Items):
-    """Takes statuses by name. Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ..."""
+    """Accepts statuses by name. Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ..."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Raise ValueError, which has been reported, where the parameters say nothing that can be done."""
+        """Raise ValueError if the parameters do not define an analyzer; the error has then been reported."""
         path = params.get("path")
         if not isinstance(path, str):
             raise _fault(log, f'GenericAnalyzer was not given parameter "path". Namepspace: {namespace}')
@@ -146,7 +146,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # As in ROS, one adds to the other.
+        # Both parameters apply, as in ROS.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")
@@ -204,14 +204,14 @@ class GenericAnalyzer(_Items):
 
 
 class DiscardAnalyzer(GenericAnalyzer):
-    """Takes statuses as GenericAnalyzer does, and reports nothing."""
+    """Accepts statuses like GenericAnalyzer, but reports nothing."""
 
     def report(self, now: float) -> list[DiagnosticStatus]:
         return []
 
 
 class IgnoreAnalyzer:
-    """Takes nothing, and reports nothing: it switches a part of the parameters off."""
+    """Accepts and reports nothing; used to disable a part of the parameters."""
 
     path = name = ""
 
@@ -229,7 +229,7 @@ class IgnoreAnalyzer:
 
 
 class OtherAnalyzer(_Items):
-    """Takes what no other analyzer takes, and reports it for some seconds."""
+    """Accepts the statuses that no other analyzer accepts, and reports them until they are stale."""
 
     def __init__(self, base_path: str, as_errors: bool) -> None:
         super().__init__(f"{base_path}/Other", "Other", _TIMEOUT, discard_stale=True)
@@ -245,10 +245,10 @@ class OtherAnalyzer(_Items):
 
 
 class AnalyzerGroup:
-    """Analyzers below a header. Parameters: path, analyzers (a namespace for each, with its type)."""
+    """A group of analyzers with a header. Parameters: path, analyzers (a namespace per analyzer, with its type)."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Make the analyzers; ``is_complete`` says whether all of them could be made. What is wrong is reported."""
+        """Create the analyzers, reporting errors; ``is_complete`` is False if one of them cannot be created."""
         path = params.get("path")
         self.name = path if isinstance(path, str) else ""
         full = f"{base_path}/{self.name}" if self.name and base_path not in ("", "/") else base_path
@@ -351,11 +351,11 @@ _TYPES: dict[str, Callable[[str, Params, str, float, Log], Analyzer]] = {
 
 
 def strip_prefix(name: str, prefix: str) -> str:
-    """Return a name whose last part does not start with a prefix, nor with the colon and the spaces after it."""
+    """Return a name without ``prefix`` at the start of its last part, and without the colon and spaces after it."""
     if not prefix:
         return name
     at = name.rfind("/") + 1
-    # As in ROS: where the prefix is found earlier in the name, too, it stays.
+    # As in ROS, keep the prefix if it also occurs earlier in the name.
     if name.find(prefix) == at:
         name = name[:at] + name[at + len(prefix) :]
     if at and name[at:].startswith(":"):
@@ -378,7 +378,7 @@ def _number(value: object, default: float) -> float:
 
 
 def _words(value: object, log: Log) -> list[str]:
-    """Return a parameter that is a text or a list of texts; what is neither is reported, and no text."""
+    """Return a parameter that is a string or a list of strings as a list; otherwise report an error and return []."""
     if isinstance(value, str):
         return [value]
     if not isinstance(value, list):

@@ -1,7 +1,7 @@
-"""Images to compressed images and back, as the transports compressed and compressedDepth have them. Pure.
+"""Encoding and decoding of images for the transports compressed and compressedDepth. Pure.
 
-A CompressedImage's format says what it was made of: ``rgb8; jpeg compressed bgr8``. compressedDepth has 12 bytes before its
-PNG: a number for the kind, and two floats by which 32 bit depths become 16 bit: inverse = A / depth + B.
+A CompressedImage's format names the original encoding: ``rgb8; jpeg compressed bgr8``. compressedDepth has 12 bytes before
+its PNG: an enum, and the two floats that convert 32-bit depths to 16 bits: inverse = A / depth + B.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _BRIDGE = CvBridge()
 
 
 class CodecError(ValueError):
-    """An image that a transport cannot take, or bytes that are not one."""
+    """A transport does not support an image, or bytes are not an image."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The parameters of the transports, with ROS's defaults; ``png_level`` of None is that of the transport."""
+    """The parameters of the transports, with ROS's defaults; ``png_level`` None means the transport's default."""
 
     format: str = "jpeg"
     jpeg_quality: int = 80
@@ -51,7 +51,7 @@ class Settings:
 
 
 def compressed(image: Image, settings: Settings) -> CompressedImage:
-    """Return an image as JPEG or PNG. Raise CodecError (another format, an encoding of other than 8 or 16 bits)."""
+    """Encode an image as JPEG or PNG. Raise CodecError for another format, or an encoding without 8 or 16 bits per channel."""
     kind = settings.format
     if kind not in ("jpeg", "png"):
         raise CodecError(f"Unknown compression type '{kind}', valid options are 'jpeg' and 'png'")
@@ -65,7 +65,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
     target = (f"bgr{8 if kind == 'jpeg' else bits}") if image.encoding in _COLORS else ""
     pixels = _pixels(image, target or "passthrough")
     if kind == "jpeg" and bits == 16 and not target:
-        # What OpenCV does to 16 bits that a format cannot hold.
+        # Clip 16-bit values that JPEG cannot store, as OpenCV does.
         pixels = pixels.clip(0, 255).astype("uint8")
     options = Options(
         settings.jpeg_quality,
@@ -79,7 +79,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Return the image of a compressed one, in the encoding that its format names. Raise CodecError."""
+    """Decode a compressed image to the encoding named in its format. Raise CodecError."""
     pixels = _decoded(bytes(message.data))
     encoding, semicolon, rest = message.format.partition(";")
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
@@ -87,7 +87,7 @@ def uncompressed(message: CompressedImage) -> Image:
         kinds = {1: "mono8", 3: "bgr8", 4: "bgra8"}
         encoding = kinds[channels] if pixels.dtype == "uint8" else f"16UC{channels}"
     elif encoding in _COLORS and channels in (3, 4):
-        # OpenCV's decoder gives the file's red, green and blue as BGR; a format without "bgr" had them exchanged.
+        # OpenCV decodes red, green and blue to BGR; if the format lacks "bgr", the encoder had swapped red and blue.
         bits = "16" if pixels.dtype == "uint16" else "8"
         order = "bgr" if "compressed bgr" in rest else "rgb"
         pixels = _converted(pixels, order + ("a" if channels == 4 else "") + bits, encoding)
@@ -97,7 +97,7 @@ def uncompressed(message: CompressedImage) -> Image:
 
 
 def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
-    """Return a depth image as PNG: 16 bits without loss, 32 bit floats as inverse depths. Raise CodecError."""
+    """Encode a depth image as PNG: 16 bits losslessly, 32-bit floats as inverse depths. Raise CodecError."""
     import numpy as np
 
     depth, channels = _type_of(image.encoding)
@@ -113,7 +113,7 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
         b = 1.0 - a / settings.depth_max
         with np.errstate(all="ignore"):
             inverse = np.clip(np.nan_to_num(np.float32(a) / pixels + np.float32(b)), 0, 65535)
-            # A NaN, and what is too far away, is 0.
+            # NaN, and depths beyond the maximum, become 0.
             pixels = np.where(pixels < settings.depth_max, inverse, 0).astype(np.uint16)
     elif depth == "int32":
         raise CodecError(f"depths are 32 bit floats or 16 bit integers, not {image.encoding}")
@@ -128,7 +128,7 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed_depth(message: CompressedImage) -> Image:
-    """Return the depth image of a compressed one; where there was no depth, 0 or NaN. Raise CodecError."""
+    """Decode a compressed depth image; missing depths are 0 or NaN. Raise CodecError."""
     import numpy as np
 
     encoding, _, rest = message.format.partition(";")

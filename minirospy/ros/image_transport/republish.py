@@ -1,9 +1,9 @@
-"""republish: images from one transport to another. Source: http://wiki.ros.org/image_transport (republish).
+"""republish: republishes images with another transport. Source: http://wiki.ros.org/image_transport (republish).
 
     republish IN_TRANSPORT in:=IN_BASE_TOPIC [OUT_TRANSPORT] out:=OUT_BASE_TOPIC
 
-Without OUT_TRANSPORT the image is published by each of them: raw on the base topic, the others below it. Parameters are those
-of the plug-ins, below the output's topic (``OUT/compressed/jpeg_quality``) or private (``~compressed/jpeg_quality``).
+Without OUT_TRANSPORT the image is published with all transports: raw on the base topic, the others below it. Parameters are
+those of the plug-ins, below the output topic (``OUT/compressed/jpeg_quality``) or private (``~compressed/jpeg_quality``).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _NUMBERS = {
     "depth_max": (1, 100),
     "depth_quantization": (1, 150),
 }
-"""The limits of the plug-ins' parameters."""
+"""The limits of the plug-ins' numeric parameters."""
 _KINDS = {"format": str, "jpeg_progressive": bool, "jpeg_optimize": bool}
 
 Encode: TypeAlias = Callable[[Image, Settings], CompressedImage]
@@ -78,7 +78,7 @@ def main() -> int:
 
 
 def _warn_without_library() -> None:
-    """Log what to install where no library is there: without a subscriber nothing else would show it."""
+    """Warn if the image library is missing: without a subscriber no image is encoded, so no other message would tell."""
     try:
         require_library()
     except ValueError as error:
@@ -86,7 +86,7 @@ def _warn_without_library() -> None:
 
 
 def list_main() -> int:
-    """Print the transports, as the program list_transports; return its exit status."""
+    """Print the transports like the program list_transports; return its exit status."""
     print("Declared transports:")
     for name in _TRANSPORTS:
         print(f"image_transport/{name}")
@@ -97,7 +97,7 @@ def list_main() -> int:
 
 
 class Republisher:
-    """Passes images on, in one or more transports; what nobody subscribes to is not encoded."""
+    """Republishes images with one or more transports; images are encoded only for transports with subscribers."""
 
     def __init__(self, source: str, source_kind: str, target: str, kinds: Sequence[str]) -> None:
         self._kind = source_kind
@@ -138,7 +138,7 @@ class Republisher:
         made: Image | CompressedImage = image
         if kind != "raw":
             made = _ENCODERS[kind](image, self._settings(kind))
-        # As bytes, which keep the sequence number that the image came with.
+        # Publish serialized bytes, which keep the sequence number of the received image.
         buffer = BytesIO()
         made.serialize(buffer)
         passed = AnyMsg()
@@ -155,7 +155,7 @@ class Republisher:
 
 
 def settings_of(values: Mapping[str, object]) -> Settings:
-    """Return the settings of parameters; those out of their limits are clamped. Raise CodecError for another type."""
+    """Return the settings from parameters, clamped to their limits. Raise CodecError for a parameter of a wrong type."""
     chosen: dict[str, object] = {}
     for name, value in values.items():
         if name in _NUMBERS:
@@ -180,7 +180,7 @@ def _class_of(kind: str) -> type[Image] | type[CompressedImage]:
 
 
 def _bytes_of(cls: type[Image] | type[CompressedImage]) -> type[AnyMsg]:
-    """Return a class for messages of that type that stay bytes."""
+    """Return a message class of that type whose messages stay serialized."""
     fields = {"_type": cls._type, "_md5sum": cls._md5sum, "_full_text": cls._full_text, "__slots__": []}
     return type("PassedImage", (AnyMsg,), fields)
 

@@ -1,9 +1,10 @@
-"""Hands to velocities: joysticks, keys, and what makes Twists of them.
+"""Teleoperation: joysticks and keyboards, and the nodes that convert their input to Twist messages.
 
 Source: http://wiki.ros.org/joy, http://wiki.ros.org/teleop_twist_joy, http://wiki.ros.org/teleop_twist_keyboard.
 """
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
+# These modules import ROS 1 messages; in an environment with ROS 2 sourced, its packages of the same names come
+# first.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""Joysticks of this machine: Linux's /dev/input/js*, by its own protocol; elsewhere by pygame-ce.
+"""Joysticks of this machine: on Linux through /dev/input/js* and its protocol, elsewhere through pygame-ce.
 
 Source of the protocol: https://www.kernel.org/doc/html/latest/input/joydev/joystick-api.html.
 """
@@ -41,28 +41,28 @@ _POLL_SECONDS = 0.002
 
 
 class DeviceError(MinirospyError):
-    """A joystick cannot be opened, or is disconnected: one line with the reason."""
+    """A joystick cannot be opened, or was disconnected; the message is one line with the reason."""
 
 
 class Device(Protocol):
-    """A joystick that is open."""
+    """An open joystick."""
 
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
+        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
 
     def close(self) -> None:
-        """Close it."""
+        """Close the device."""
 
 
 def open_device(path: str, feedback_path: str = "") -> Device:
-    """Open a joystick by its path; elsewhere than on Linux the path's number counts. Raise DeviceError.
+    """Open a joystick by its path; on systems other than Linux, only the number in the path is used. Raise DeviceError.
 
-    ``feedback_path``: Linux's device of its motors, where that is not the one which belongs to the joystick.
+    ``feedback_path``: on Linux the event device of the motors, if it is not the one that belongs to the joystick.
     """
     if sys.platform == "linux" or os.path.exists(path):
         return LinuxDevice(path, feedback_path)
@@ -71,13 +71,13 @@ def open_device(path: str, feedback_path: str = "") -> Device:
 
 
 class LinuxDevice:
-    """A joystick of Linux: a file that events are read from, each eight bytes."""
+    """A joystick on Linux: a device file that returns eight bytes per event."""
 
     def __init__(self, path: str, feedback_path: str = "") -> None:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events are the state; that of the first time it is opened may be the one when it was closed last.
+            # The first events report the state, but after the first open() it may be the state at the last close().
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -86,7 +86,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
+        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -106,7 +106,7 @@ class LinuxDevice:
         return Event(kind, number, value)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
         if self._motors is None:
             if not self._feedback_path:
                 raise RumbleError(
@@ -116,7 +116,7 @@ class LinuxDevice:
         self._motors.play(strong, weak)
 
     def close(self) -> None:
-        """Close it."""
+        """Close the device."""
         os.close(self._file)
         if self._motors is not None:
             self._motors.close()
@@ -124,7 +124,7 @@ class LinuxDevice:
 
 
 def _name_of(file: int) -> str:
-    """Return a joystick's name, as the kernel has it (JSIOCGNAME)."""
+    """Return a joystick's name as reported by the kernel (JSIOCGNAME)."""
     if sys.platform == "win32":
         return _UNKNOWN
     import fcntl
@@ -138,7 +138,7 @@ def _name_of(file: int) -> str:
 
 
 def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
-    """Yield name and path of each joystick of Linux."""
+    """Yield the name and path of each joystick on Linux."""
     for path in sorted(folder.glob("js*")):
         try:
             if not stat.S_ISCHR(path.stat().st_mode):
@@ -153,7 +153,7 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick of SDL; its hats are axes behind the others, as on Linux. Raise DeviceError."""
+    """A joystick of SDL; its hats are additional axes after the others, as on Linux. Raise DeviceError."""
 
     def __init__(self, number: int) -> None:
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
@@ -167,7 +167,7 @@ class PygameDevice:
             ) from None
         self._pygame: Any = pygame
         pygame.init()
-        # One that was plugged in later is known after this.
+        # Initialize again to find a joystick that was plugged in since.
         pygame.joystick.quit()
         pygame.joystick.init()
         count = pygame.joystick.get_count()
@@ -179,7 +179,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if none has come within that time. Raise DeviceError if it is disconnected."""
+        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()
@@ -196,7 +196,7 @@ class PygameDevice:
         return self._events.pop(0)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
         if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
             raise RumbleError("the joystick has no motors that SDL knows")
 
@@ -217,7 +217,7 @@ class PygameDevice:
         ]
 
     def close(self) -> None:
-        """Close it."""
+        """Close the device."""
         with contextlib.suppress(self._pygame.error):
             self._joystick.quit()
 
@@ -225,7 +225,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events between two states; those of a first state are initial ones."""
+    """Return the events that lead from one state to the next; initial events if ``before`` is empty."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

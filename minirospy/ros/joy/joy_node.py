@@ -1,8 +1,9 @@
-"""joy_node: a joystick -> `joy` (sensor_msgs/Joy), and its state on /diagnostics.
+"""joy_node: publishes a joystick as `joy` (sensor_msgs/Joy), and its state on /diagnostics.
 
-`joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs its motors: id 0 the strong one, any other id the weak one.
+`joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs its motors: ID 0 is the strong one, any other ID the weak one.
 
-Parameters: ~dev (/dev/input/js0), ~dev_ff (the event device that belongs to ~dev), ~dev_name, ~deadzone (0.05), ~autorepeat_rate
+Parameters: ~dev (/dev/input/js0), ~dev_ff (the event device that belongs to ~dev), ~dev_name, ~deadzone (0.05),
+~autorepeat_rate
 (0: none), ~coalesce_interval (0.001 s), ~default_trig_val, ~sticky_buttons (false). Source: http://wiki.ros.org/joy.
 """
 
@@ -22,17 +23,15 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2
-"""How soon a shutdown is noticed."""
+_LOOK_SECONDS = 0.2  # maximum delay until a shutdown is noticed
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-_RUMBLE_SECONDS = 0.5
-"""How long motors run before they are started again: half of what a device makes of it."""
+_RUMBLE_SECONDS = 0.5  # interval at which motors are restarted: half of the time for which a device runs them
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     try:
         rospy.init_node("joy_node")
         JoyNode().run()
@@ -53,7 +52,7 @@ def _flag(name: str) -> bool:
 
 
 class JoyNode:
-    """Opens the device, again where it is lost, and publishes its state."""
+    """Opens the device, reopens it after it is lost, and publishes its state."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("joy", Joy, queue_size=1)
@@ -92,7 +91,7 @@ class JoyNode:
         return str(rospy.get_param("~dev", "/dev/input/js0"))
 
     def run(self) -> None:
-        """Publish until the node is shut down."""
+        """Publish until the node shuts down."""
         while not rospy.is_shutdown():
             self._report()
             device = self._open()
@@ -108,7 +107,7 @@ class JoyNode:
                 device.close()
 
     def _open(self) -> Device | None:
-        """Return the device as soon as it can be opened; None at the shutdown."""
+        """Wait until the device can be opened, and return it; None at shutdown."""
         is_first = True
         while not rospy.is_shutdown():
             try:
@@ -129,7 +128,7 @@ class JoyNode:
         return None
 
     def _follow(self, device: Device) -> None:
-        """Publish what a device does, until it is lost (DeviceError) or the node is shut down."""
+        """Publish a device's events until it is lost (raising DeviceError) or the node shuts down."""
         joystick = Joystick(self._options, time.monotonic())
         while not rospy.is_shutdown():
             now = time.monotonic()
@@ -194,7 +193,7 @@ class JoyNode:
 
 
 class Motors:
-    """What `joy/set_feedback` requests of the motors; they run until a message changes it, as with the real node."""
+    """The motors as requested on `joy/set_feedback`; they run until a message changes that, as in the real node."""
 
     def __init__(self) -> None:
         self._wanted = (0.0, 0.0)
@@ -202,7 +201,7 @@ class Motors:
         self._again = 0.0
 
     def set(self, message: JoyFeedbackArray) -> None:
-        """Take in a message: the newest intensity (0 to 1) of each motor counts, other feedback does not."""
+        """Process a message: use the last intensity (0 to 1) for each motor, and ignore other feedback."""
         strong, weak = self._wanted
         for each in message.array:
             if each.type == JoyFeedback.TYPE_RUMBLE and not math.isnan(each.intensity):
@@ -210,7 +209,7 @@ class Motors:
         self._wanted = strong, weak
 
     def run(self, device: Device, now: float) -> None:
-        """Pass a change on to the device, and what is to last, before it ends there; ``now`` in seconds."""
+        """Apply a change to the device, and restart motors before the device stops them; ``now`` is in seconds."""
         wanted = self._wanted
         if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
             return

@@ -1,7 +1,7 @@
-"""A joystick's events and the time -> when to publish, and what. Pure: the clock is an argument, in seconds.
+"""The publishing rules of joy_node: events and the time in, messages out. Pure: the clock is an argument, in seconds.
 
-Source: http://wiki.ros.org/joy. Buttons are published immediately; axes, and what a device sends when it is opened, after
-``coalesce_interval``; with ``autorepeat_rate`` the state is published again where nothing happens.
+Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and the initial events of a device, are
+published after ``coalesce_interval``. With ``autorepeat_rate`` the state is republished while no event occurs.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from typing import NamedTuple
 __all__ = ["EVENT_AXIS", "EVENT_BUTTON", "EVENT_INIT", "Event", "Joystick", "JoystickOptions"]
 
 EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
-"""Types of struct js_event of Linux, which the other backends use as well."""
+"""Event types of Linux's struct js_event, also used by the other backends."""
 
 LARGEST = 32767.0
-_FIRST_SECONDS = 1.0
-"""How long the real node waits for a first event before it starts to repeat."""
+_FIRST_SECONDS = 1.0  # delay of the first repetition after opening, as in the real node
 
 
 class Event(NamedTuple):
-    """A change: ``type`` of EVENT_*, the number of the button or axis, its value (0 or 1; -32767 to 32767)."""
+    """A change: ``type`` is one of EVENT_*, ``number`` that of the button or axis, ``value`` 0 or 1, or -32767 to 32767."""
 
     type: int
     number: int
@@ -29,7 +28,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class JoystickOptions:
-    """The node's parameters: a share of an axis' range, a rate in Hz (0: none), seconds."""
+    """The node's parameters: ``deadzone`` as a fraction of an axis's range, the rate in Hz (0: none), the interval in seconds."""
 
     deadzone: float = 0.05
     autorepeat_rate: float = 0.0
@@ -38,7 +37,7 @@ class JoystickOptions:
     sticky_buttons: bool = False
 
     def checked(self) -> tuple[JoystickOptions, list[str]]:
-        """Return the options within their limits, and a warning for each that was not, in the real node's words."""
+        """Return the options clamped to their limits, with the real node's warning for each clamped option."""
         warnings = []
         deadzone, rate, interval = self.deadzone, self.autorepeat_rate, self.coalesce_interval
         if interval and rate > 1 / interval:
@@ -82,10 +81,10 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """When the state is to be published if no event comes; None: then not."""
+    """The time at which to publish the state if no event occurs; None: never."""
 
     def handle(self, event: Event, now: float) -> bool:
-        """Take an event in; return whether the state is to be published now. Raise ValueError for an unknown type."""
+        """Process an event; return whether to publish the state immediately. Raise ValueError for an unknown type."""
         is_initial = bool(event.type & EVENT_INIT)
         kind = event.type & ~EVENT_INIT
         if kind == EVENT_BUTTON:
@@ -106,7 +105,7 @@ class Joystick:
         return False
 
     def is_due(self, now: float) -> bool:
-        """Return whether the time has come to publish the state."""
+        """Return whether it is time to publish the state; if so, set the next deadline."""
         if self.deadline is None or now < self.deadline:
             return False
         self._published(now)
@@ -126,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # What a trigger reports before it was touched is wrong: 0, if it rests at 1.
+        # Before its first move a trigger reports 0, although its rest position is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = LARGEST * self._options.deadzone

@@ -1,4 +1,4 @@
-"""The motors of a joystick on Linux: the force feedback of its event device, with the kernel's own structures.
+"""The motors of a joystick on Linux: force feedback of its event device, with the kernel's structures.
 
 Source: https://www.kernel.org/doc/html/latest/input/ff.html, linux/input.h.
 """
@@ -19,11 +19,10 @@ _EV_FF = 0x15
 _FF_RUMBLE = 0x50
 _FF_GAIN = 0x60
 _LARGEST = 0xFFFF
-_MILLISECONDS = 1000
-"""How long an effect lasts: the node plays it again meanwhile."""
+_MILLISECONDS = 1000  # duration of an effect; joy_node restarts it before it ends
 
+# Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16 the union, with the two magnitudes.
 _EFFECT = struct.Struct("=HhHHHHHxxHH")
-"""Type, id, direction, trigger (2), replay (length, delay); the union starts at byte 16 with the two magnitudes."""
 _EFFECT_SIZE = 48 if struct.calcsize("P") == 8 else 44
 _EVIOCSFF = 0x40004580 | _EFFECT_SIZE << 16
 _ID_AT = 2
@@ -32,29 +31,29 @@ _INPUT = Path("/sys/class/input")
 
 
 class RumbleError(MinirospyError):
-    """A joystick cannot be made to rumble: one line with the reason."""
+    """The motors of a joystick cannot be used; the message is one line with the reason."""
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:
-    """Return the event device of the joystick at a path (`/dev/input/js0`); empty if it has none."""
+    """Return the event device of the joystick at a path (`/dev/input/js0`); "" if it has none."""
     found = sorted((folder / Path(joystick).name / "device").glob("event*"))
     return f"/dev/input/{found[0].name}" if found else ""
 
 
 def pack_effect(number: int, strong: float, weak: float) -> bytes:
-    """Return struct ff_effect with the motors' shares of their full power; ``number`` is -1 for a new one."""
+    """Return a struct ff_effect for motors at 0 to 1 of full power; ``number`` is -1 for a new effect."""
     low, high = (round(min(max(share, 0.0), 1.0) * _LARGEST) for share in (strong, weak))
     fields = _EFFECT.pack(_FF_RUMBLE, number, 0, 0, 0, _MILLISECONDS, 0, low, high)
     return fields + bytes(_EFFECT_SIZE - len(fields))
 
 
 def pack_event(code: int, value: int) -> bytes:
-    """Return struct input_event that plays the effect ``code``, or sets the gain."""
+    """Return a struct input_event that plays the effect ``code``, or sets the gain."""
     return struct.pack("@llHHi", 0, 0, _EV_FF, code, value)
 
 
 class Rumble:
-    """The motors of one event device. Every method raises RumbleError."""
+    """The motors of one event device. All methods may raise RumbleError."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -70,7 +69,7 @@ class Rumble:
             raise self._error(error) from error
 
     def play(self, strong: float, weak: float) -> None:
-        """Run the motors at shares of their full power for a second."""
+        """Run the two motors for one second, at 0 to 1 of full power."""
         try:
             self._upload(self._number, (strong, weak))
             os.write(self._file, pack_event(self._number, 1))
@@ -84,7 +83,7 @@ class Rumble:
     def _upload(self, number: int, magnitudes: Sequence[float]) -> int:
         import fcntl
 
-        # The kernel writes the number of a new effect into it.
+        # The ioctl writes the ID of a new effect into this array.
         effect = array.array("B", pack_effect(number, *magnitudes))
         fcntl.ioctl(self._file, _EVIOCSFF, effect)
         found: int = struct.unpack_from("=h", effect, _ID_AT)[0]

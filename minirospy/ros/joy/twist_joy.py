@@ -1,7 +1,9 @@
-"""teleop_node: `joy` -> `cmd_vel`, while a button is held.
+"""teleop_node: converts `joy` to `cmd_vel` while a button is held.
 
-Parameters: ~enable_button (0), ~enable_turbo_button (-1: none), ~axis_linear (1), ~scale_linear (0.5), ~scale_linear_turbo (1.0),
-~axis_angular (0), ~scale_angular (0.5), ~scale_angular_turbo (as scale_angular); an axis and its scales may be maps from x, y, z
+Parameters: ~enable_button (0), ~enable_turbo_button (-1: none), ~axis_linear (1), ~scale_linear (0.5),
+~scale_linear_turbo (1.0),
+~axis_angular (0), ~scale_angular (0.5), ~scale_angular_turbo (as scale_angular); an axis and its scales may be maps from
+x, y, z
 and yaw, pitch, roll. Source: http://wiki.ros.org/teleop_twist_joy.
 """
 
@@ -20,7 +22,7 @@ __all__ = ["Direction", "JoyTeleop", "TeleopOptions", "Velocity", "main", "read_
 
 
 class Velocity(NamedTuple):
-    """Metres and radians a second."""
+    """Linear velocities in m/s, angular velocities in rad/s."""
 
     x: float = 0.0
     y: float = 0.0
@@ -31,7 +33,7 @@ class Velocity(NamedTuple):
 
 
 class Direction(NamedTuple):
-    """The axis of a joystick that sets one of a velocity's fields, and its scales."""
+    """The joystick axis for one component of the velocity, and its scales."""
 
     axis: int
     normal: float
@@ -40,7 +42,7 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True)
 class TeleopOptions:
-    """The buttons, and the directions by the fields of a velocity: linear (x, y, z) and angular (yaw, pitch, roll)."""
+    """The buttons, and a Direction per velocity component: linear (x, y, z) and angular (yaw, pitch, roll)."""
 
     enable_button: int = 0
     enable_turbo_button: int = -1
@@ -49,7 +51,7 @@ class TeleopOptions:
 
 
 def read_options(parameters: Mapping[str, object]) -> TeleopOptions:
-    """Return the options of private parameters; one of another type has its default, as in roscpp."""
+    """Return the options from the private parameters; a parameter of the wrong type gets its default, as in roscpp."""
     linear = _directions(parameters, "linear", "x", 1, 1.0)
     angular = _directions(parameters, "angular", "yaw", 0, None)
     return TeleopOptions(
@@ -84,14 +86,14 @@ def _integer(value: object, default: int) -> int:
 
 
 class JoyTeleop:
-    """States of a joystick -> velocities. Pure."""
+    """Converts joystick states to velocities. Pure."""
 
     def __init__(self, options: TeleopOptions) -> None:
         self._options = options
         self._has_stopped = False
 
     def velocity(self, axes: Sequence[float], buttons: Sequence[int]) -> Velocity | None:
-        """Return the velocity to publish: one stop when the buttons are released, and then None."""
+        """Return the velocity to publish: once zero after the buttons are released, then None."""
         if self._is_held(buttons, self._options.enable_turbo_button):
             return self._moving(axes, is_fast=True)
         if self._is_held(buttons, self._options.enable_button):
@@ -121,7 +123,7 @@ class JoyTeleop:
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     try:
         rospy.init_node("teleop_twist_joy_node")
         node = _TeleopNode()

@@ -1,7 +1,8 @@
-"""teleop_twist_keyboard: keys of a terminal -> `cmd_vel`.
+"""teleop_twist_keyboard: converts terminal keys to `cmd_vel`.
 
 Parameters: ~speed (0.5), ~turn (1.0), ~speed_limit, ~turn_limit (1000), ~repeat_rate (0: only when something changes),
-~key_timeout (0.5 s without a key: stop), ~stamped (false: Twist), ~frame_id. Source: http://wiki.ros.org/teleop_twist_keyboard.
+~key_timeout (0.5 s without a key: stop), ~stamped (false: Twist), ~frame_id. Source:
+http://wiki.ros.org/teleop_twist_keyboard.
 """
 
 from __future__ import annotations
@@ -45,14 +46,13 @@ e/c : increase/decrease only angular speed by 10%
 CTRL-C to quit
 """
 
-_HELP_EVERY = 15
-"""Changes of the speed after which the help is shown again."""
+_HELP_EVERY = 15  # speed changes between repetitions of the help text
 
 _QUIT = "\x03"
 
 
 class Direction(NamedTuple):
-    """Signs of the motion forward, to the left, up, and of the turn to the left."""
+    """The signs of the motion: forward, left and up, and of the turn to the left."""
 
     x: int = 0
     y: int = 0
@@ -84,7 +84,7 @@ _SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": 
 
 
 class Motion(NamedTuple):
-    """The published motion: metres a second along x, y, z, and radians a second about z."""
+    """The published motion: m/s along x, y, z, and rad/s about z."""
 
     x: float
     y: float
@@ -93,7 +93,7 @@ class Motion(NamedTuple):
 
 
 class KeyTeleop:
-    """Keys -> motions, and the lines that are shown. Pure."""
+    """Converts keys to motions and lines to print. Pure."""
 
     def __init__(
         self, speed: float, turn: float, speed_limit: float = 1000, turn_limit: float = 1000
@@ -105,17 +105,17 @@ class KeyTeleop:
 
     @property
     def motion(self) -> Motion:
-        """The motion that the last keys ask for."""
+        """The motion that results from the keys so far."""
         x, y, z, turn = self._direction
         return Motion(x * self._speed, y * self._speed, z * self._speed, turn * self._turn)
 
     @property
     def speeds(self) -> str:
-        """The line of the speeds."""
+        """The line that shows the speeds."""
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Do what a key means ("": none was pressed in time); return the lines to show, None if nothing is to be published."""
+        """Process a key ("": timeout without a key); return the lines to print, None if there is nothing to publish."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []
@@ -147,7 +147,7 @@ class _ParameterError(MinirospyError):
 
 
 class _Output:
-    """Publishes each motion, and the last one again at a rate in Hz; 0: not again."""
+    """Publishes each motion, and repeats the last one at ``rate`` Hz (0: never)."""
 
     def __init__(self, rate: float) -> None:
         self._is_stamped = bool(rospy.get_param("~stamped", False))
@@ -180,7 +180,7 @@ class _Output:
             self._changed.notify()
 
     def close(self) -> None:
-        """Publish a stop, the last message."""
+        """Publish a zero velocity as the last message."""
         with self._changed:
             self._is_closed = True
             self._publish(Motion(0, 0, 0, 0))
@@ -205,12 +205,12 @@ class _Output:
         try:
             self._publisher.publish(message)
         except rospy.ROSException:
-            # The node is being shut down.
+            # The node is shutting down.
             pass
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; return the exit status: 1 without a terminal, or with a wrong parameter."""
+    """Run the node until Ctrl-C; return the exit status: 1 without a terminal, or for an invalid parameter."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "teleop_twist_keyboard: ERROR: keys come from a terminal, which standard input is not: "
@@ -225,7 +225,7 @@ def main() -> int:
         rospy.logerr("%s", error)
         return 1
     except OSError:
-        # The terminal's window was closed: no key can come any more.
+        # The terminal window was closed: there will be no more keys.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSInterruptException:
         pass
@@ -251,7 +251,7 @@ def _run() -> None:
     rospy.on_shutdown(output.close)
     output.set(teleop.motion)
 
-    # The terminal is set up before the help is shown: what was typed until then is dropped.
+    # Set up the terminal before printing the help: keys typed before that are discarded.
     with Keys(end=_QUIT) as keys:
         print(HELP)
         print(teleop.speeds, flush=True)
@@ -268,7 +268,7 @@ def _run() -> None:
 
 
 def _next_key(keys: Keys, timeout: float) -> str:
-    """Return a key, or "" where none is typed in ``timeout`` seconds."""
+    """Return a key, or "" if none is typed within ``timeout`` seconds."""
     end = time.monotonic() + timeout
     while not (key := keys.next()) and time.monotonic() < end and not rospy.is_shutdown():
         pass

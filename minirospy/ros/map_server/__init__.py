@@ -1,6 +1,7 @@
-"""Maps: image files -> OccupancyGrid -> image files. Source: http://wiki.ros.org/map_server."""
+"""Maps: conversion of image files to OccupancyGrid and back. Source: http://wiki.ros.org/map_server."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
+# These modules import ROS 1 messages; in an environment with ROS 2 sourced, its packages of the same names come
+# first.
 prefer_ros1()

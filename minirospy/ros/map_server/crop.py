@@ -1,4 +1,4 @@
-"""crop_map: a map without the unknown cells around it. `crop_map MAP.yaml [CROPPED.yaml]`, into the folder that it runs in.
+"""crop_map: remove the unknown cells around a map. `crop_map MAP.yaml [CROPPED.yaml]`; writes to the current folder.
 
 Source: http://wiki.ros.org/map_server. The origin moves with the lower left corner.
 """
@@ -25,7 +25,7 @@ __all__ = ["crop", "main"]
 def crop(
     image: NDArray[np.uint8], resolution: float, origin: tuple[float, float, float]
 ) -> tuple[NDArray[np.uint8], tuple[float, float, float]]:
-    """Return the part of an image (rows from the top) that is not unknown, and its origin. Raise MapError."""
+    """Return the smallest part of an image (rows from the top) with all known cells, and its origin. Raise MapError."""
     rows, columns = np.nonzero(image != UNKNOWN_GREY)
     if not len(rows):
         raise MapError("every cell of the map is unknown: nothing is left of it")

@@ -1,6 +1,6 @@
-"""A map's YAML file and pixels -> occupancies; occupancies -> PGM and YAML. Pure.
+"""Conversion of a map's YAML file and pixels to occupancies, and of occupancies to PGM and YAML. Pure.
 
-Source: http://wiki.ros.org/map_server. Row 0 of an image is the top, of a grid the bottom.
+Source: http://wiki.ros.org/map_server. Row 0 is the top of an image, but the bottom of a grid.
 """
 
 from __future__ import annotations
@@ -36,16 +36,15 @@ __all__ = [
 ]
 
 OCCUPIED_THRESHOLD, FREE_THRESHOLD = 0.65, 0.196
-FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205
-"""Greys of map_saver's images."""
+FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205  # grey levels in map_saver's images
 
 
 class MapError(MinirospyError):
-    """A map's YAML file is wrong, or a grid is: one line with the fault."""
+    """A map's YAML file or a grid is invalid; the message is one line with the reason."""
 
 
 class Mode(Enum):
-    """The conversion of greys to occupancies."""
+    """The conversion of grey levels to occupancies."""
 
     TRINARY = "trinary"
     SCALE = "scale"
@@ -53,7 +52,7 @@ class Mode(Enum):
 
 
 class MapSettings(NamedTuple):
-    """The fields of a map's YAML file: metres per pixel, x, y (metres) and yaw (radians) of the lower left corner."""
+    """The fields of a map's YAML file: metres per pixel; x, y (metres) and yaw (radians) of the lower left corner."""
 
     image: str
     resolution: float
@@ -65,9 +64,10 @@ class MapSettings(NamedTuple):
 
 
 def read_settings(text: str) -> MapSettings:
-    """Return the settings in a map's YAML file. Raise MapError in the real program's words."""
+    """Return the settings in a map's YAML file. Raise MapError with the real program's message."""
     try:
-        # As texts: yaml-cpp takes `1e-3` as a number, which YAML 1.1 does not, and refuses `false` as one.
+        # Load all scalars as strings: yaml-cpp reads `1e-3` as a number, which YAML 1.1 does not, and rejects `false`
+        # as one.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -126,10 +126,10 @@ def _finite(text: str) -> float:
 
 
 def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
-    """Return the occupancies of an image, row by row from the bottom: 0 to 100, -1 for unknown, the greys in the mode raw."""
+    """Return an image's occupancies, row by row from the bottom: 0 to 100, -1 for unknown; in mode raw, the grey levels."""
     values, has_alpha = pixels
     channels = values.shape[2]
-    # In the mode trinary the transparency counts as one more color, as in the real program.
+    # In mode trinary the alpha channel counts as one more color, as in the real program.
     averaged = channels - 1 if has_alpha and settings.mode is not Mode.TRINARY else channels
     grey = values[..., :averaged].sum(axis=2, dtype=np.float64) / averaged
     if settings.negate:
@@ -152,15 +152,15 @@ def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
 
 
 def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
-    """Return z and w of a rotation about z, with the precision of the real program's library (32 bits)."""
+    """Return z and w of a rotation about z, in 32-bit floats like the real program's library."""
     half = np.float32(yaw) * np.float32(0.5)
     return float(np.sin(half)), float(np.cos(half))
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians; 0 if the pitch is a right angle, as tf2's getEulerYPR.
+    """Return the rotation about z in radians; 0 if the pitch is a right angle, like tf2's getEulerYPR.
 
-    0 also of the quaternion 0, 0, 0, 0, which a publisher never set: the real program writes `-nan`, which no map_server reads.
+    Also return 0 for the unset quaternion 0, 0, 0, 0: the real program writes `-nan`, which no map_server can read.
     """
     square = x * x + y * y + z * z + w * w
     if not square:
@@ -175,7 +175,7 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
 def pgm_of_grid(
     data: Sequence[int], width: int, height: int, resolution: float, occupied: int, free: int
 ) -> bytes:
-    """Return the PGM image of a grid: free up to ``free``, occupied from ``occupied`` on. Raise MapError."""
+    """Return a grid as a PGM image: cells up to ``free`` are free, from ``occupied`` occupied. Raise MapError."""
     cells = np.asarray(data, np.int8)
     if len(cells) != width * height:
         raise MapError(f"the map has {len(cells)} cells, where {width} x {height} are {width * height}")
@@ -188,7 +188,7 @@ def pgm_of_grid(
 
 
 def yaml_of_map(image: str, resolution: float, origin: tuple[float, float, float]) -> str:
-    """Return the YAML file of a map that map_saver saves."""
+    """Return the YAML file for a map saved by map_saver."""
     x, y, yaw = origin
     return (
         f"image: {image}\nresolution: {resolution:f}\norigin: [{x:f}, {y:f}, {yaw:f}]\nnegate: 0\n"

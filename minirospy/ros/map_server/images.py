@@ -1,6 +1,6 @@
-"""Bytes of an image file -> its pixels, as the real map_server's library has them.
+"""Image files to pixels, with the same results as the real map_server's library.
 
-PGM, PBM and PPM are read here; every other format by Pillow, where it is installed.
+PGM, PBM and PPM are decoded here, all other formats by Pillow, if it is installed.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
+# Cells; a message is at most 4 GiB, which is also the size of 2**30 pixels with four channels.
 MAX_CELLS = 2**30
-"""Cells of the largest map: a message holds at most 4 GiB, and 2**30 pixels of four channels are as many."""
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
 _COMMENT = re.compile(rb"#[^\n]*")
@@ -30,11 +30,11 @@ _REVERSED_FORMATS = ("BMP", "TGA")
 
 
 class ImageError(MinirospyError):
-    """An image cannot be read: one line with the reason."""
+    """An image cannot be read; the message is one line with the reason."""
 
 
 class Pixels(NamedTuple):
-    """The bytes of an image: rows from the top, pixels, channels; whether the last channel is its transparency."""
+    """The bytes of an image with shape (rows from the top, columns, channels); whether the last channel is alpha."""
 
     values: NDArray[np.uint8]
     has_alpha: bool
@@ -50,7 +50,7 @@ def read_image(data: bytes) -> Pixels:
 
 
 def _read_pnm(data: bytes) -> NDArray[np.uint8]:
-    """Return the pixels of a PBM, PGM or PPM file. Source: https://netpbm.sourceforge.net/doc/pnm.html."""
+    """Decode a PBM, PGM or PPM file. Source: https://netpbm.sourceforge.net/doc/pnm.html."""
     kind, at = data[:2], 2
     is_bits = kind in (b"P1", b"P4")
     numbers = []
@@ -89,7 +89,7 @@ def _exactly(data: bytes, count: int) -> NDArray[np.uint8]:
 
 
 def _plain_values(data: bytes, count: int, *, is_bits: bool) -> NDArray[np.uint8]:
-    """Return numbers that are written as text; those that are missing at the end are 0, as in the real program."""
+    """Parse numbers in plain text; missing ones at the end are 0, as in the real program."""
     text = _COMMENT.sub(b"", data)
     words = [each for each in text if each in b"01"] if is_bits else text.split()
     try:
@@ -123,7 +123,7 @@ def _read_by_pillow(data: bytes) -> Pixels:
 
 
 def _pixels_of(image: Image.Image) -> Pixels:
-    """Return the bytes that SDL_image gives for an image: indices of palettes, the upper byte of 16 bits."""
+    """Return the bytes that SDL_image returns for an image: palette indices, and the upper byte of 16-bit values."""
     if image.mode.startswith("I"):
         values = np.asarray(image).astype(np.int64)
         return Pixels(np.clip(values >> 8, 0, 255).astype(np.uint8)[..., None], has_alpha=False)
@@ -134,7 +134,7 @@ def _pixels_of(image: Image.Image) -> Pixels:
     if image.mode == "1":
         return Pixels(_array(image.convert("L"))[..., None], has_alpha=False)
     colours = _array(image.convert("RGB"))
-    # The last channel decides on transparency in the mode `scale`, whatever it is.
+    # In mode `scale` the last channel is used as alpha, even if it is a color.
     return Pixels(colours[..., ::-1] if image.format in _REVERSED_FORMATS else colours, has_alpha=False)
 
 
@@ -142,7 +142,7 @@ def _has_alpha(image: Image.Image) -> bool:
     if image.mode in ("LA", "RGBA", "PA", "La", "RGBa"):
         return True
     transparency = image.info.get("transparency")
-    # Of a palette one color may be transparent: it stays an index.
+    # In a palette with a single transparent color, that color stays an index.
     return isinstance(transparency, bytes) and not (
         set(transparency) <= {0, 255} and transparency.count(0) < 2
     )

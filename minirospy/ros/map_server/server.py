@@ -1,4 +1,4 @@
-"""map_server: a map's files -> /map and /map_metadata (latched), services static_map and change_map.
+"""map_server: publishes a map's files on /map and /map_metadata (latched); services static_map and change_map.
 
 `map_server MAP.yaml`, or, deprecated, `map_server IMAGE RESOLUTION` with ~negate, ~occupied_thresh and ~free_thresh.
 Parameter: ~frame_id (map). Source: http://wiki.ros.org/map_server.
@@ -47,7 +47,7 @@ _CLOCK_SECONDS = 0.05
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status: 255 without a map."""
+    """Run the node until it shuts down; return the exit status: 255 without a map."""
     words = rospy.myargv()[1:]
     try:
         rospy.init_node("map_server", anonymous=True)
@@ -90,7 +90,7 @@ def _number(name: str, default: float) -> float:
 
 
 def settings_of_file(name: str) -> MapSettings:
-    """Return the settings in a YAML file, the image as a path from here. Raise MapError."""
+    """Return the settings in a YAML file, with the image's path relative to the current folder. Raise MapError."""
     try:
         text = Path(name).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
@@ -101,7 +101,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map, without its frame and times. Raise MapError."""
+    """Return a map, with frame and times unset. Raise MapError."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())
@@ -118,13 +118,13 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
     x, y, yaw = settings.origin
     info.origin.position.x, info.origin.position.y = x, y
     info.origin.orientation.z, info.origin.orientation.w = quaternion_of_yaw(yaw)
-    # An array is sent as it is, without a list of its numbers.
+    # The message is serialized from the array, without a list of numbers.
     grid.data = to_grid(pixels, settings)  # type: ignore[assignment]
     return grid
 
 
 class MapServer:
-    """The map as a node: two latched topics and two services. Raise MapError if there is no map."""
+    """Serves the map: two latched topics and two services. Raise MapError if the map cannot be loaded."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))
@@ -139,7 +139,7 @@ class MapServer:
 
     def _show(self, settings: MapSettings) -> None:
         grid = load_map(settings)
-        # In simulated time the map has the time of the simulation, not 0.
+        # With simulated time, wait for the simulation's time instead of stamping the map with 0.
         while not rospy.Time.now() and not rospy.is_shutdown():
             time.sleep(_CLOCK_SECONDS)
         grid.info.map_load_time = rospy.Time.now()

@@ -1,4 +1,4 @@
-"""The parameter robot_description, found as ROS's nodes find it."""
+"""Reading the parameter robot_description, with the search order of ROS's nodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAME = "robot_description"
 
 
 class DescriptionError(MinirospyError):
-    """No robot can be had from the parameter server; the lines are those of ROS's reader."""
+    """The parameter has no valid robot; ``lines`` are the messages of ROS's parser."""
 
     def __init__(self, *lines: str) -> None:
         super().__init__(*lines)
@@ -24,7 +24,7 @@ class DescriptionError(MinirospyError):
 
 
 def robot_of_parameter(name: str = NAME) -> Robot:
-    """Return the robot of a parameter, which is searched from the node's namespace upwards. Raise DescriptionError."""
+    """Return the robot in a parameter, searching from the node's namespace upwards. Raise DescriptionError."""
     key = rospy.resolve_name(name)
     if not rospy.has_param(key):
         found = rospy.search_param(name)

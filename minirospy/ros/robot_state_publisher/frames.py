@@ -1,4 +1,4 @@
-"""Positions of joints -> poses of links. Pure.
+"""Converts joint positions to link poses. Pure.
 
 Source: http://wiki.ros.org/robot_state_publisher.
 """
@@ -16,7 +16,7 @@ __all__ = ["LinkPose", "RobotFrames", "prefixed"]
 
 
 class LinkPose(NamedTuple):
-    """The frame ``child`` in the frame ``parent``."""
+    """The pose of frame ``child`` in frame ``parent``."""
 
     parent: str
     child: str
@@ -24,9 +24,10 @@ class LinkPose(NamedTuple):
 
 
 class RobotFrames:
-    """The frames of a robot: those that move with a joint, and those that are fixed, both in the order of joints' names.
+    """The frames of a robot: moving ones and fixed ones, both ordered by joint name.
 
-    Planar joints are fixed, as KDL has them; floating ones have no frame, since a JointState cannot hold their pose.
+    Planar joints are treated as fixed, as in KDL. Floating joints have no frame, because a JointState cannot contain
+    their pose.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -42,15 +43,15 @@ class RobotFrames:
         self._names = robot.joints.keys()
 
     def fixed(self) -> Iterator[LinkPose]:
-        """Yield the frames of fixed joints."""
+        """Yield the link poses of fixed joints."""
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the frames of the joints whose positions are given, and of those that mimic them."""
+        """Yield the link poses of the joints with a given position, and of the joints that mimic them."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
-        # A joint may mimic one that mimics another.
+        # A joint may mimic a joint that itself mimics another.
         waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
         while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
             for name in found:
@@ -61,12 +62,12 @@ class RobotFrames:
             yield LinkPose(segment.joint.parent, segment.joint.child, segment.pose(known[name]))
 
     def unknown(self, names: Mapping[str, float]) -> list[str]:
-        """Return the joints that the robot does not have."""
+        """Return the names that are not joints of the robot, sorted."""
         return sorted(names.keys() - self._names)
 
 
 def prefixed(prefix: str, frame: str) -> str:
-    """Return a frame's name with the tf_prefix; a frame with a slash in front is taken as it is, without the slash."""
+    """Return a frame's name with the tf_prefix; if it starts with a slash, only remove the slash."""
     if frame.startswith("/"):
         return frame[1:]
     return f"{prefix.removeprefix('/')}/{frame}" if prefix else frame

@@ -1,4 +1,4 @@
-"""The parameters of joint_state_publisher, which its terminal and its page have in common. Pure: values of parameters in.
+"""The parameters of joint_state_publisher, shared by its terminal and web versions. Pure: parameter values are arguments.
 
 Source: http://wiki.ros.org/joint_state_publisher.
 """
@@ -17,11 +17,11 @@ NAMES = (
     "robot_description", "rate", "dependent_joints", "use_mimic_tags", "use_smallest_joint_limits", "source_list", "zeros",
     "delta", "publish_default_positions", "publish_default_velocities", "publish_default_efforts",
 )  # fmt: skip
-"""The parameters that are read: private ones, else of the node's namespace; of zeros both."""
+"""The parameters to read: the private one, else that in the node's namespace; zeros from both."""
 
 
 class JointParameters(NamedTuple):
-    """``rate`` in messages a second; ``delta`` in radians or metres a message; ``sources``: topics."""
+    """``rate`` is in messages per second, ``delta`` in radians or metres per message; ``sources`` are topics."""
 
     description: str
     options: JointOptions
@@ -31,7 +31,7 @@ class JointParameters(NamedTuple):
 
 
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
-    """Return the parameters; ``param(name, default)`` returns the value of one, ``zeros`` are those trees in order.
+    """Return the parameters; ``param(name, default)`` returns a value, ``zeros`` are the trees named zeros, private one first.
 
     Raise JointError.
     """
@@ -59,7 +59,7 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
 
 
 def _zero(zeros: Sequence[object], joint: str) -> float | None:
-    """Return a joint's zero, the private one first. Slashes of its name are levels of the parameter."""
+    """Return a joint's zero position, from the first tree that has it. A slash in its name separates levels of the tree."""
     for tree in zeros:
         value: object = tree
         for part in joint.split("/"):

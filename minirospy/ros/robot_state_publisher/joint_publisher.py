@@ -1,9 +1,9 @@
-"""joint_state_publisher: a description's joints, their zeros and what other nodes publish of them -> joint_states.
+"""joint_state_publisher: publishes joint_states from a description's joints, their zeros, and other nodes' joint states.
 
-Parameters, private ones first, else of the node's namespace: robot_description, rate (10 Hz), dependent_joints
+Parameters, private or in the node's namespace: robot_description, rate (10 Hz), dependent_joints
 (``{joint: {parent, factor, offset}}``), use_mimic_tags, use_smallest_joint_limits (true), source_list (topics), zeros
-(``{joint: position}``), delta (radians or metres a message), publish_default_positions (true), publish_default_velocities,
-publish_default_efforts (false). Source: http://wiki.ros.org/joint_state_publisher.
+(``{joint: position}``), delta (radians or metres per message), publish_default_positions (true),
+publish_default_velocities, publish_default_efforts (false). Source: http://wiki.ros.org/joint_state_publisher.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _CONNECT_SECONDS = 0.5
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status: 1 where there are no joints to publish."""
+    """Run the node until it shuts down; return the exit status: 1 if there are no joints to publish."""
     return run_node("joint_state_publisher", lambda: JointPublisher().loop())
 
 
 def run_node(name: str, body: Callable[[], object]) -> int:
-    """Initialise a node and run it; return the exit status: 1 for a JointError, which is logged."""
+    """Initialize a node and run ``body``; return the exit status: 1 after a JointError, which is logged."""
     try:
         rospy.init_node(name)
         body()
@@ -41,7 +41,7 @@ def run_node(name: str, body: Callable[[], object]) -> int:
 
 
 def param(name: str, default: object = None) -> object:
-    """Return a private parameter, else the one of the node's namespace, else the default."""
+    """Return a private parameter, else the one in the node's namespace, else the default."""
     for key in (f"~{name}", name):
         if rospy.has_param(key):
             return rospy.get_param(key)
@@ -49,13 +49,13 @@ def param(name: str, default: object = None) -> object:
 
 
 class JointPublisher:
-    """The joints as a node: publishes them, and follows the topics of source_list. Raise JointError.
+    """Publishes the joint states, and follows the topics in source_list. Raise JointError.
 
-    ``on_update`` is called when a message of a source has come.
+    ``on_update`` is called after each message from a source.
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Both: a zero that the private ones lack may be among the others.
+        # Use both: a zero that is missing in the private tree may be in the other.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()
@@ -66,7 +66,7 @@ class JointPublisher:
         self._subscribers = [rospy.Subscriber(topic, JointState, self._follow) for topic in found.sources]
 
     def loop(self) -> None:
-        """Publish until the node is shut down."""
+        """Publish until the node shuts down."""
         self._publisher.wait_for_subscribers(timeout=min(1 / self._rate, _CONNECT_SECONDS))
         rate = rospy.Rate(self._rate)
         while not rospy.is_shutdown():
@@ -77,7 +77,7 @@ class JointPublisher:
                 pass
 
     def publish(self) -> None:
-        """Publish the state of all joints; nothing if there are none."""
+        """Publish the state of all joints; do nothing if there are none."""
         with self.lock:
             if self._delta > 0:
                 self.joints.advance(self._delta)

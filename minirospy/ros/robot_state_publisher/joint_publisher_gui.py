@@ -1,6 +1,6 @@
-"""joint_state_publisher_gui as sliders in a terminal: joint_state_publisher, and keys that set the joints.
+"""joint_state_publisher_gui as terminal sliders: joint_state_publisher with keys that set the joints.
 
-Without a terminal, as below roslaunch, it publishes the joints' zeros and what its sources publish.
+Without a terminal, for example in roslaunch, it publishes the zeros and the joint states of its sources.
 Source: http://wiki.ros.org/joint_state_publisher_gui.
 """
 
@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 _QUIT = ("q", "\x04")
-_OTHER_LINES = 6
-"""Of the screen: the frame, the hint, the shell's own."""
+_OTHER_LINES = 6  # screen lines without sliders: the frame, the hint and the shell prompt
 
 
 def main() -> int:
-    """Run the node until it is shut down, or `q` is pressed; return the exit status: 1 where there are no joints."""
+    """Run the node until it shuts down or `q` is pressed; return the exit status: 1 if there are no joints."""
     return run_node("joint_state_publisher_gui", _run)
 
 
@@ -54,7 +53,7 @@ def _publish(publisher: JointPublisher) -> None:
 
 
 def _show(publisher: JointPublisher) -> None:
-    """Draw the sliders, and set them by keys, until the node is shut down or `q` is pressed."""
+    """Draw the sliders, and move them by keys, until the node shuts down or `q` is pressed."""
     from rich.console import Console
     from rich.live import Live
 

@@ -1,7 +1,7 @@
-"""The joints of a description that can be set, and their state. Pure: parameters in, values of a JointState out.
+"""The adjustable joints of a description, and their state. Pure: converts parameters to the values of a JointState.
 
-Source: http://wiki.ros.org/joint_state_publisher. The description is read loosely, as that node does: it may come from
-parts that no complete robot is made of, or be COLLADA.
+Source: http://wiki.ros.org/joint_state_publisher. Like that node, it parses the description leniently: an incomplete
+robot, or a COLLADA file, is accepted.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _SETTLED = ("fixed", "floating", "planar")
 
 
 class JointError(MinirospyError):
-    """Joints that cannot be had: one line that says which, and why."""
+    """The joints cannot be determined; the message is one line that names the joint and the reason."""
 
 
 @dataclass
 class FreeJoint:
-    """A joint that can be set, in radians or metres; None: not published."""
+    """An adjustable joint, in radians or metres; values that are None are not published."""
 
     lower: float
     upper: float
@@ -45,7 +45,7 @@ class FreeJoint:
     is_rising: bool = True
 
     def advance(self, step: float) -> None:
-        """Move by ``step``, to and fro between the limits; a continuous joint goes round."""
+        """Move by ``step``, reversing at the limits; a continuous joint wraps around instead."""
         position = self.zero if self.position is None else self.position
         if self.is_rising:
             position += step
@@ -61,7 +61,7 @@ class FreeJoint:
 
 @dataclass(frozen=True)
 class Dependent:
-    """A joint at ``factor * position of parent + offset``."""
+    """A joint whose position is ``factor * position of parent + offset``."""
 
     parent: str
     factor: float = 1.0
@@ -70,7 +70,7 @@ class Dependent:
 
 @dataclass(frozen=True)
 class JointOptions:
-    """The parameters of joint_state_publisher that say which joints there are, by its names."""
+    """The parameters of joint_state_publisher that determine the joints; the names are those of the parameters."""
 
     dependent_joints: Mapping[str, Dependent] = field(default_factory=dict)
     use_mimic_tags: bool = True
@@ -92,7 +92,7 @@ class StateValues:
 
 
 class JointStates:
-    """Joints in the order of the description: those that can be set in ``free``, the others by what they depend on."""
+    """The joints in the order of the description: adjustable ones in ``free``, the others with their dependency."""
 
     def __init__(
         self, names: Sequence[str], free: dict[str, FreeJoint], dependent: Mapping[str, Dependent]
@@ -103,9 +103,9 @@ class JointStates:
         self._has_dependent = bool(dependent)
 
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
-        """Return how a joint depends on one that can be set. Raise JointError."""
+        """Return a joint's dependency on an adjustable joint. Raise JointError."""
         if name not in dependent:
-            # Its limits are missing, which was warned of.
+            # A joint without limits; the warning has been logged.
             return Dependent("")
 
         rule = dependent[name]
@@ -131,7 +131,7 @@ class JointStates:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> None:
-        """Set joints to what another node publishes of them; shorter lists leave the rest as it is."""
+        """Set joints from another node's JointState; a shorter list leaves the remaining values unchanged."""
         for number, name in enumerate(names):
             joint = self.free.get(name)
             if joint is None:
@@ -144,12 +144,12 @@ class JointStates:
                 joint.effort = efforts[number]
 
     def advance(self, step: float) -> None:
-        """Move all joints by ``step``."""
+        """Move all adjustable joints by ``step``."""
         for joint in self.free.values():
             joint.advance(step)
 
     def values(self) -> StateValues:
-        """Return the lists to publish; a kind that no joint has is empty."""
+        """Return the lists to publish; a list is empty if no joint has such a value."""
         joints = self.free.values()
         has_position = self._has_dependent or any(joint.position is not None for joint in joints)
         has_velocity = any(joint.velocity is not None for joint in joints)
@@ -170,7 +170,7 @@ class JointStates:
 
 
 def read_joints(text: str, options: JointOptions, warn: Callable[[str], object]) -> JointStates:
-    """Return the joints of a description; ``warn`` gets a line for each that is left out. Raise JointError."""
+    """Return the joints of a description; call ``warn`` with a line for each omitted joint. Raise JointError."""
     try:
         root = parse_xml(text, "robot_description")
         if root.tag == "COLLADA":
@@ -227,7 +227,7 @@ def _free_joint(name: str, lower: float, upper: float, kind: str, options: Joint
 
 
 def _limits(element: Element, kind: str) -> tuple[float, float] | None:
-    """Return the limits of a joint; None if they are missing or are not numbers."""
+    """Return the limits of a joint; None if they are missing or not numbers."""
     if kind == "continuous":
         return -math.pi, math.pi
     for limit in _below(element):
@@ -252,14 +252,14 @@ def _number(element: Element, name: str, default: float) -> float:
 
 
 def _below(element: Element) -> Iterator[Element]:
-    """Yield an element and all below it, in the order of the file."""
+    """Yield an element and all its descendants in document order."""
     yield element
     for child in element.children:
         yield from _below(child)
 
 
 def _collada_joints(root: Element, warn: Callable[[str], object]) -> dict[str, FreeJoint]:
-    """Return the revolute joints of a COLLADA description, whose limits are degrees."""
+    """Return the revolute joints of a COLLADA description, which gives limits in degrees."""
     models = [each for each in _below(root) if each.tag == "kinematics_model"]
     techniques = [each for model in models[:1] for each in _below(model) if each.tag == "technique_common"]
     found = {}

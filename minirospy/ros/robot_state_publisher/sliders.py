@@ -1,6 +1,6 @@
-"""Joints set by keys: what is selected, what a key does, and the lines that are shown. Pure.
+"""Sliders for joints, moved by keys: the selection, the meaning of the keys, and the lines to show. Pure.
 
-Source: http://wiki.ros.org/joint_state_publisher_gui, whose sliders, Center and Randomize these are.
+Source: http://wiki.ros.org/joint_state_publisher_gui, which has the same sliders, Center and Randomize.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _MOVES = {"up": -1, "down": 1, "k": -1, "j": 1}
 
 
 class Row(NamedTuple):
-    """A joint as it is shown: its name, its bar, its position with its limits, and whether it is selected."""
+    """A line for a joint: its name, its bar, its position with the limits, and whether it is selected."""
 
     name: str
     bar: str
@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 class Sliders:
-    """The joints that can be set, one of them selected. ``random_`` gives numbers from 0 to 1."""
+    """The adjustable joints, one of which is selected. ``random_`` is the source of random positions."""
 
     def __init__(self, joints: Mapping[str, FreeJoint], random_: random.Random | None = None) -> None:
         self._joints = joints
@@ -37,7 +37,7 @@ class Sliders:
         self._selected = 0
 
     def press(self, key: str) -> bool:
-        """Do what a key means; return whether a position has changed."""
+        """Process a key; return whether a position has changed."""
         if not self._names:
             return False
         if key in _MOVES:

@@ -1,8 +1,8 @@
-"""robot_state_publisher: joint_states in, the frames of a robot's links out.
+"""robot_state_publisher: subscribes to joint_states and publishes the frames of a robot's links.
 
-Parameters: ~publish_frequency (50 Hz at most for a joint), ~use_tf_static (true: fixed joints are latched once on
-/tf_static; false: on /tf, at each period, half a second ahead), ~ignore_timestamp (false), and tf_prefix, searched from
-the node's own name upwards. Source: http://wiki.ros.org/robot_state_publisher.
+Parameters: ~publish_frequency (at most 50 Hz per joint), ~use_tf_static (true: publish fixed joints once, latched, on
+/tf_static; false: on /tf, every period, stamped half a second ahead), ~ignore_timestamp (false), and tf_prefix, searched
+from the node's name upwards. Source: http://wiki.ros.org/robot_state_publisher.
 """
 
 from __future__ import annotations
@@ -24,16 +24,15 @@ from minirospy.ros.robot_state_publisher.frames import LinkPose, RobotFrames, pr
 __all__ = ["StatePublisher", "main"]
 
 _AHEAD = rospy.Duration(0, 500_000_000)
-"""How far ahead fixed frames on /tf are stamped: they hold until the next ones."""
+"""Fixed frames on /tf are stamped this far ahead, so that they are valid until the next message."""
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5
-_PREFIX_SECONDS = 1.0
-"""How long a value of tf_prefix is used: ROS looks it up for each message, which costs a call of the master's each."""
+_PREFIX_SECONDS = 1.0  # lifetime of the cached tf_prefix; ROS queries the master for each message instead
 
 
 def main(name: str = "robot_state_publisher") -> int:
-    """Run the node until it is shut down; return the exit status: 1 without a robot."""
+    """Run the node until it shuts down; return the exit status: 1 without a robot."""
     try:
         rospy.init_node(name)
         robot = robot_of_parameter()
@@ -50,7 +49,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Warn of what a robot has and frames cannot show, in the words of ROS's node."""
+    """Log warnings, in ROS's words, for features of a robot that frames cannot represent."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -71,7 +70,7 @@ def _warn_of(robot: Robot) -> None:
 
 
 class StatePublisher:
-    """Publishes the frames of a robot from its joints' states, on /tf and /tf_static."""
+    """Publishes the frames of a robot on /tf and /tf_static, from the states of its joints."""
 
     def __init__(self, frames: RobotFrames) -> None:
         self._frames = frames
@@ -90,14 +89,14 @@ class StatePublisher:
             self._tf_static.publish(TFMessage(self._stamped(frames.fixed(), rospy.Time.now())))
         else:
             self._timer = rospy.Timer(self._period, self._publish_fixed, reset=True)
-        # Those that listen already get the first frames, too.
+        # Existing subscribers should receive the first frames, too.
         self._tf.wait_for_subscribers(timeout=_CONNECT_SECONDS)
         self._subscriber = rospy.Subscriber(
             "joint_states", JointState, self.publish, queue_size=1, tcp_nodelay=True
         )
 
     def publish(self, state: JointState) -> None:
-        """Publish the frames of a state's joints, unless they were published less than a period ago."""
+        """Publish the frames for a joint state, unless its joints were published less than a period ago."""
         if not self._is_valid(state):
             return
         now = rospy.Time.now()
@@ -114,7 +113,7 @@ class StatePublisher:
         last = min((self._published.get(name, rospy.Time()) for name in state.name), default=now)
         if not self._ignores_stamps and stamp < min(last, now) + self._period:
             return
-        # As in ROS, the first position of a joint that is named twice counts.
+        # If a joint is named twice, the first position is used, as in ROS.
         positions = dict(zip(reversed(state.name), reversed(state.position), strict=True))
         for name in self._frames.unknown(positions):
             rospy.logwarn_throttle(10, f'Joint state with name: "{name}" was received but not found in URDF')
@@ -160,6 +159,6 @@ class StatePublisher:
 
 
 def _number(name: str, default: float) -> float:
-    """Return a parameter that is a number, else the default, as roscpp has it."""
+    """Return a numeric parameter; if it has another type, return the default, as in roscpp."""
     value = rospy.get_param(name, default)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else default

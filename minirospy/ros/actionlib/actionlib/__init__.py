@@ -1,9 +1,9 @@
-"""Actions: goals that take a while, with feedback on the way, a result at the end, and a way to stop them.
+"""Actions: long-running goals with feedback, a final result, and cancellation.
 
-The way of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
-`internal_goal_callback` -> simple_server, the user's function -> handle `set_succeeded` -> topic result ==>
-machine `update_result` -> simple_client `_handle_transition`, the user's function. Which state follows which
-is in `minirospy.core.graph.goals`. What `import actionlib` re-exports. Source: http://wiki.ros.org/actionlib.
+The path of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
+`internal_goal_callback` -> simple_server, the user's callback -> handle `set_succeeded` -> topic result ==>
+machine `update_result` -> simple_client `_handle_transition`, the user's callback. The state transitions are in
+`minirospy.core.graph.goals`. `import actionlib` re-exports this package. Source: http://wiki.ros.org/actionlib.
 """
 
 from __future__ import annotations

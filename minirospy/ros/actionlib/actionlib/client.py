@@ -1,4 +1,4 @@
-"""ActionClient: any number of goals of one action, each with a handle.
+"""ActionClient: any number of concurrent goals of one action, each with a handle.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -33,8 +33,8 @@ _M = TypeVar("_M", bound=Message)
 class ActionClient:
     """The client of the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
 
-    The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set the lengths
-    of its queues. Raise ActionException on a class that is not an action.
+    The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set its queue sizes. Raise
+    ActionException if ``ActionSpec`` is not an action class.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
@@ -52,7 +52,8 @@ class ActionClient:
         if self.pub_queue_size < 0:
             self.pub_queue_size = 10
 
-        # Small messages that somebody waits for: none may wait for the one before to be acknowledged.
+        # Disable Nagle's algorithm: these messages are small and awaited, and must not be delayed until the last is
+        # acknowledged.
         self.pub_goal = rospy.Publisher(
             rospy.remap_name(ns) + "/goal",
             self.ActionGoal,
@@ -80,7 +81,7 @@ class ActionClient:
         self.feedback_sub = self._subscribe("/feedback", self.ActionFeedback, self._feedback_cb)
 
     def stop(self) -> None:
-        """Leave the action's topics."""
+        """Unregister from the action's topics."""
         for end in (self.pub_goal, self.pub_cancel, self.status_sub, self.result_sub, self.feedback_sub):
             end.unregister()
 
@@ -90,29 +91,30 @@ class ActionClient:
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal and return its handle, which has to be kept for as long as the goal is of interest.
+        """Send a goal and return its handle. Keep the handle: without it, the callbacks are no longer called.
 
-        ``transition_cb(handle)`` is called on each change, ``feedback_cb(handle, feedback)`` with feedback,
-        both in threads of the library, one after the other.
+        ``transition_cb(handle)`` is called on each state change, ``feedback_cb(handle, feedback)`` with feedback. Both
+        are called
+        in threads of the library, never concurrently.
         """
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
 
     def cancel_all_goals(self) -> None:
-        """Ask the server to cancel all its goals, other clients' too."""
+        """Request the server to cancel all its goals, including those of other clients."""
         self.pub_cancel.publish(GoalID())
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Ask the server to cancel all goals with a stamp up to ``time``, other clients' too."""
+        """Request the server to cancel all goals stamped at or before ``time``, including those of other clients."""
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Return the older name of :meth:`wait_for_server`."""
+        """Wait as :meth:`wait_for_server` does, which is the newer name."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Return whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever).
+        """Wait until a server is connected on all five topics; return False after ``timeout`` (zero Duration: no timeout).
 
-        Raise ROSException in a fork of the node that has not called init_node.
+        Raise ROSException in a forked process that has not called init_node.
         """
         session = current_session()
         if session.is_fork_without_node:
@@ -156,7 +158,7 @@ class ActionClient:
 
 
 class _Listener(rospy.SubscribeListener):
-    """Notifies of new subscribers."""
+    """Calls ``notify`` for each new subscriber."""
 
     def __init__(self, notify: Callable[[], None]) -> None:
         self._notify = notify
@@ -164,10 +166,10 @@ class _Listener(rospy.SubscribeListener):
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """Notify of a new subscriber."""
+        """Call ``notify``."""
         self._notify()
 
 
 def _peer(connection: Connection) -> str:
-    """Return the name of the node at the other end of a link."""
+    """Return the name of the peer node of a connection."""
     return connection.callerid_pub if connection.direction == "i" else connection.endpoint_id

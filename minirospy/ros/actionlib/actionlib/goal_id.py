@@ -1,4 +1,4 @@
-"""Ids of goals: unique by the node's name, a number and the time."""
+"""Goal IDs: made unique by the node's name, a number and the time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["GoalIDGenerator"]
 
 
 class GoalIDGenerator:
-    """Makes ids that begin with ``name``, the node's where it is None."""
+    """Generates IDs that start with ``name``, by default the node's name."""
 
     _numbers = itertools.count(1)
 
@@ -20,10 +20,10 @@ class GoalIDGenerator:
         self.name = name or rospy.get_name()
 
     def set_name(self, name: str) -> None:
-        """Begin the ids with ``name`` from now on."""
+        """Set the prefix of the next IDs."""
         self.name = name
 
     def generate_ID(self) -> GoalID:
-        """Return a GoalID that no other goal of this process has, stamped with the present. Raise ROSInitException."""
+        """Return a GoalID that is unique in this process, stamped with the current time. Raise ROSInitException."""
         now = rospy.Time.now()
         return GoalID(stamp=now, id=f"{self.name}-{next(self._numbers)}-{now.secs}.{now.nsecs}")

@@ -1,6 +1,6 @@
-"""The server's state of a goal: a StatusTracker each, and the ServerGoalHandle by which user code moves it on.
+"""The server's state of its goals: one StatusTracker per goal, and the ServerGoalHandle with which user code changes it.
 
-Which state follows which is a table (`minirospy.core.graph.goals`).
+The transitions are a table in `minirospy.core.graph.goals`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _WHERE_FROM = {
 
 
 class StatusTracker:
-    """A goal of the server's list, or an id whose cancel came before its goal."""
+    """A goal in the server's list, or the ID of a goal that was cancelled before it arrived."""
 
     def __init__(
         self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None
@@ -40,8 +40,7 @@ class StatusTracker:
         self.goal = goal
         self.handle_tracker: HandleTrackerDeleter | None = None
         self.id_generator = GoalIDGenerator()
-        self.ended_at = 0
-        """Nanoseconds; zero while the goal has not ended."""
+        self.ended_at = 0  # nanoseconds of ROS time; 0 until the goal ends
         self._bytes: bytes | None = None
         self.status = GoalStatus()
         if goal is None:
@@ -56,16 +55,16 @@ class StatusTracker:
 
     @property
     def handle_destruction_time(self) -> times.Time:
-        """When the goal ended; zero while it has not."""
+        """The time at which the goal ended; zero before."""
         return rospy.Time(nsecs=self.ended_at)
 
     def end(self) -> None:
-        """Record that the goal has ended: its status is published for a while longer only."""
+        """Record that the goal has ended: its status is removed from the list after the status list timeout."""
         self.ended_at = rospy.Time.now().to_nsec()
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """Return the status as it travels. Once the goal has ended, it changes no more."""
+        """Return the serialized status. It is cached once the goal has ended, because it no longer changes."""
         if self._bytes is not None:
             return self._bytes
         encoded = status_bytes(self.status)
@@ -75,7 +74,7 @@ class StatusTracker:
 
 
 class HandleTrackerDeleter:
-    """Ends a goal of which nobody holds a handle any more."""
+    """Marks a goal as ended when its last handle is deleted."""
 
     def __init__(self, action_server: ActionServer, status_tracker: StatusTracker) -> None:
         self.action_server = action_server
@@ -88,7 +87,7 @@ class HandleTrackerDeleter:
 
 
 class ServerGoalHandle:
-    """A goal that a server got. One that is made without arguments holds none: its calls are logged as mistakes."""
+    """A goal received by a server. Without arguments it has no goal, and its methods log an error."""
 
     def __init__(
         self,
@@ -115,7 +114,7 @@ class ServerGoalHandle:
         return hash(self.get_goal_id().id)
 
     def get_default_result(self) -> Message | None:
-        """Return a result with nothing in it."""
+        """Return an empty result."""
         return self.action_server.ActionResultType() if self.action_server else None
 
     def set_accepted(self, text: str = "") -> None:
@@ -125,27 +124,27 @@ class ServerGoalHandle:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal at a client's request: RECALLED where it had not been accepted, else PREEMPTED."""
+        """End the goal after a cancel request: RECALLED if it had not been accepted, else PREEMPTED."""
         self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
     def set_rejected(self, result: Message | None = None, text: str = "") -> None:
-        """Refuse the goal."""
+        """Reject the goal."""
         self._log("Setting status to rejected on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.REJECT, result, text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal: it has failed."""
+        """End the goal as ABORTED."""
         self._log("Setting status to aborted on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.ABORT, result, text)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal: it is reached."""
+        """End the goal as SUCCEEDED."""
         self._log("Setting status to succeeded on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.SUCCEED, result, text)
 
     def set_cancel_requested(self) -> bool:
-        """Record that a client wants the goal canceled; return whether that changes its state."""
+        """Record a client's cancel request; return whether that changes the goal's state."""
         self._log("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
         tracker = self.status_tracker
         if not self.goal or tracker is None or self.action_server is None:
@@ -168,11 +167,11 @@ class ServerGoalHandle:
             self.action_server.publish_feedback(self.status_tracker.status, feedback)
 
     def get_goal(self) -> Any:
-        """Return the goal; None if the handle holds none."""
+        """Return the goal; None if the handle has none."""
         return self.goal.goal if self.goal else None
 
     def get_goal_id(self) -> GoalID:
-        """Return the goal's id and stamp."""
+        """Return the goal's ID and stamp."""
         if not self.goal or self.status_tracker is None:
             rospy.logerr("Attempt to get a goal id on an uninitialized ServerGoalHandle")
             return GoalID()
@@ -190,7 +189,7 @@ class ServerGoalHandle:
         rospy.logdebug(line, goal_id.id, goal_id.stamp.to_sec())
 
     def _step(self, event: GoalEvent, text: str) -> bool:
-        """Take the goal to its next state; a step that cannot be taken is logged."""
+        """Apply an event to the goal's state; log an error if the state does not allow it."""
         tracker = self.status_tracker
         if not self.goal or tracker is None or self.action_server is None:
             rospy.logerr("Attempt to set status on an uninitialized ServerGoalHandle")

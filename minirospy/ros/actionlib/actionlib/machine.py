@@ -1,6 +1,6 @@
-"""The client's state of its goals: one CommStateMachine a goal, found by the GoalManager, read through a ClientGoalHandle.
+"""The client's state of its goals: one CommStateMachine per goal, owned by the GoalManager, read by a ClientGoalHandle.
 
-The machine's rules are tables (`minirospy.core.graph.goals`). Source: http://wiki.ros.org/actionlib/DetailedDescription.
+The transitions are tables in `minirospy.core.graph.goals`. Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which a goal may be missing from the server's list: not there yet, or there no more."""
+"""States in which the server's list may lack the goal: the goal is not listed yet, or no longer."""
 
 
 class ClientGoalHandle:
-    """A goal that was sent. As long as a handle of it is kept, its callbacks are called."""
+    """A goal that was sent. Its callbacks are called only while a handle of it exists."""
 
     def __init__(self, comm_state_machine: CommStateMachine) -> None:
         self.comm_state_machine: CommStateMachine | None = comm_state_machine
@@ -49,18 +49,18 @@ class ClientGoalHandle:
         return hash(self.comm_state_machine)
 
     def cancel(self) -> None:
-        """Ask the server to cancel this goal."""
+        """Request the server to cancel this goal."""
         machine = self._machine("cancel")
         if machine is None:
             return
         with machine.mutex:
             machine.send_cancel_fn(GoalID(id=machine.action_goal.goal_id.id))
-            # The server may have ended it at this moment; then there is nothing to wait for.
+            # If the goal has just ended, there is no acknowledgement to wait for.
             if machine.state != _DONE:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 
     def get_comm_state(self) -> int:
-        """Return how far the goal is: one of CommState."""
+        """Return the communication state of the goal: one of CommState."""
         machine = self._machine("get_comm_state")
         return machine.state if machine else CommState.LOST
 
@@ -70,19 +70,19 @@ class ClientGoalHandle:
         return machine.latest_goal_status.status if machine else GoalStatus.PENDING
 
     def get_goal_status_text(self) -> str:
-        """Return the text that the server sent with it."""
+        """Return the server's text for the last status."""
         machine = self._machine("get_goal_status_text")
         if machine is None:
             return "ERROR: Trying to get_goal_status_text on an inactive ClientGoalHandle."
         return machine.latest_goal_status.text
 
     def get_result(self) -> Any:
-        """Return the goal's result; None while there is none."""
+        """Return the goal's result; None if there is none yet."""
         machine = self._machine("get_result")
         return machine.latest_result.result if machine and machine.latest_result else None
 
     def get_terminal_state(self) -> int:
-        """Return how the goal ended: one of TerminalState. LOST, and a line in the log, where it has not."""
+        """Return the final state of the goal: one of TerminalState. If it has not ended, log an error and return LOST."""
         machine = self._machine("get_terminal_state")
         if machine is None:
             return TerminalState.LOST
@@ -104,9 +104,9 @@ class ClientGoalHandle:
 
 
 class CommStateMachine:
-    """A goal as its client sees it: takes what the server publishes, calls back on each change.
+    """A goal as seen by its client: processes the server's messages, and calls back on each state change.
 
-    ``mutex`` is held during callbacks: those of a goal come one after the other.
+    ``mutex`` is held during callbacks, so the callbacks of a goal never run concurrently.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class CommStateMachine:
         return hash(self.action_goal.goal_id.id)
 
     def set_state(self, state: int) -> None:
-        """Go to a state without calling back."""
+        """Set the state without calling back."""
         rospy.logdebug(
             "Transitioning CommState from %s to %s",
             CommState.to_string(self.state),
@@ -145,7 +145,7 @@ class CommStateMachine:
         self.state = state
 
     def transition_to(self, state: int) -> None:
-        """Go to a state and call back."""
+        """Set the state and call back."""
         rospy.logdebug(
             "Transitioning to %s (from %s, goal: %s)",
             CommState.to_string(state),
@@ -169,7 +169,7 @@ class CommStateMachine:
                 self._mark_as_lost()
 
     def update_result(self, action_result: ActionResult) -> None:
-        """Process a result, perhaps another goal's."""
+        """Process a result; ignore that of another goal."""
         if self.action_goal.goal_id.id != action_result.status.goal_id.id:
             return
         with self.mutex:
@@ -180,12 +180,12 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The list of statuses may come later, or not at all: pass through what it would have reported.
+                # The matching status list may arrive later or never: first make the transitions that it would cause.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
     def update_feedback(self, action_feedback: ActionFeedback) -> None:
-        """Process feedback, perhaps another goal's."""
+        """Process feedback; ignore that of another goal."""
         if self.action_goal.goal_id.id != action_feedback.status.goal_id.id:
             return
         with self.mutex:
@@ -197,7 +197,7 @@ class CommStateMachine:
         self.transition_to(_DONE)
 
     def _follow(self, status: int) -> None:
-        """Pass through the states to which a status leads."""
+        """Make the transitions that lead to a status."""
         if self.state == CommState.LOST:
             rospy.logerr("CommStateMachine is in a funny state: %i", self.state)
             return
@@ -218,9 +218,9 @@ class CommStateMachine:
 
 
 class GoalManager:
-    """The goals of one action client: makes them, and hands each what the server publishes.
+    """The goals of one action client: creates them, and passes the server's messages to each.
 
-    It holds no goal alive: one without handles is not notified any more.
+    It has only weak references: a goal without handles receives no further messages.
     """
 
     _numbers = itertools.count(1)
@@ -237,11 +237,11 @@ class GoalManager:
         self.ActionFeedback = types.action_feedback
 
     def register_send_goal_fn(self, fn: Callable[[ActionGoal], object]) -> None:
-        """Set the function that sends a goal with its header."""
+        """Set the function that publishes a goal."""
         self.send_goal_fn = fn
 
     def register_cancel_fn(self, fn: Callable[[GoalID], object]) -> None:
-        """Set the function that sends a cancel."""
+        """Set the function that publishes a cancel request."""
         self.cancel_fn = fn
 
     def init_goal(
@@ -254,7 +254,7 @@ class GoalManager:
         action_goal = self.ActionGoal(goal_id=self._generate_id(), goal=goal)
         action_goal.header.stamp = rospy.get_rostime()
         machine = CommStateMachine(action_goal, transition_cb, feedback_cb, self.send_goal_fn, self.cancel_fn)
-        # First known, then sent: the answer may come before the sending returns.
+        # Register the goal before sending it: the answer may arrive before the send function returns.
         with self.list_mutex:
             self.statuses.append(weakref.ref(machine, self._forget))
         if self.send_goal_fn:
@@ -282,7 +282,7 @@ class GoalManager:
 
     def _get_live_statuses(self) -> list[CommStateMachine]:
         with self.list_mutex:
-            # A copy: collecting garbage may call _forget in this very thread.
+            # Iterate over a copy: the garbage collector may call _forget in this thread.
             references = list(self.statuses)
         machines = [reference() for reference in references]
         return [machine for machine in machines if machine is not None]

@@ -1,4 +1,4 @@
-"""ActionServer: takes goals and cancels, keeps a status of each goal, publishes statuses, feedback and results.
+"""ActionServer: receives goals and cancel requests, tracks the status of each goal, publishes statuses, feedback and results.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -42,15 +42,14 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50
-"""So many statuses are published at each change, without a pause."""
+_FEW_STATUSES = 50  # up to this many statuses are published immediately at each change
 
+# Pause after a longer list, per status in it: publishing lists must not use all the server's time.
 _SECONDS_A_STATUS = 1e-4
-"""Of more, each adds this to the pause between two lists: else a busy server would do nothing but publish them."""
 
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
-    """Do nothing: the cancel callback of a server that has none."""
+    """Do nothing: the default cancel callback."""
 
 
 _M = TypeVar("_M", bound=Message)
@@ -59,8 +58,9 @@ _M = TypeVar("_M", bound=Message)
 class ActionServer:
     """The server of the action ``ActionSpec`` in the namespace ``ns``.
 
-    ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each that a client wants
-    canceled, one after the other, in threads of the library. Parameters: ``actionlib_status_frequency`` in Hz,
+    ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each goal that a client cancels. They are
+    called
+    in threads of the library, never concurrently. Parameters: ``actionlib_status_frequency`` in Hz,
     ``<ns>/status_list_timeout`` in seconds (how long the status of a goal is published after its end),
     ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raise ActionException.
     """
@@ -109,24 +109,24 @@ class ActionServer:
 
     @property
     def status_list(self) -> list[StatusTracker]:
-        """Every goal whose status is published."""
+        """All goals whose status is published."""
         return list(self._trackers.values())
 
     @staticmethod
     def warn_of_auto_start() -> None:
-        """Goals may come before the one who made the server holds it."""
+        """Warn that auto_start can deliver goals before the caller has the server object."""
         rospy.logwarn(_AUTO_START)
 
     def register_goal_callback(self, cb: GoalCallback) -> None:
-        """Call ``cb`` with new goals from now on."""
+        """Set the callback for new goals."""
         self.goal_callback = cb
 
     def register_cancel_callback(self, cancel_cb: GoalCallback) -> None:
-        """Call ``cancel_cb`` with cancels from now on."""
+        """Set the callback for cancel requests."""
         self.cancel_callback = cancel_cb
 
     def start(self) -> None:
-        """Take goals from now on."""
+        """Start to accept goals."""
         with self.lock:
             if self.started:
                 self.stop()
@@ -135,7 +135,7 @@ class ActionServer:
             self.publish_status()
 
     def stop(self) -> None:
-        """Leave the action's topics; :meth:`start` takes the goals up again."""
+        """Unregister from the action's topics; :meth:`start` registers again."""
         with self.lock:
             self.started = False
             if self._status_thread:
@@ -146,12 +146,13 @@ class ActionServer:
                     end.unregister()
 
     def initialize(self) -> None:
-        """Join the action's topics, read the parameters."""
+        """Register with the action's topics and read the parameters."""
         name = rospy.remap_name(self.ns)
         self.pub_queue_size: int = rospy.get_param("actionlib_server_pub_queue_size", 50)
         if self.pub_queue_size < 0:
             self.pub_queue_size = 50
-        # Small messages that somebody waits for: none may wait for the one before to be acknowledged.
+        # Disable Nagle's algorithm: these messages are small and awaited, and must not be delayed until the last is
+        # acknowledged.
         self.status_pub = rospy.Publisher(
             name + "/status", StatusList, latch=True, tcp_nodelay=True, queue_size=self.pub_queue_size
         )
@@ -187,7 +188,7 @@ class ActionServer:
         self._status_thread = _StatusThread(self.publish_status_now, 1.0 / self.status_frequency)
 
     def publish_result(self, status: GoalStatus, result: Message | None) -> None:
-        """Send a goal's result, and its status."""
+        """Publish a goal's result, and the statuses."""
         with self.lock:
             message = self.ActionResult(status=status, result=result)
             message.header.stamp = rospy.Time.now()
@@ -195,14 +196,14 @@ class ActionServer:
             self.publish_status()
 
     def publish_feedback(self, status: GoalStatus, feedback: Message) -> None:
-        """Send feedback on a goal."""
+        """Publish feedback on a goal."""
         with self.lock:
             message = self.ActionFeedback(status=status, feedback=feedback)
             message.header.stamp = rospy.Time.now()
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish the statuses of all goals: now where they are few, else soon."""
+        """Publish the statuses of all goals: immediately if there are few, else after a pause."""
         with self.lock:
             pause = len(self._trackers) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -212,7 +213,7 @@ class ActionServer:
                 self._status_thread.hurry(self._published_at + pause - now)
 
     def publish_status_now(self) -> None:
-        """Publish the statuses of all goals but those that ended long ago."""
+        """Publish the statuses of all goals, after removing those that ended longer ago than the status list timeout."""
         with self.lock:
             now = rospy.get_rostime()
             self._forget_old(now)
@@ -222,7 +223,7 @@ class ActionServer:
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        """Cancel goals for a client: the one of the id, all up to a stamp, or all."""
+        """Process a cancel request: for one goal ID, for all goals up to a stamp, or for all goals."""
         time.sleep(CANCEL_SECONDS)
 
         with self.lock:
@@ -240,7 +241,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and goal_id.id not in self._trackers:
-                # The goal may be on its way: it is to be recalled as soon as it comes.
+                # The goal may still arrive: it is then recalled immediately.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._trackers[goal_id.id] = tracker
                 tracker.end()
@@ -248,7 +249,7 @@ class ActionServer:
             self.last_cancel = max(self.last_cancel, goal_id.stamp)
 
     def internal_goal_callback(self, goal: ActionGoal) -> None:
-        """Take a goal that a client has sent."""
+        """Process a goal from a client."""
         header = getattr(goal, "_connection_header", None) or {}
         if not TAKES_FAST_ANSWERS.items() <= header.items():
             time.sleep(SEND_SECONDS)
@@ -271,7 +272,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Take a goal whose id is known: it comes a second time, or after its cancel."""
+        """Process a goal with a known ID: it was sent twice, or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -318,14 +319,14 @@ class _StatusThread:
             threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:
-        """Call in so many seconds, where it was not to be called before that anyway."""
+        """Call ``publish`` in ``seconds``, unless a call is due before that."""
         due = time.monotonic() + seconds
         if due < self._due:
             self._due = due
             self._wake.set()
 
     def stop(self) -> None:
-        """Call no more."""
+        """Stop the calls and the thread."""
         self._stopped = True
         self._wake.set()
 
@@ -340,7 +341,7 @@ class _StatusThread:
 
 
 def _status_frequency(name: str) -> float:
-    """Return how often a server publishes all statuses, in Hz. Raise ActionException."""
+    """Return the rate in Hz at which a server publishes all statuses. Raise ActionException."""
     if rospy.has_param(name + "/status_frequency"):
         rospy.logwarn(
             "You're using the deprecated status_frequency parameter, please switch to "

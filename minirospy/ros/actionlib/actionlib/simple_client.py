@@ -27,7 +27,7 @@ FeedbackCallback = Callable[[Any], object]
 
 
 class SimpleActionClient:
-    """The client of one goal at a time: a new one takes the place of the one before.
+    """A client that tracks one goal at a time: a new goal replaces the previous one.
 
     ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raise ActionException.
     """
@@ -40,13 +40,13 @@ class SimpleActionClient:
         self.active_cb: Callable[[], object] | None = None
         self.feedback_cb: FeedbackCallback | None = None
         self._set_simple_state(SimpleGoalState.PENDING)
-        # Held while a goal is sent: its answer may come before its handle is known.
+        # Held while a goal is sent: its answer may arrive before its handle is stored.
         self._lock = threading.RLock()
         self._finished: ClientGoalHandle | None = None
         self._news = Waiting()
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Return whether a server is connected, within ``timeout`` (a zero Duration: whenever)."""
+        """Wait until a server is connected; return False after ``timeout`` (zero Duration: no timeout)."""
         return self.action_client.wait_for_server(timeout)
 
     def send_goal(
@@ -56,10 +56,10 @@ class SimpleActionClient:
         active_cb: Callable[[], object] | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> None:
-        """Send a goal; the one before is not tracked any more.
+        """Send a goal; the previous goal is no longer tracked.
 
-        ``active_cb()`` is called when the server starts with it, ``feedback_cb(feedback)`` with feedback,
-        ``done_cb(state, result)`` at its end; all in threads of the library.
+        ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` with feedback,
+        ``done_cb(state, result)`` when the goal ends; all in threads of the library.
         """
         with self._lock:
             self.stop_tracking_goal()
@@ -75,10 +75,11 @@ class SimpleActionClient:
         execute_timeout: times.Duration = rospy.Duration(),  # noqa: B008
         preempt_timeout: times.Duration = rospy.Duration(),  # noqa: B008
     ) -> int:
-        """Send a goal, wait for its end, and return its state.
+        """Send a goal, wait until it ends, and return its state.
 
-        After ``execute_timeout`` the goal is canceled, and its end awaited for ``preempt_timeout`` more. A zero
-        Duration waits for ever.
+        After ``execute_timeout`` cancel the goal, and wait for up to ``preempt_timeout`` until it ends. A zero Duration
+        means no
+        timeout.
         """
         self.send_goal(goal)
 
@@ -97,14 +98,14 @@ class SimpleActionClient:
         return self.get_state()
 
     def wait_for_result(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Return whether the goal comes to its end, its done callback done, within ``timeout`` (zero: whenever)."""
+        """Wait until the goal has ended and its done callback has returned; return False after ``timeout`` (zero: no timeout)."""
         waited_for = self.gh
         if waited_for is None:
             rospy.logerr("Called wait_for_result when no goal exists")
             return False
 
         def is_over() -> bool:
-            # The done callback may have sent the next goal already, and others may track another one.
+            # The done callback may have sent the next goal, or another thread may track a different one.
             return (
                 self.gh is None or self.simple_state == SimpleGoalState.DONE or self._finished is waited_for
             )
@@ -112,39 +113,39 @@ class SimpleActionClient:
         return self._news.wait_for(is_over, timeout) and self.gh is not None
 
     def get_result(self) -> Any:
-        """Return the goal's result; None while there is none."""
+        """Return the goal's result; None if there is none yet."""
         if self.gh is None:
             rospy.logerr("Called get_result when no goal is running")
             return None
         return self.gh.get_result()
 
     def get_state(self) -> int:
-        """Return the goal's state, one of GoalStatus; LOST without a goal."""
+        """Return the goal's state, one of GoalStatus; LOST if there is no goal."""
         gh = self.gh
         return visible_state(gh.get_goal_status()) if gh else GoalStatus.LOST
 
     def get_goal_status_text(self) -> str:
-        """Return the text that the server sent with the state."""
+        """Return the server's text for the state."""
         if self.gh is None:
             rospy.logerr("Called get_goal_status_text when no goal is running")
             return "ERROR: Called get_goal_status_text when no goal is running"
         return self.gh.get_goal_status_text()
 
     def cancel_all_goals(self) -> None:
-        """Ask the server to cancel all its goals, other clients' too."""
+        """Request the server to cancel all its goals, including those of other clients."""
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Ask the server to cancel all goals with a stamp up to ``time``, other clients' too."""
+        """Request the server to cancel all goals stamped at or before ``time``, including those of other clients."""
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:
-        """Ask the server to cancel the goal."""
+        """Request the server to cancel the goal."""
         if self.gh:
             self.gh.cancel()
 
     def stop_tracking_goal(self) -> None:
-        """Call no callback of the goal any more; the server goes on with it."""
+        """Stop calling the goal's callbacks; the server continues with the goal."""
         self.gh = None
         self._finished = None
 
@@ -174,7 +175,7 @@ class SimpleActionClient:
             self._log_wrong(comm_state)
 
     def _finish(self, tracked: ClientGoalHandle | None) -> None:
-        """Wake the threads that wait for the goal: it and its done callback are over."""
+        """Wake the threads that wait for the goal, after its done callback has returned."""
         with self._lock:
             self._finished = tracked
             if self.gh is tracked:

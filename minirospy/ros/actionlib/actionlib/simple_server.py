@@ -1,4 +1,4 @@
-"""SimpleActionServer: one goal at a time; a new goal requests that the current one is preempted.
+"""SimpleActionServer: one goal at a time; a new goal requests preemption of the current one.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription#Server-Side_Policies.
 """
@@ -29,12 +29,12 @@ _ACCEPTED = "This goal has been accepted by the simple action server"
 
 
 class SimpleActionServer:
-    """A server that works on one goal at a time.
+    """A server that executes one goal at a time.
 
-    ``execute_cb(goal)`` is called with each goal in a separate thread, and has to set a terminal state
-    (``set_succeeded``, ``set_aborted``, ``set_preempted``). Without it, ``register_goal_callback`` notifies of
-    goals, and ``accept_new_goal`` takes them. The program lives on while an ``execute_cb`` serves. Raise
-    ActionException on a class that is not an action.
+    ``execute_cb(goal)`` is called for each goal in a separate thread, and must set a terminal state (``set_succeeded``,
+    ``set_aborted``, ``set_preempted``). Without it, use ``register_goal_callback`` to be notified of goals, and
+    ``accept_new_goal`` to accept them. With an ``execute_cb``, the program runs until the node shuts down. Raise
+    ActionException if ``ActionSpec`` is not an action class.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class SimpleActionServer:
         self.action_server = ActionServer(
             name, ActionSpec, self.internal_goal_callback, self.internal_preempt_callback, auto_start=False
         )
-        # One lock for both: with two, a goal that comes while one ends could find them taken crosswise.
+        # Both share one lock: with two, a goal that arrives while another ends could cause a deadlock.
         self.lock = self.action_server.lock
         self.execute_condition = threading.Condition(self.lock)
 
@@ -72,11 +72,11 @@ class SimpleActionServer:
             self.start()
 
     def start(self) -> None:
-        """Take goals from now on."""
+        """Start to accept goals."""
         self.action_server.start()
 
     def accept_new_goal(self) -> Any:
-        """Begin with the goal that waits, and return it; the one that runs is preempted. None if none waits."""
+        """Accept the pending goal and return it, preempting the active one. Return None if no goal is pending."""
         with self.lock:
             if not self.new_goal or not self.next_goal.get_goal():
                 rospy.logerr("Attempting to accept the next goal when a new goal is not available")
@@ -92,45 +92,45 @@ class SimpleActionServer:
             return self.current_goal.get_goal()
 
     def is_new_goal_available(self) -> bool:
-        """Return whether a goal waits."""
+        """Return whether a goal is pending."""
         return self.new_goal
 
     def is_preempt_requested(self) -> bool:
-        """Return whether the goal that runs is to make way: it was canceled, or another one waits."""
+        """Return whether the active goal should be preempted: it was cancelled, or another goal is pending."""
         return self.preempt_request
 
     def is_active(self) -> bool:
-        """Return whether a goal runs."""
+        """Return whether a goal is active."""
         if not self.current_goal.get_goal():
             return False
         return self.current_goal.get_goal_status().status in (GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal: it is reached."""
+        """End the current goal as SUCCEEDED."""
         with self.lock:
             self.current_goal.set_succeeded(result or self.get_default_result(), text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal: it has failed."""
+        """End the current goal as ABORTED."""
         with self.lock:
             self.current_goal.set_aborted(result or self.get_default_result(), text)
 
     def set_preempted(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal: it was preempted."""
+        """End the current goal as PREEMPTED."""
         with self.lock:
             rospy.logdebug("Setting the current goal as canceled")
             self.current_goal.set_canceled(result or self.get_default_result(), text)
 
     def publish_feedback(self, feedback: Message) -> None:
-        """Send feedback on the goal that runs."""
+        """Publish feedback on the current goal."""
         self.current_goal.publish_feedback(feedback)
 
     def get_default_result(self) -> Message | None:
-        """Return a result with nothing in it."""
+        """Return an empty result."""
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Call ``cb()`` when a goal has come; not for a server with an execute callback."""
+        """Set ``cb()``, called when a goal arrives; refused, with a warning, for a server with an execute callback."""
         if self.execute_callback:
             rospy.logwarn(
                 "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback exists. "
@@ -140,11 +140,11 @@ class SimpleActionServer:
             self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
-        """Call ``cb()`` when the goal that runs is to make way."""
+        """Set ``cb()``, called when preemption of the active goal is requested."""
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
-        """Take a new goal."""
+        """Process a new goal."""
         with self.lock:
             rospy.logdebug(
                 "A new goal %s has been received by the single goal action server", goal.get_goal_id().id
@@ -172,7 +172,7 @@ class SimpleActionServer:
             self.execute_condition.notify_all()
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
-        """Take a client's request to cancel a goal."""
+        """Process a client's request to cancel a goal."""
         with self.lock:
             rospy.logdebug("A preempt has been received by the SimpleActionServer")
             if preempt == self.current_goal:
@@ -187,7 +187,7 @@ class SimpleActionServer:
                 self.new_goal_preempt_request = True
 
     def executeLoop(self) -> None:
-        """Run the execute callback for each goal, in its thread."""
+        """Run the execute callback for each goal; the body of the execute thread."""
         with rospy.interrupting(self._wake_soon):
             while True:
                 with self.execute_condition:
@@ -205,7 +205,8 @@ class SimpleActionServer:
         try:
             self.execute_callback(goal)
         except BaseException as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
-            # Ctrl-C ends its sleep with an exception, and a shutdown hook may have closed what it works with.
+            # During a shutdown exceptions are expected: Ctrl-C interrupts sleeps, and a hook may have closed the
+            # callback's resources.
             if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())
                 self.set_aborted(None, f"Exception in execute callback: {error}")
@@ -215,7 +216,7 @@ class SimpleActionServer:
                 self.set_aborted(None, "No terminal state was set.")
 
     def _wake_soon(self) -> None:
-        """Have the loop look again; in a thread, since a callback that blocks may hold the lock."""
+        """Wake the execute loop from a new thread, because a callback that blocks may hold the lock."""
         with naming_thread_limit():
             threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 

@@ -1,4 +1,4 @@
-"""The messages of an action, by its class: `TestAction` -> its goal, result and feedback, with and without header."""
+"""The message classes of an action, from its class: `TestAction` -> goal, result and feedback, with and without header."""
 
 from __future__ import annotations
 
@@ -17,17 +17,14 @@ __all__ = [
 ]
 
 
+# Field in the connection header of goals from minirospy clients.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
-"""What our clients send in the connection header of their goals."""
 
+# Delay of goals from other clients: Python actionlib drops results that arrive before send_goal has returned.
 SEND_SECONDS = 1e-3
-"""Goals of third-party clients wait for this long.
 
-actionlib in Python drops what comes before its send_goal has returned: a result, too.
-"""
-
+# Delay of cancel requests: a goal sent before uses another connection, and is itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
-"""Cancels wait for this long: the goal that was sent before comes by another connection, and waits itself."""
 
 
 class ActionException(MinirospyError):
@@ -35,7 +32,7 @@ class ActionException(MinirospyError):
 
 
 class ActionTypes(NamedTuple):
-    """The message classes of an action; the ``action_`` ones are those that travel."""
+    """The message classes of an action; those named ``action_...`` are the ones sent on the topics."""
 
     action_goal: type[ActionGoal]
     action_result: type[ActionResult]

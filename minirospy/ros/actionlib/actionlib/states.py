@@ -1,4 +1,4 @@
-"""The numbers that an action's client reports, by the names that user code has for them."""
+"""The state constants of an action client, under the names that user code expects."""
 
 from __future__ import annotations
 
@@ -17,25 +17,24 @@ __all__ = [
 ]
 
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
-"""The marks in the transition table of ROS's client for a status that changes nothing, or is impossible.
+"""In the transition table of ROS's client: a status that changes nothing, or is invalid.
 
-Ours is in :mod:`minirospy.core.graph.goals`; `from actionlib import *` brings them, so programs may use these names.
+minirospy's table is in :mod:`minirospy.core.graph.goals`; programs may use these names after `from actionlib import *`.
 """
-g_goal_id = 1
-"""A number of ROS's module that nothing counts; `from actionlib import *` brings it."""
+g_goal_id = 1  # unused; `from actionlib import *` exports it in ROS
 
 
 def get_name_of_constant(C: type, n: int) -> str:
-    """Return the name of the constant of a class that has this value, as ``NO_SUCH_STATE_77`` where it has none."""
+    """Return the name of a class's constant with this value, or a name such as ``NO_SUCH_STATE_77`` if there is none."""
     for name, value in vars(C).items():
-        # A bool is an int, too: a message class has such constants.
+        # ``type(value) is int`` excludes bool constants, which message classes also have.
         if type(value) is int and value == n and not name.startswith("_"):
             return name
     return f"NO_SUCH_STATE_{n}"
 
 
 class CommState:
-    """The state of a goal in the client."""
+    """The communication states of a goal in the client."""
 
     WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
     PENDING = int(ClientState.PENDING)
@@ -54,7 +53,7 @@ class CommState:
 
 
 class TerminalState:
-    """The final state of a goal."""
+    """The final states of a goal."""
 
     RECALLED = int(GoalState.RECALLED)
     REJECTED = int(GoalState.REJECTED)
@@ -70,7 +69,7 @@ class TerminalState:
 
 
 class SimpleGoalState:
-    """The state of the goal in the simple client."""
+    """The states of the goal in the simple client."""
 
     PENDING = int(SimpleState.PENDING)
     ACTIVE = int(SimpleState.ACTIVE)
@@ -82,5 +81,5 @@ class SimpleGoalState:
         return get_name_of_constant(cls, n)
 
 
-# As ROS's actionlib does it: `GoalStatus.to_string(client.get_state())`.
+# ROS's actionlib also adds this method: `GoalStatus.to_string(client.get_state())`.
 GoalStatus.to_string = classmethod(get_name_of_constant)  # type: ignore[attr-defined]

@@ -1,7 +1,7 @@
-"""A list of statuses as it travels: actionlib_msgs/GoalStatusArray, made of parts and read in part.
+"""A serialized actionlib_msgs/GoalStatusArray: composed of serialized statuses, and parsed only where needed.
 
-A server publishes the status of each goal for seconds after its end, so a busy one publishes thousands at a time, of
-which a client wants those of its own goals.
+A server publishes the status of each goal for seconds after its end, so a busy server publishes thousands at a time, of
+which a client needs only those of its own goals.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _STATUS_AND_LENGTH = struct.Struct("<BI")
 
 
 def status_bytes(status: GoalStatus) -> bytes:
-    """Return a status as it travels."""
+    """Return a serialized status."""
     buffer = BytesIO()
     status.serialize(buffer)
     return buffer.getvalue()
 
 
 class StatusList(GoalStatusArray):
-    """A GoalStatusArray that is sent as the parts which it was made of, and read when it is used."""
+    """A GoalStatusArray that is sent from serialized statuses, and parsed on access."""
 
     _takes_memoryview = False
 
@@ -43,30 +43,30 @@ class StatusList(GoalStatusArray):
 
     @property
     def status_list(self) -> list[GoalStatus]:
-        """The statuses."""
+        """The statuses, parsed on first access."""
         if self._read is None:
             self._read = [self._status(start, end) for start, end in self._bounds()]
         return self._read
 
     @status_list.setter
     def status_list(self, statuses: list[GoalStatus]) -> None:
-        # The base class sets an empty one.
+        # The base class's constructor sets an empty list.
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:
-        """Return the status of a goal; None if the list does not have it."""
+        """Return the status of a goal; None if it is not in the list."""
         name = id.encode()
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # It is there, or is a part of another goal's text.
+        # Check the position: the bytes may also occur in another goal's text.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
                 return self._status(start, end)
         return None
 
     def serialize(self, buff: Writer) -> None:
-        """Write the message. Raise genpy.SerializationError."""
+        """Serialize the message. Raise genpy.SerializationError."""
         if self._read is not None:
             self._parts = [status_bytes(status) for status in self._read]
         stamp = self.header.stamp
@@ -77,13 +77,13 @@ class StatusList(GoalStatusArray):
         buff.write(b"".join(self._parts))
 
     def deserialize(self, data: Buffer) -> StatusList:
-        """Take the message's bytes. Raise genpy.DeserializationError."""
+        """Store the message's bytes, parsing only the header. Raise genpy.DeserializationError."""
         data = bytes(data)
         try:
             seq, secs, nsecs, length = _HEADER.unpack_from(data)
             self._start = _HEADER.size + length + _COUNT.size
             (self._count,) = _COUNT.unpack_from(data, self._start - _COUNT.size)
-        except (struct.error, OverflowError):  # the second: of an offset that 32 bits do not hold
+        except (struct.error, OverflowError):  # OverflowError: an offset beyond the range of struct
             self._fail(data)
         self.header.seq = seq
         self.header.stamp.secs, self.header.stamp.nsecs = secs, nsecs
@@ -93,7 +93,7 @@ class StatusList(GoalStatusArray):
         return self
 
     def _bounds(self) -> list[tuple[int, int]]:
-        """Return where each status starts and ends."""
+        """Return the start and end offset of each status."""
         bounds = []
         data, end = self._data, self._start
         try:
@@ -102,7 +102,7 @@ class StatusList(GoalStatusArray):
                 end += 17 + _STAMP_AND_LENGTH.unpack_from(data, start)[2]
                 end += _STATUS_AND_LENGTH.unpack_from(data, end - 5)[1]
                 bounds.append((start, end))
-        except (struct.error, OverflowError):  # the second: of an offset that 32 bits do not hold
+        except (struct.error, OverflowError):  # OverflowError: an offset beyond the range of struct
             self._fail(data)
         return bounds
 
@@ -112,12 +112,12 @@ class StatusList(GoalStatusArray):
         return status
 
     def _fail(self, data: bytes) -> None:
-        # The generated class finds the same fault, and words it.
+        # The generated class raises DeserializationError for the same data, with its message.
         GoalStatusArray().deserialize(data)
 
 
 def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
-    """Return the status of a goal in a GoalStatusArray; None if it does not have it."""
+    """Return the status of a goal in a GoalStatusArray; None if it is not in the list."""
     if isinstance(statuses, StatusList):
         return statuses.find(id)
     for status in statuses.status_list:

@@ -1,4 +1,4 @@
-"""Blocking until others have made something true: no polling, ended by a shutdown, timed by ROS time."""
+"""Blocking until a condition becomes true: without polling, interrupted by a shutdown, with timeouts in ROS time."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ from minirospy.base.clock import SignalSafeEvent, wait_for_event
 __all__ = ["Waiting"]
 
 _FOREVER = times.Duration()
-_SIMULATED_SLICE = 0.02
-"""Seconds: nothing notifies of simulated time's passing, which may be faster than the wall's."""
+_SIMULATED_SLICE = 0.02  # seconds; polling interval in simulated time, which may run faster than wall time
 
 
 class Waiting:
-    """Threads that wait for a condition; who may have made it true calls :meth:`notify`."""
+    """Threads that wait for a condition; call :meth:`notify` when it may have become true."""
 
     def __init__(self) -> None:
         self._events: list[threading.Event] = []
 
     def notify(self) -> None:
-        """Have all that wait look again."""
+        """Make all waiting threads check their condition again."""
         for event in list(self._events):
             event.set()
 
     def wait_for(self, condition: Callable[[], bool], timeout: times.Duration) -> bool:
-        """Return whether ``condition()`` came to hold within ``timeout`` (zero: whenever) and before a shutdown."""
+        """Wait until ``condition()`` is true; return False after ``timeout`` (zero: no timeout) or at a shutdown."""
         deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
         if condition():
             return True

@@ -1,6 +1,7 @@
-"""axclient.py: send a goal to an action server from the terminal, by a form made from the goal's type.
+"""axclient.py: send a goal to an action server from the terminal, with a form generated from the goal's type.
 
-Source: http://wiki.ros.org/actionlib (Tools): there it is a window, here lines, so that a script may use it too.
+Source: http://wiki.ros.org/actionlib (Tools). ROS's axclient.py opens a window; this one uses lines, so that scripts can use
+it too.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class NodeParser(Parser):
-    """Leaves out the remapping arguments, which the node reads itself."""
+    """A parser that ignores remapping arguments, which the node parses itself."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raise CommandLineError."""
@@ -70,7 +71,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
     if goal is None and type and type.lstrip().startswith("{"):
         type, goal = None, type
-    # Ctrl-C is to cancel the goal first.
+    # Without signal handlers: Ctrl-C cancels the goal first.
     rospy.init_node("axclient", anonymous=True, disable_signals=True, disable_rosout=True)
     name = rospy.resolve_name(action)
     cls = action_class(type or _found_type(name, timeout))
@@ -93,7 +94,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
 
 def action_class(type_: str) -> type[Action]:
-    """Return the class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+    """Return the class of an action from its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
     Raise NotFoundError.
     """
@@ -107,7 +108,7 @@ def action_class(type_: str) -> type[Action]:
 
 
 def read_answer(question: str) -> str:
-    """Prompt for a line and return it; at the end of the input return an empty one."""
+    """Prompt for a line and return it; return "" at end of input."""
     try:
         return input(question)
     except EOFError:
@@ -121,7 +122,7 @@ def _complain(error: Exception) -> None:
 
 
 def _found_type(action: str, timeout: float | None) -> str:
-    """Wait for the action's server; return the action's type. Raise ROSException after ``timeout`` seconds."""
+    """Wait for the action's server and return the action's type. Raise ROSException after ``timeout`` seconds."""
     from minirospy.introspect.graph import Graph
 
     waiting = threading.Event()
@@ -142,7 +143,7 @@ def _found_type(action: str, timeout: float | None) -> str:
 
 
 class _Progress:
-    """A goal under way: prints its state and feedback, cancels at Ctrl-C."""
+    """A running goal: prints its state and feedback, and cancels it on Ctrl-C."""
 
     def __init__(self, client: SimpleActionClient, goal: Message) -> None:
         self._client = client
@@ -153,7 +154,7 @@ class _Progress:
         self._is_active = False
 
     def run(self) -> int:
-        """Send the goal and wait for its end; return the exit status."""
+        """Send the goal, wait until it ends, and return the exit status."""
         from actionlib_msgs.msg import GoalStatus
 
         from minirospy.core.idl.message import strify_message
@@ -162,7 +163,7 @@ class _Progress:
         self._tell("Sent")
         try:
             client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
-            # In slices: a Ctrl-C just before a wait would be seen at its end only.
+            # Wait in slices: a Ctrl-C just before a long wait would take effect only after it.
             while not self._done.wait(_SLICE_SECONDS):
                 pass
         except KeyboardInterrupt:
@@ -189,7 +190,7 @@ class _Progress:
             self._tell("Active")
 
     def _on_feedback(self, feedback: Message) -> None:
-        # It has a separate connection, and may arrive before the status.
+        # Feedback has a separate connection, and may arrive before the status.
         self._on_active()
         line = "Feedback: " + ", ".join(f"{field.path}: {flow(field.value)}" for field in fields(feedback))
         share = progress(self._goal, feedback)
@@ -199,7 +200,7 @@ class _Progress:
         self._tell(line, replaces=True)
 
     def _tell(self, line: str, *, replaces: bool = False) -> None:
-        """Print a line; on a terminal feedback takes the place of the feedback before."""
+        """Print a line; on a terminal, feedback overwrites the previous feedback."""
         with self._lock:
             on_terminal = sys.stdout.isatty()
             if self._is_line_open and not replaces:
@@ -212,7 +213,7 @@ class _Progress:
 
 
 def progress(goal: Message, feedback: Message) -> float | None:
-    """Return the share of a goal reached, 0 to 1, where each has one number and the goal's is the greater; else None."""
+    """Return the progress, 0 to 1, if goal and feedback each have one number, of which the goal's is not smaller; else None."""
     wanted, reached = (
         [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]
         for message in (goal, feedback)

@@ -1,6 +1,6 @@
-"""axserver.py: an action server at the terminal, whose person answers the goals: to try a client without a robot.
+"""axserver.py: an action server on the terminal, whose user answers the goals; for testing a client without a robot.
 
-Source: http://wiki.ros.org/actionlib (Tools): there it is a window, here lines.
+Source: http://wiki.ros.org/actionlib (Tools). ROS's axserver.py opens a window; this one uses lines.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _axserver(action: str, type: str) -> None:
     print(f"Serving {rospy.resolve_name(action)} ({cls._type})", flush=True)
     while True:
         while not news.wait(_SLICE_SECONDS):
-            # In slices: a Ctrl-C just before a wait would be seen at its end only.
+            # Wait in slices: a Ctrl-C just before a long wait would take effect only after it.
             pass
         news.clear()
         while server.is_new_goal_available():
@@ -64,7 +64,7 @@ def _axserver(action: str, type: str) -> None:
 
 
 def _answer(server: SimpleActionServer) -> bool:
-    """Prompt for actions until the goal has ended; return False if the input ends: then it is aborted."""
+    """Prompt for actions until the goal has ended; at end of input, abort the goal and return False."""
     types = server.action_server
     endings: dict[str, Callable[..., None]] = {
         "s": server.set_succeeded,

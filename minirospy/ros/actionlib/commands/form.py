@@ -1,4 +1,4 @@
-"""A message as a form on the terminal: a question per field, with what is in it as the default; answers are YAML."""
+"""A message as a form on the terminal: a prompt per field, with its value as the default; answers are YAML."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 class Field(NamedTuple):
-    """A field to ask for: its path (``pose.position.x``), type and value."""
+    """A field to prompt for: its path (``pose.position.x``), type and value."""
 
     path: str
     type: str
@@ -24,7 +24,7 @@ class Field(NamedTuple):
 
 
 def fields(message: Message, prefix: str = "") -> Iterator[Field]:
-    """Yield the fields of a message and of those in it; an array, a time and a duration are one field each."""
+    """Yield the fields of a message and of its nested messages; an array, a time or a duration is a single field."""
     for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
         value = getattr(message, name)
         if is_message(value):
@@ -39,12 +39,12 @@ def ask_for(
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
 ) -> _M:
-    """Fill ``message`` with the answers to a question per field, and return it; an empty answer changes nothing.
+    """Fill ``message`` from the answers to a prompt per field, and return it; an empty answer keeps the value.
 
-    Of the message's own fields those in ``known`` are not asked for.
+    Skip the top-level fields in ``known``.
 
-    ``ask(question)`` gives the answer. ``complain(error)`` is called for one that does not fit: then the question
-    is asked again; it may raise instead.
+    ``ask(question)`` returns the answer. If the answer is invalid, call ``complain(error)``, which may raise, and prompt
+    again.
     """
     for field in list(fields(message)):
         if field.path.partition(".")[0] in known:
@@ -52,7 +52,7 @@ def ask_for(
         answer = ask(_question(field)).strip()
         while answer:
             try:
-                # Tried on a separate message: a value that does not fit must not stay.
+                # Try the value on a separate message first: an invalid one must not remain in ``message``.
                 values = _nested(field.path, _value(field, answer))
                 check(fill(type(message)(), [values]))
             except (MessageException, ValueTextError) as error:
@@ -65,7 +65,7 @@ def ask_for(
 
 
 def flow(value: object) -> str:
-    """Return a value on one line, as YAML."""
+    """Return a value as YAML on one line."""
     if isinstance(value, bool):
         return str(value)
     if isinstance(value, bytes | list | tuple):
@@ -83,7 +83,7 @@ def _question(field: Field) -> str:
 
 
 def _value(field: Field, answer: str) -> object:
-    """Return an answer's value; a string needs no quotes."""
+    """Parse an answer; a string needs no quotes."""
     if field.type == "string" and answer[0] not in "'\"":
         return answer
     return parse_value(answer)

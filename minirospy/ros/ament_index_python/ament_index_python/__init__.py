@@ -1,5 +1,5 @@
-"""The index of packages by which PyPI's xacro resolves `$(find PACKAGE)`: a look-up in the packages that we find.
+"""The package index with which PyPI's xacro resolves `$(find PACKAGE)`: it looks up packages as minirospy does.
 
-xacro is made for both ROS 1 and 2, and its release on PyPI looks packages up as ROS 2 does. With a real ROS 2 in the
-environment its own module comes first.
+xacro supports both ROS 1 and 2, and its PyPI release looks packages up as ROS 2 does. In an environment with ROS 2, the
+real module takes precedence.
 """

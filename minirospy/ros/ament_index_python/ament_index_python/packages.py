@@ -1,4 +1,4 @@
-"""Where packages are, by the names of ROS 2's functions. Source: https://github.com/ament/ament_index (ament_index_python)."""
+"""Package paths, with ROS 2's function names. Source: https://github.com/ament/ament_index (ament_index_python)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = [
 
 
 class PackageNotFoundError(KeyError):
-    """No package of this name, in ROS_PACKAGE_PATH or among minirospy's own."""
+    """There is no package of this name in ROS_PACKAGE_PATH or in minirospy."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -38,10 +38,10 @@ def get_package_share_path(package_name: str, print_warning: bool = True) -> Pat
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Return the folder of a package: ROS 1 has no folder that several share. Raise PackageNotFoundError."""
+    """Return the folder of a package: ROS 1 has no shared prefix. Raise PackageNotFoundError."""
     return get_package_share_directory(package_name)
 
 
 def get_packages_with_prefixes() -> dict[str, str]:
-    """Return every package and its folder."""
+    """Return all packages with their folders."""
     return {name: str(folder) for name, folder in Packages().folders().items()}

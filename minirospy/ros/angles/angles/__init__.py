@@ -1,4 +1,4 @@
-"""angles: distances on the circle, with and without limits. All angles are radians. Source: http://wiki.ros.org/angles."""
+"""angles: distances between angles, with and without limits. All angles are in radians. Source: http://wiki.ros.org/angles."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ _TURN = 2.0 * pi
 
 
 def normalize_angle_positive(angle: float) -> float:
-    """Return the same angle from 0 to 2 pi."""
+    """Normalize an angle to the range 0 to 2 pi."""
     return angle % _TURN
 
 
 def normalize_angle(angle: float) -> float:
-    """Return the same angle from -pi to pi."""
+    """Normalize an angle to the range -pi to pi."""
     positive = normalize_angle_positive(angle)
     return positive - _TURN if positive > pi else positive
 
 
 def shortest_angular_distance(from_angle: float, to_angle: float) -> float:
-    """Return the turn between two angles, from -pi to pi."""
+    """Return the shortest rotation from one angle to another, from -pi to pi."""
     return normalize_angle(to_angle - from_angle)
 
 
 def two_pi_complement(angle: float) -> float:
-    """Return the turn to the same angle the other way round, from -2 pi to 2 pi."""
+    """Return the rotation to the same angle in the opposite direction, from -2 pi to 2 pi."""
     if abs(angle) > _TURN:
         angle = fmod(angle, _TURN)
     return angle - _TURN if angle > 0 else angle + _TURN
@@ -42,9 +42,9 @@ def two_pi_complement(angle: float) -> float:
 def shortest_angular_distance_with_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return whether a turn stays within the limits, and the turn: the shortest one that does, if there is one.
+    """Return (success, rotation): the shortest rotation to an angle that stays within limits, if there is one.
 
-    All angles are from -pi to pi. The limits go counter-clockwise from left to right: [0.25, -0.25] contains pi, and not 0.
+    All angles are from -pi to pi. The limits run counter-clockwise from left to right: [0.25, -0.25] contains pi, but not 0.
     """
     is_inside, least, greatest = _find_min_max_delta(from_angle, left_limit, right_limit)
     turn = shortest_angular_distance(from_angle, to_angle)
@@ -53,7 +53,7 @@ def shortest_angular_distance_with_limits(
         for each in (turn, other):
             if least <= each <= greatest:
                 return True, each
-        # The goal is outside: turn to the limit that is closer to it.
+        # The target is outside the limits: rotate towards the limit that is closer to it.
         _, least, greatest = _find_min_max_delta(to_angle, left_limit, right_limit)
         least, greatest = greatest, least
 
@@ -67,9 +67,9 @@ def shortest_angular_distance_with_limits(
 def shortest_angular_distance_with_large_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return whether a turn stays within limits that may be beyond -pi and pi, and the turn.
+    """Return (success, rotation), as the function above, for limits that may be beyond -pi and pi.
 
-    The left limit has to be below the right one.
+    The left limit must be below the right one.
     """
     turn = shortest_angular_distance(from_angle, to_angle)
     other = two_pi_complement(turn)
@@ -85,7 +85,7 @@ def shortest_angular_distance_with_large_limits(
 def _find_min_max_delta(
     from_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float, float]:
-    """Return whether an angle is within the limits, and how far it can turn clockwise and counter-clockwise to them."""
+    """Return whether an angle is within limits, and how far it can rotate clockwise and counter-clockwise before a limit."""
     to_left = shortest_angular_distance(from_angle, left_limit)
     to_right = shortest_angular_distance(from_angle, right_limit)
     left_round, right_round = two_pi_complement(to_left), two_pi_complement(to_right)

@@ -1,1 +1,1 @@
-"""bondpy: two nodes that notice when the other one ends. Source: http://wiki.ros.org/bondpy."""
+"""bondpy: a bond notifies each of two nodes when the other exits. Source: http://wiki.ros.org/bondpy."""

@@ -1,4 +1,4 @@
-"""A bond: heartbeats of two nodes on a topic, and callbacks when the bond forms and breaks.
+"""A bond: two nodes exchange heartbeats on a topic, and get callbacks when the bond forms and breaks.
 
 Source: http://wiki.ros.org/bond, http://wiki.ros.org/bondpy.
 """
@@ -23,22 +23,21 @@ __all__ = ["Bond", "Timeout", "as_float_duration", "as_ros_duration"]
 Seconds = float | times.Duration
 Callback = Callable[[], object]
 
-_LOOK = 0.1
-"""Seconds between two looks for a shutdown."""
+_LOOK = 0.1  # seconds between checks for a shutdown
 
 
 def as_ros_duration(d: Seconds) -> times.Duration:
-    """Return seconds, or a Duration, as a Duration."""
+    """Convert seconds to a Duration; a Duration is returned unchanged."""
     return d if isinstance(d, times.Duration) else rospy.Duration.from_sec(d)
 
 
 def as_float_duration(d: Seconds) -> float:
-    """Return seconds, or a Duration, as seconds."""
+    """Convert a Duration to seconds; a number is returned unchanged."""
     return d.to_sec() if isinstance(d, times.Duration) else d
 
 
 class Timeout:
-    """Calls a function some time after ``reset``, unless it is reset or cancelled before."""
+    """Calls a function ``duration`` after ``reset``, unless it is reset or cancelled before."""
 
     def __init__(self, duration: Seconds, on_timeout: Callback | None = None) -> None:
         self.duration = duration
@@ -47,7 +46,7 @@ class Timeout:
         self.timer: threading.Timer | None = None
 
     def reset(self) -> Timeout:
-        """Start again, and return itself."""
+        """Restart the timeout; return self."""
         self.cancel()
         seconds = as_float_duration(self.duration)
         self.deadline = time.monotonic() + seconds
@@ -58,22 +57,22 @@ class Timeout:
         return self
 
     def cancel(self) -> None:
-        """Do not call the function."""
+        """Cancel the timeout."""
         if self.timer is not None:
             self.timer.cancel()
 
     def left(self) -> times.Duration:
-        """Return the time that is left."""
+        """Return the remaining time."""
         return rospy.Duration.from_sec(max(0.0, self.deadline - time.monotonic()))
 
 
 class Bond:
-    """One end of a bond. ``start`` looks for the other end: a bond of the same topic and id in another node."""
+    """One endpoint of a bond. ``start`` waits for its peer: a Bond with the same topic and ID in another node."""
 
     def __init__(
         self, topic: str, id: str, on_broken: Callback | None = None, on_formed: Callback | None = None
     ) -> None:
-        """Make an end that does not look for the other one yet; callbacks are called without a lock."""
+        """Create an endpoint without starting it. Callbacks are called without holding a lock."""
         self.topic = topic
         self.id = id
         self.instance_id = str(uuid.uuid4())
@@ -93,60 +92,60 @@ class Bond:
             Event.HEARTBEAT_TIMEOUT: Constants.DEFAULT_HEARTBEAT_TIMEOUT,
             Event.DISCONNECT_TIMEOUT: Constants.DEFAULT_DISCONNECT_TIMEOUT,
         }
-        # When each timeout that runs is over, by the monotonic clock.
+        # Deadlines of the active timeouts, in monotonic time.
         self._deadlines: dict[Event, float] = {}
         self._heartbeat_period: float = Constants.DEFAULT_HEARTBEAT_PERIOD
         self.sub: rospy.Subscriber[Status] | None = None
         self.thread: threading.Thread | None = None
-        # Only the newest heartbeat is worth sending.
+        # queue_size=1: only the newest heartbeat is useful.
         self.pub: rospy.Publisher[Status] = rospy.Publisher(topic, Status, queue_size=1)
 
     def __repr__(self) -> str:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # An error of __init__ leaves nothing to end.
+        # Without ``pub``, __init__ has failed and there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 
-    # Times, which can be set until the bond starts.
+    # Timeouts; they can be changed until the bond is started.
 
     def get_connect_timeout(self) -> Seconds:
-        """Return how long the bond may take to form."""
+        """Return the maximum time for the bond to form."""
         return self._seconds[Event.CONNECT_TIMEOUT]
 
     def set_connect_timeout(self, dur: Seconds) -> None:
-        """Set how long the bond may take to form."""
+        """Set the maximum time for the bond to form."""
         self._set(Event.CONNECT_TIMEOUT, dur)
 
     connect_timeout = property(get_connect_timeout, set_connect_timeout)
 
     def get_heartbeat_timeout(self) -> Seconds:
-        """Return how long the other end may be silent."""
+        """Return the maximum time between heartbeats from the peer."""
         return self._seconds[Event.HEARTBEAT_TIMEOUT]
 
     def set_heartbeat_timeout(self, dur: Seconds) -> None:
-        """Set how long the other end may be silent."""
+        """Set the maximum time between heartbeats from the peer."""
         self._set(Event.HEARTBEAT_TIMEOUT, dur)
 
     heartbeat_timeout = property(get_heartbeat_timeout, set_heartbeat_timeout)
 
     def get_disconnect_timeout(self) -> Seconds:
-        """Return how long the other end may take to confirm that the bond is broken."""
+        """Return the maximum time for the peer to confirm that the bond is broken."""
         return self._seconds[Event.DISCONNECT_TIMEOUT]
 
     def set_disconnect_timeout(self, dur: Seconds) -> None:
-        """Set how long the other end may take to confirm that the bond is broken."""
+        """Set the maximum time for the peer to confirm that the bond is broken."""
         self._set(Event.DISCONNECT_TIMEOUT, dur)
 
     disconnect_timeout = property(get_disconnect_timeout, set_disconnect_timeout)
 
     def get_heartbeat_period(self) -> float:
-        """Return the seconds between two heartbeats."""
+        """Return the interval between heartbeats in seconds."""
         return self._heartbeat_period
 
     def set_heartbeat_period(self, per: Seconds) -> None:
-        """Set the time between two heartbeats."""
+        """Set the interval between heartbeats."""
         assert not self._has_started, "the bond has started"
         self._heartbeat_period = as_float_duration(per)
 
@@ -156,10 +155,10 @@ class Bond:
         assert not self._has_started, "the bond has started"
         self._seconds[timeout] = seconds
 
-    # What a program calls.
+    # Public methods.
 
     def start(self) -> None:
-        """Look for the other end."""
+        """Start sending heartbeats, and wait for the peer in a thread."""
         with self.lock:
             self._run_timeout(Event.CONNECT_TIMEOUT)
             self.sub = rospy.Subscriber(self.topic, Status, self._on_bond_status)
@@ -168,21 +167,21 @@ class Bond:
             self._has_started = True
 
     def set_formed_callback(self, on_formed: Callback | None) -> None:
-        """Set what is called when the bond forms."""
+        """Set the callback for when the bond forms."""
         with self.lock:
             self.on_formed = on_formed
 
     def set_broken_callback(self, on_broken: Callback | None) -> None:
-        """Set what is called when the bond breaks."""
+        """Set the callback for when the bond breaks."""
         with self.lock:
             self.on_broken = on_broken
 
     def wait_until_formed(self, timeout: Seconds | None = None) -> bool:
-        """Return whether the bond has formed, within ``timeout`` (None: whenever)."""
+        """Wait until the bond has formed; return False after ``timeout`` (None: no timeout)."""
         return self._wait(lambda: self._state is not State.WAITING, timeout)
 
     def wait_until_broken(self, timeout: Seconds | None = None) -> bool:
-        """Return whether the bond is broken, within ``timeout`` (None: whenever), also if it never formed."""
+        """Wait until the bond is broken, even if it never formed; return False after ``timeout`` (None: no timeout)."""
         return self._wait(lambda: self._state is State.DEAD, timeout)
 
     def is_broken(self) -> bool:
@@ -191,14 +190,14 @@ class Bond:
             return self._state is State.DEAD
 
     def break_bond(self) -> None:
-        """Break the bond; the other end is notified."""
+        """Break the bond and notify the peer."""
         with self.lock:
             self._handle(Event.DIE)
             self._publish(False)
         self._flush_pending_callbacks()
 
     def shutdown(self) -> None:
-        """Break the bond, and use the topic no longer."""
+        """Break the bond, and unregister from the topic."""
         with self.lock:
             if self.is_shutdown:
                 return
@@ -221,7 +220,7 @@ class Bond:
                 self.condition.wait(left)
             return has_come()
 
-    # Messages.
+    # Messages from and to the peer.
 
     def _on_bond_status(self, msg: Status) -> None:
         if msg.id != self.id or msg.instance_id == self.instance_id:
@@ -237,7 +236,7 @@ class Bond:
                 return
             self._handle(Event.SISTER_ALIVE if msg.active else Event.SISTER_DEAD)
             if not msg.active and self.sister_died_first:
-                # The other end waits for this.
+                # The peer waits for this confirmation.
                 self._publish(False)
         self._flush_pending_callbacks()
 
@@ -254,7 +253,7 @@ class Bond:
         with suppress(rospy.ROSException):
             self.pub.publish(message)
 
-    # The state machine, and its thread: heartbeats, and timeouts that are over.
+    # The state machine and its thread, which sends heartbeats and handles expired timeouts.
 
     def _handle(self, event: Event) -> None:
         self._state, actions = next_state(self._state, event)
@@ -308,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have come meanwhile.
+            # A message may have restarted the timeout meanwhile.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

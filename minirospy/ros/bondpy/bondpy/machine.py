@@ -1,4 +1,4 @@
-"""The states of a bond: which event leads where, and what is to be done. Pure; written from http://wiki.ros.org/bond."""
+"""The state machine of a bond: transitions and their actions. Pure; based on http://wiki.ros.org/bond."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Action", "Event", "State", "next_state"]
 
 
 class State(enum.Enum):
-    """A state, by the name that ``repr(bond)`` shows."""
+    """A state; its value is the name in ``repr(bond)``."""
 
     WAITING = "SM.WaitingForSister"
     ALIVE = "SM.Alive"
@@ -17,7 +17,7 @@ class State(enum.Enum):
 
 
 class Event(enum.Enum):
-    """Something that happens to a bond."""
+    """An event in the life of a bond."""
 
     SISTER_ALIVE = enum.auto()
     SISTER_DEAD = enum.auto()
@@ -28,7 +28,7 @@ class Event(enum.Enum):
 
 
 class Action(enum.Enum):
-    """Something that is to be done."""
+    """An action to perform after a transition."""
 
     CONNECTED = enum.auto()
     HEARTBEAT = enum.auto()
@@ -38,7 +38,7 @@ class Action(enum.Enum):
 
 
 _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
-    # The first message counts as a heartbeat: a sister that ends after it is noticed, too.
+    # The first message counts as a heartbeat, so that a sister that exits right after it is also noticed.
     (State.WAITING, Event.SISTER_ALIVE): (State.ALIVE, (Action.CONNECTED, Action.HEARTBEAT)),
     (State.WAITING, Event.SISTER_DEAD): (State.DEAD, (Action.CONNECTED, Action.SISTER_DIED, Action.DEATH)),
     (State.WAITING, Event.CONNECT_TIMEOUT): (State.DEAD, (Action.DEATH,)),
@@ -53,5 +53,5 @@ _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
 
 
 def next_state(state: State, event: Event) -> tuple[State, tuple[Action, ...]]:
-    """Return the state after an event, and what is to be done. An event without meaning in a state changes nothing."""
+    """Return the state after an event, and the actions to perform. An event that a state does not expect changes nothing."""
     return _TABLE.get((state, event), (state, ()))

@@ -1,4 +1,4 @@
-"""camera_calibration_parsers: calibrations of cameras in .yaml and .ini files.
+"""camera_calibration_parsers: reads and writes camera calibrations in .yaml and .ini files.
 
 Source: http://wiki.ros.org/camera_calibration_parsers.
 """
@@ -25,9 +25,9 @@ _WRITERS = {".yaml": yaml_of, ".yml": yaml_of, ".ini": ini_of}
 
 
 def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
-    """Return the camera's name and its parameters from a .yaml, .yml or .ini file.
+    """Return the camera's name and parameters from a .yaml, .yml or .ini file.
 
-    None if there is none, or it is not a calibration; the reason is logged.
+    If the file is missing or invalid, log the reason and return None.
     """
     parse = _PARSERS.get(Path(file_name).suffix)
     if parse is None:
@@ -45,9 +45,9 @@ def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
 
 
 def writeCalibration(file_name: str, camera_name: str, cinfo: CameraInfo) -> bool:
-    """Write a calibration as .yaml, .yml or .ini, folders included, with ROS's text; ROS has this in C++ alone.
+    """Write a calibration as .yaml, .yml or .ini in ROS's format, creating its folders. ROS has this function only in C++.
 
-    Returns False if it cannot be written, or is of another kind; the reason is logged.
+    If it cannot be written, or the extension is unknown, log the reason and return False.
     """
     write = _WRITERS.get(Path(file_name).suffix)
     if write is None:

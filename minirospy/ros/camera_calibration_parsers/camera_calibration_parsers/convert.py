@@ -1,4 +1,4 @@
-"""convert: a calibration file from one format to the other, as the program of that name."""
+"""convert: convert a calibration file to the other format, like ROS's program of that name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The text of calibration files, and CameraInfo: both formats, both directions. Pure.
+"""Conversion of CameraInfo to and from the text of calibration files, in both formats. Pure.
 
 Source: http://wiki.ros.org/camera_calibration_parsers (formats).
 """
@@ -22,14 +22,14 @@ _MATRICES = (
     ("rectification_matrix", "R", (3, 3)),
     ("projection_matrix", "P", (3, 4)),
 )
-"""Key, field of CameraInfo, and shape; distortions have any."""
+"""Key, field of CameraInfo, and shape; None: any shape."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
 _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
 class CalibrationError(ValueError):
-    """A text that is not a calibration, or a calibration that a format cannot hold."""
+    """A text is not a calibration, or a format does not support a calibration."""
 
 
 def parse_yaml(text: str) -> tuple[str, CameraInfo]:
@@ -37,7 +37,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
     import yaml
 
     try:
-        # All scalars as texts: a name may look like a number, and 1e3 is a text in YAML 1.1.
+        # Load all scalars as strings: a name may look like a number, and YAML 1.1 does not read 1e3 as a number.
         tree = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         raise CalibrationError(" ".join(str(error).split())) from error
@@ -55,7 +55,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
 
 
 def yaml_of(name: str, info: CameraInfo) -> str:
-    """Return the YAML file of a calibration, as ROS writes it."""
+    """Return a calibration as a YAML file, as written by ROS."""
     lines = [f"image_width: {info.width}", f"image_height: {info.height}", f"camera_name: {_quoted(name)}"]
 
     def matrix(key: str, values: Sequence[float], rows: int) -> None:
@@ -99,7 +99,7 @@ def parse_ini(text: str) -> tuple[str, CameraInfo]:
 
 
 def ini_of(name: str, info: CameraInfo) -> str:
-    """Return the .ini file of a calibration, as ROS writes it. Raise CalibrationError for another model than plumb_bob."""
+    """Return a calibration as an .ini file, as written by ROS. Raise CalibrationError if the model is not plumb_bob."""
     if info.distortion_model != "plumb_bob" or len(info.D) != 5:
         raise CalibrationError("an .ini file holds the distortion model plumb_bob with 5 numbers alone")
 
@@ -121,7 +121,7 @@ def _pixels(word: object) -> int:
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
-    """Return the numbers of a matrix, of any one row without ``shape``."""
+    """Return the numbers of a matrix; ``shape`` None accepts any shape."""
     found = tree.get(key)
     if not isinstance(found, dict):
         raise CalibrationError(f"{key} is missing")
@@ -146,7 +146,7 @@ def _numbers(words: Sequence[object]) -> tuple[float, ...]:
 
 
 def _number(value: float) -> str:
-    """Return a number with all of its places, as yaml-cpp writes it."""
+    """Return a number with all its digits, as yaml-cpp writes it."""
     if math.isfinite(value):
         return f"{value:.17g}"
     return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"

@@ -1,4 +1,4 @@
-"""camera_info_manager: a camera driver's calibration, kept in a file. Source: http://wiki.ros.org/camera_info_manager_py."""
+"""camera_info_manager: manages a camera driver's calibration file. Source: http://wiki.ros.org/camera_info_manager_py."""
 
 from minirospy.ros.camera_info_manager_py.camera_info_manager.camera_info_manager import (
     CameraInfoError,

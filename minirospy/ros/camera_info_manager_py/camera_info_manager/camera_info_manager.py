@@ -1,8 +1,8 @@
-"""camera_info_manager.camera_info_manager: CameraInfoManager, and the functions that it is made of.
+"""camera_info_manager.camera_info_manager: CameraInfoManager, and the functions that it uses.
 
-URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or nothing for the default; ``${NAME}`` is the camera's name and
-``${ROS_HOME}`` the folder of ROS's files. Source: http://wiki.ros.org/camera_info_manager_py (and the C++ package for
-the files' text, which is that of camera_calibration_parsers).
+URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or "" for the default; ``${NAME}`` is the camera's name and
+``${ROS_HOME}`` the folder of ROS's files. Source: http://wiki.ros.org/camera_info_manager_py, and the C++ package for the
+files' format, which is that of camera_calibration_parsers.
 """
 
 from __future__ import annotations
@@ -53,18 +53,18 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
 class CameraInfoError(Exception):
-    """An error of this module."""
+    """The base class of this module's errors."""
 
 
 class CameraInfoMissingError(CameraInfoError):
-    """A calibration that has not been loaded."""
+    """The calibration has not been loaded."""
 
 
 class CameraInfoManager:
-    """Loads a camera's calibration, and saves what the service ``set_camera_info`` gets; create it after ``init_node``."""
+    """Loads a camera's calibration, and saves the ones sent to service ``set_camera_info``; create it after ``init_node``."""
 
     def __init__(self, cname: str = "camera", url: str = "", namespace: str = "") -> None:
-        """Offer the service. ``cname``: the camera's name; ``url``: of its file; ``namespace``: of the service."""
+        """Offer the service. ``cname``: the camera's name; ``url``: the calibration file; ``namespace``: that of the service."""
         self.cname = cname
         self.url = url
         self.camera_info: CameraInfo | None = None
@@ -72,7 +72,7 @@ class CameraInfoManager:
         self.svc = rospy.Service(service, SetCameraInfo, self.setCameraInfo)
 
     def getCameraInfo(self) -> CameraInfo:
-        """Return the calibration; an empty one where the file is missing. Raise CameraInfoMissingError before it is loaded."""
+        """Return the calibration, an empty one if the file is missing. Raise CameraInfoMissingError if it has not been loaded."""
         if self.camera_info is None:
             raise CameraInfoMissingError("Calibration missing, loadCameraInfo() needed.")
         return self.camera_info
@@ -82,21 +82,21 @@ class CameraInfoManager:
         return self.cname
 
     def getURL(self) -> str:
-        """Return the URL of the calibration, as it was set."""
+        """Return the URL of the calibration as it was set."""
         return self.url
 
     def isCalibrated(self) -> bool:
-        """Return whether the camera is calibrated. Raise CameraInfoMissingError before it is loaded."""
+        """Return whether the camera is calibrated. Raise CameraInfoMissingError if the calibration has not been loaded."""
         return bool(self.getCameraInfo().K[0] != 0.0)
 
     def loadCameraInfo(self) -> None:
-        """Load the calibration; an empty one where the file is missing. What is wrong with it is logged."""
+        """Load the calibration, an empty one if the file is missing. Errors are logged."""
         filename = filename_of(self.url, self.cname)
         if filename is not None:
             self.camera_info = loadCalibrationFile(filename, self.cname)
 
     def setCameraInfo(self, req: SetCameraInfoRequest) -> SetCameraInfoResponse:
-        """Store a calibration and save it: the handler of the service."""
+        """Store a calibration and save it; this is the service's handler."""
         rospy.logdebug("SetCameraInfo received for %s", self.cname)
         self.camera_info = req.camera_info
         if saveCalibration(req.camera_info, self.url, self.cname):
@@ -104,9 +104,9 @@ class CameraInfoManager:
         return SetCameraInfoResponse(success=False, status_message="Error storing camera calibration.")
 
     def setCameraName(self, cname: str) -> bool:
-        """Set the camera's name, of letters, digits and ``_``; return False if it is not one.
+        """Set the camera's name (letters, digits and ``_``); return False if it is invalid.
 
-        The calibration has to be loaded again, since its file may be another one.
+        The calibration must then be loaded again, because its file may be different.
         """
         if not re.fullmatch(r"\w+", cname, re.ASCII):
             return False
@@ -115,7 +115,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the URL of the calibration, which has to be loaded again; return False if it is not one."""
+        """Set the URL of the calibration, which must then be loaded again; return False if the URL is invalid."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:
@@ -124,12 +124,12 @@ class CameraInfoManager:
 
 
 def genCameraName(from_string: str) -> str:
-    """Return a text as a camera's name: every character but letters, digits and ``_`` becomes ``_``."""
+    """Return a valid camera name: every character except letters, digits and ``_`` is replaced by ``_``."""
     return re.sub(r"\W", "_", from_string, flags=re.ASCII)
 
 
 def parseURL(url: str) -> int:
-    """Return the kind of a resolved URL: ``URL_empty``, ``URL_file``, ``URL_package`` or ``URL_invalid``."""
+    """Return the type of a resolved URL: ``URL_empty``, ``URL_file``, ``URL_package`` or ``URL_invalid``."""
     if not url:
         return URL_empty
     if url[:8].upper() == "FILE:///":
@@ -142,7 +142,7 @@ def parseURL(url: str) -> int:
 
 
 def resolveURL(url: str, cname: str) -> str:
-    """Return a URL with the values of its variables; another variable stays, with a warning."""
+    """Substitute the variables in a URL; an unknown variable is kept, with a warning."""
 
     def value(match: re.Match[str]) -> str:
         if match[1] == "NAME":
@@ -157,7 +157,7 @@ def resolveURL(url: str, cname: str) -> str:
 
 
 def getPackageFileName(url: str) -> str:
-    """Return the path of a package:// URL; nothing, with a warning, where the package is not found."""
+    """Return the path of a package:// URL; "", with a warning, if the package is not found."""
     package, _, name = url[len("package://") :].partition("/")
     try:
         return f"{RosPack().get_path(package)}/{name}"
@@ -167,7 +167,7 @@ def getPackageFileName(url: str) -> str:
 
 
 def loadCalibrationFile(filename: str, cname: str) -> CameraInfo:
-    """Return the calibration in a file; an empty one where there is none, or the file is not a calibration."""
+    """Return the calibration in a file; an empty one if the file is missing or invalid."""
     if not Path(filename).exists():
         return CameraInfo()
     found = readCalibration(filename)
@@ -180,19 +180,19 @@ def loadCalibrationFile(filename: str, cname: str) -> CameraInfo:
 
 
 def saveCalibration(new_info: CameraInfo, url: str, cname: str) -> bool:
-    """Save a calibration where a URL points to; return False, with the reason logged, where it cannot be saved."""
+    """Save a calibration to a URL; on failure, log the reason and return False."""
     filename = filename_of(url, cname)
     return filename is not None and saveCalibrationFile(new_info, filename, cname)
 
 
 def saveCalibrationFile(ci: CameraInfo, filename: str, cname: str) -> bool:
-    """Save a calibration in a file, folders included; return False, with the reason logged, where it cannot be saved."""
+    """Save a calibration to a file, creating its folders; on failure, log the reason and return False."""
     rospy.loginfo("writing calibration data to %s", filename)
     return writeCalibration(filename, cname, ci)
 
 
 def filename_of(url: str, cname: str) -> str | None:
-    """Return the path that a URL points to; None, with the reason logged, where it points to none."""
+    """Return the path for a URL; if there is none, log the reason and return None."""
     resolved = resolveURL(url or default_camera_info_url, cname)
     kind = parseURL(resolved)
     if kind == URL_file:

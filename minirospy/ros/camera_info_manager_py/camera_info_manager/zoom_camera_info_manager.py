@@ -1,6 +1,6 @@
-"""camera_info_manager.zoom_camera_info_manager: calibrations of a camera with a zoom.
+"""camera_info_manager.zoom_camera_info_manager: calibrations of a camera with zoom.
 
-Source: http://wiki.ros.org/camera_info_manager_py. A zoom level is a number to which the focal length is proportional.
+Source: http://wiki.ros.org/camera_info_manager_py. The focal length is proportional to the zoom level, a number.
 """
 
 from __future__ import annotations
@@ -34,26 +34,26 @@ __all__ = ["ApproximateZoomCameraInfoManager", "InterpolatingZoomCameraInfoManag
 
 
 class ZoomCameraInfoManager(CameraInfoManager):
-    """The common part: a zoom level within limits. With ``with``, the service ends with the block."""
+    """The base class: a zoom level within limits. As a context manager, it stops the service at the end."""
 
     def __init__(
         self, min_zoom: float, max_zoom: float, cname: str = "camera", url: str = "", namespace: str = ""
     ) -> None:
-        """``url``: of the calibration at the lowest zoom level; the rest is that of CameraInfoManager."""
+        """``url``: the calibration at the lowest zoom level; for the other arguments see CameraInfoManager."""
         super().__init__(cname, url, namespace)
         self._min_zoom = min_zoom
         self._max_zoom = max_zoom
         self._zoom = min_zoom
 
     def set_zoom(self, zoom: float) -> None:
-        """Compute the calibration of a zoom level. Raise CameraInfoError if it is outside of the limits."""
+        """Compute the calibration for a zoom level. Raise CameraInfoError if the level is out of range."""
         if not self._min_zoom <= zoom <= self._max_zoom:
             raise CameraInfoError("Zoom got outside the allowed range")
         self._zoom = zoom
         self._update_camera_info()
 
     def _update_camera_info(self) -> None:
-        """Compute the calibration again; a derived class has it."""
+        """Compute the calibration again; subclasses override it."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -66,7 +66,7 @@ class ZoomCameraInfoManager(CameraInfoManager):
 
 
 class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
-    """A matrix K from the fields of view at both ends of the zoom; the rest is that of the calibration, where there is one."""
+    """Computes K from the fields of view at both ends of the zoom range; all else is from the calibration file, if any."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """``min_fov``, ``max_fov``: the horizontal field of view at the highest and the lowest zoom level, in degrees."""
+        """``min_fov``, ``max_fov``: the horizontal field of view in degrees at the highest and at the lowest zoom level."""
         super().__init__(min_zoom, max_zoom, cname, url, namespace)
         self._min_fov = min_fov
         self._max_fov = max_fov
@@ -89,12 +89,12 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         self._loaded_camera_info: CameraInfo | None = None
 
     def loadCameraInfo(self) -> None:
-        """Load the calibration; an empty one where the file is missing."""
+        """Load the calibration, an empty one if the file is missing."""
         super().loadCameraInfo()
         self._loaded_camera_info = deepcopy(self.camera_info)
 
     def set_resolution(self, width: int, height: int) -> None:
-        """Compute the calibration of images of another size, in pixels."""
+        """Compute the calibration for another image size in pixels."""
         self._image_width, self._image_height = width, height
         self._update_camera_info()
 
@@ -114,7 +114,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         matrix[0] = width / (2 * tan(horizontal / 2))
         matrix[4] = height / (2 * tan(vertical / 2))
         matrix[8] = 1.0
-        # The center of a calibration moves with the size of the image; without one it is the image's.
+        # A calibrated center is scaled with the image's size; without a calibration the image's center is used.
         is_calibrated = matrix[2] != 0.0 and loaded.width and loaded.height
         matrix[2] = matrix[2] * width / loaded.width if is_calibrated else width / 2
         matrix[5] = matrix[5] * height / loaded.height if is_calibrated else height / 2
@@ -123,7 +123,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
 
 
 class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
-    """Calibrations at some zoom levels, and between two of them what is linear between theirs."""
+    """Uses calibrations at some zoom levels, and interpolates linearly between them."""
 
     def __init__(
         self,
@@ -133,7 +133,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """``calibration_url_template``: a URL with ``%d`` for the zoom level; ``zoom_levels``: those that have a calibration."""
+        """``calibration_url_template``: a URL with ``%d`` for the zoom level; ``zoom_levels``: the calibrated levels."""
         super().__init__(min(zoom_levels), max(zoom_levels), cname, url, namespace)
         self._calibration_url_template = calibration_url_template
         self._zoom_levels = zoom_levels
@@ -142,7 +142,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
     def loadCameraInfo(self) -> None:
         """Load all calibrations.
 
-        Raise CameraInfoMissingError if their package is missing, CameraInfoError where they are fewer than two.
+        Raise CameraInfoMissingError if their package is missing, CameraInfoError if there are fewer than two.
         """
         super().loadCameraInfo()
         self._camera_infos = {level: self._load(level) for level in self._zoom_levels}
@@ -179,5 +179,5 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
 
 
 def _between(low: Sequence[float], high: Sequence[float], share: float) -> list[float]:
-    """Return what is between two arrays: ``low`` where ``share`` is 0, ``high`` where it is 1."""
+    """Interpolate between two arrays: ``low`` at ``share`` 0, ``high`` at ``share`` 1."""
     return [(1 - share) * left + share * right for left, right in zip(low, high, strict=False)]

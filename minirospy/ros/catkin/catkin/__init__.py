@@ -1,1 +1,1 @@
-"""catkin: the workspaces of the environment."""
+"""catkin: the sourced workspaces."""

@@ -1,4 +1,4 @@
-"""catkin.find_in_workspaces: the files of a package in all workspaces."""
+"""catkin.find_in_workspaces: find a package's files in all sourced workspaces."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return the folders, or files ``path`` in them, that the workspaces have in ``search_dirs`` (of the package ``project``).
+    """Return the existing folders ``search_dirs`` of the workspaces, or the files ``path`` in them, for package ``project``.
 
-    ``search_dirs``: of etc, include, libexec and share, without a project also of bin and lib. What is searched is
-    added to ``considered_paths``. Raise ValueError on other folders.
+    ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. All searched paths
+    are appended to ``considered_paths``. Raise ValueError for other folders.
     """
     chosen = _checked(search_dirs, project)
     found: list[str] = []
@@ -58,7 +58,7 @@ def _checked(search_dirs: Sequence[str] | None, project: str | None) -> list[str
 def _by_workspace(
     workspaces: Sequence[str], chosen: Sequence[str], project: str | None
 ) -> Iterator[list[Path]]:
-    """Yield the folders to look into, those of a workspace together; packages elsewhere come last."""
+    """Yield a list of folders to search for each workspace; last, the folder of the package if it is elsewhere."""
     for workspace in workspaces:
         folders = []
         for each in chosen:

@@ -1,4 +1,4 @@
-"""catkin.terminal_color: texts with colors by name, such as ``fmt("@{redf}error@{reset}")``."""
+"""catkin.terminal_color: strings with named colors, such as ``fmt("@{redf}error@{reset}")``."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ for _number, _color in enumerate(_COLORS):
 
 
 class ColorTemplate(string.Template):
-    """Texts in which ``@`` precedes the name of a color."""
+    """A string template in which ``@`` precedes the name of a color."""
 
     delimiter = "@"
 
 
 class _Colors:
-    """The codes in use: none on Windows, or after :func:`disable_ANSI_colors`."""
+    """The ANSI codes in use: empty on Windows, or after :func:`disable_ANSI_colors`."""
 
     def __init__(self) -> None:
         self.codes: Mapping[str, str] = {}
@@ -46,22 +46,22 @@ _USED = _Colors()
 
 
 def ansi(key: str) -> str:
-    """Return the code of a color or a style. Raise KeyError."""
+    """Return the ANSI code of a color or style. Raise KeyError."""
     return _USED.codes[key]
 
 
 def enable_ANSI_colors() -> None:
-    """Let the functions of this module write codes."""
+    """Make the functions of this module insert ANSI codes."""
     _USED.switch(is_on=True)
 
 
 def disable_ANSI_colors() -> None:
-    """Let the functions of this module write plain text."""
+    """Make the functions of this module return plain text."""
     _USED.switch(is_on=False)
 
 
 def fmt(msg: str) -> str:
-    """Return a text with codes instead of ``@{redf}``, ``@!`` (bold), ``@/``, ``@_`` and ``@|`` (reset)."""
+    """Return a string with ANSI codes in place of ``@{redf}``, ``@!`` (bold), ``@/``, ``@_`` and ``@|`` (reset)."""
     for mark in ("!", "/", "_", "|"):
         msg = msg.replace(f"@{mark}", f"@{{{_NAMES[mark]}}}")
     return ColorTemplate(msg).substitute(_USED.codes) + _USED.codes["reset"]
@@ -71,7 +71,7 @@ _NAMES = {"!": "boldon", "/": "italicson", "_": "ulon", "|": "reset"}
 
 
 def sanitize(msg: str) -> str:
-    """Return a text that :func:`fmt` leaves as it is, but for its braces, which become double."""
+    """Escape a string so that :func:`fmt` returns it unchanged, except that braces are doubled."""
     msg = msg.replace("@", "@@").replace("{", "{{").replace("}", "}}")
     for mark, name in _MARKS.items():
         msg = msg.replace(f"@@{mark}", f"@{{{name}}}")

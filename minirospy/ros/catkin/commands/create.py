@@ -1,4 +1,4 @@
-"""catkin_create_pkg and catkin_init_workspace: the first files of a package and of a workspace."""
+"""catkin_create_pkg and catkin_init_workspace: create the first files of a package and of a workspace."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""catkin_find, catkin_find_pkg and catkin_topological_order: where catkin's folders, files and packages are.
+"""catkin_find, catkin_find_pkg and catkin_topological_order: find catkin's folders, files and packages.
 
-Source: http://docs.ros.org/api/catkin/html. What is printed is what catkin prints; packages that need nothing of one
-another come by name.
+Source: http://docs.ros.org/api/catkin/html. The output is that of catkin; packages without dependencies on each other are
+sorted by name.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _PLACES: dict[str, Callable[[str], str]] = {
     "libexec": lambda project: f"lib/{project}",
     "share": lambda project: f"share/{project}",
 }
-"""Search folder -> where it is below a workspace's devel or install folder."""
+"""For each search folder, its path below a workspace's devel or install folder."""
 
 _WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
 _WITH_PROJECT = ("etc", "include", "libexec", "share")
@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Yield the prefixes of the sourced workspaces, the nearest first; last None, for minirospy's own packages."""
+    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

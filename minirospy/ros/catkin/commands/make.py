@@ -1,6 +1,6 @@
-"""catkin_make: workspaces without CMake.
+"""catkin_make: build workspaces without CMake.
 
-catkin_make_isolated is catkin_make with folders of other names: packages that no compiler builds do not meet in CMake.
+catkin_make_isolated only uses other folder names: packages that need no compiler cannot conflict in CMake.
 Source: http://wiki.ros.org/catkin/commands/catkin_make.
 """
 
@@ -45,7 +45,7 @@ def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
 
 
 class _MakeParser(Parser):
-    """Leaves out the words for CMake; what they set becomes ``variables``."""
+    """Removes CMake arguments; the variables that they set become the argument ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raise CommandLineError."""
@@ -126,7 +126,7 @@ def _catkin_make(
     force_cmake: bool,
     variables: dict[str, str],
 ) -> int:
-    """Build a workspace whose folders' names end in ``suffix``."""
+    """Build a workspace whose folder names end in ``suffix``."""
     root = directory.resolve()
     if not root.is_dir():
         raise UsageError(f"folder {directory} does not exist")
@@ -151,7 +151,8 @@ def _catkin_make(
 
     tests = [target for target in targets if target.startswith("run_tests_")]
     others = {"all", "install", *TEST_TARGETS, *tests}
-    # VERBOSE=1 is a variable of make; what generates messages is all of a package.
+    # Words with "=", such as VERBOSE=1, are variables of make. A target for generated messages means the whole
+    # package.
     named = [_GENERATED.sub("", word) for word in targets if word not in others and "=" not in word]
     chosen = [*(pkg or []), *named]
     plans = build_packages(workspace, chosen, only_pkg_with_deps or (), variables)
@@ -167,7 +168,7 @@ def _catkin_make(
 
 
 def _check_folders(command: str, workspace: Workspace) -> None:
-    """Raise BuildError if the folder is not a workspace's."""
+    """Raise BuildError if the folder is not that of a workspace."""
     if not workspace.source.is_dir():
         raise BuildError(
             str(workspace.source),
@@ -181,7 +182,7 @@ def _check_folders(command: str, workspace: Workspace) -> None:
 
 
 def _where_to_build(command: str, workspace: Workspace) -> str:
-    """Return what to do if folder src does not exist: most often the current folder is src, or devel."""
+    """Return advice if folder src does not exist: usually the current folder is src, or devel."""
     for above in workspace.root.parents:
         source = above / workspace.source.name
         if workspace.root.is_relative_to(source) or (
@@ -192,7 +193,7 @@ def _where_to_build(command: str, workspace: Workspace) -> str:
 
 
 def _mark_top_level(workspace: Workspace) -> None:
-    """Write what marks a folder as a workspace, for us and for real catkin."""
+    """Write the files that mark a folder as a workspace, for minirospy and for catkin."""
     marker = workspace.root / ".catkin_workspace"
     if not marker.exists() and not (workspace.root / ".catkin_tools").exists():
         marker.write_text("# This file marks the top of a catkin workspace\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The tests of a workspace's packages, as `catkin_make run_tests` and `catkin test` run them.
+"""Run the tests of a workspace's packages, for `catkin_make run_tests` and `catkin test`.
 
 Source: http://wiki.ros.org/catkin/CMakeLists.txt (unit tests), http://wiki.ros.org/rostest (add_rostest).
 """
@@ -23,17 +23,16 @@ from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
 
-_END_SECONDS = 20.0
-"""As long as roslaunch gives its nodes, and a little."""
+_END_SECONDS = 20.0  # a bit longer than roslaunch waits for its nodes to exit
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; return 1 where one failed.
+    """Run the tests of the chosen packages, or of all; return 1 if one failed.
 
-    Raise BuildError, NotFoundError; MinirospyError at Ctrl-C.
+    Raise BuildError, NotFoundError; MinirospyError on Ctrl-C.
 
-    One test is chosen by catkin's name for it: ``PACKAGE_rostest_test_x.test``. The results are JUnit XML files in
-    ``build/test_results/PACKAGE``.
+    To choose a single test, use its target name in catkin, such as ``PACKAGE_rostest_test_x.test``. The results are JUnit XML
+    files in ``build/test_results/PACKAGE``.
     """
     targets = {name: plan for plan in plans for test in (None, *plan.tests) for name in _targets(plan, test)}
     wanted = {_flat(name) for name in chosen or [plan.name for plan in plans]}
@@ -47,7 +46,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             continue
         results = workspace.build / "test_results" / plan.name
         if _flat(plan.name) in wanted:
-            # What is there is of tests that may be gone.
+            # Remove old results: their tests may no longer exist.
             for file in results.glob("*.xml"):
                 file.unlink()
         for test in plan.tests:
@@ -60,7 +59,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             command = _COMMANDS[test.kind](plan, test, results)
             print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)
             status = _run(command, _environment(workspace), _folder_of(test, plan, workspace))
-            # 5: pytest found no tests in there.
+            # Status 5 of pytest: it found no tests.
             worst |= status not in ((0, 5) if test.kind == "pytest" else (0,))
         for _, counts in results_below(results):
             if isinstance(counts, Counts):
@@ -73,7 +72,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
-    """Run a test; return its exit status. Raise MinirospyError at Ctrl-C, after the test has ended its nodes."""
+    """Run a test; return its exit status. On Ctrl-C, wait until the test has stopped its nodes, and raise MinirospyError."""
     with (
         interrupt_noted() as interrupted,
         guard_children(),
@@ -82,7 +81,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:
-            # The terminal's Ctrl-C reached it, too.
+            # The terminal has also sent the Ctrl-C to the test.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
@@ -94,9 +93,9 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
-    """Return the folder in which a test runs; make it where it is the package's build folder.
+    """Return the folder in which to run a test; create it if it is the package's build folder.
 
-    As catkin's: ``nosetests --where=FOLDER`` changes into a folder of tests, other programs run in the build folder.
+    As in catkin, ``nosetests --where=FOLDER`` changes into a folder of tests; other programs run in the build folder.
     """
     if test.folder:
         return Path(test.folder)
@@ -110,7 +109,7 @@ def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """Return what CMake's targets are called that run a package's tests, or one of them, in :func:`_flat`'s form."""
+    """Return the names of the CMake targets that run a package's tests, or one of them, in the form of :func:`_flat`."""
     if test is None:
         return [_flat(plan.name)]
     kinds = {"pytest": ("nosetests", "pytests")}.get(test.kind, (test.kind,))
@@ -118,7 +117,7 @@ def _targets(plan: Plan, test: Test | None) -> list[str]:
 
 
 def _flat(name: str) -> str:
-    """Return a name with one sign between its words: CMake's targets have no slashes."""
+    """Return a name with underscores in place of other separators: CMake target names have no slashes."""
     return re.sub(r"\W", "_", name)
 
 
@@ -131,7 +130,7 @@ def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
 
 
 def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
-    # One file may be run with several sets of arguments.
+    # The same file may be run with several sets of arguments.
     stem = "__".join([os.path.splitext(test.path)[0], *test.arguments])
     name = re.sub(r"[^\w.-]", "_", stem)
     options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]
@@ -151,7 +150,7 @@ _COMMANDS = {"pytest": _pytest, "rostest": _rostest, "roslaunch-check": _launch_
 
 
 def _environment(workspace: Workspace) -> dict[str, str]:
-    """Return the environment of the shell, with the workspace as its setup file would put it in front."""
+    """Return the environment, with the workspace's folders prepended as by its setup file."""
 
     def before(variable: str, path: Path) -> str:
         return os.pathsep.join(filter(None, [str(path), os.environ.get(variable, "")]))

@@ -1,4 +1,4 @@
-"""`catkin_test_results`: the counts of all JUnit XML files below a folder.
+"""`catkin_test_results`: sum up the JUnit XML files below a folder.
 
 Source: http://wiki.ros.org/catkin/commands (catkin_test_results).
 """
@@ -23,7 +23,7 @@ _SKIPPED = ("skip", "skipped", "disabled")
 
 
 class Counts(NamedTuple):
-    """Numbers of tests, by their results."""
+    """Numbers of tests, by result."""
 
     tests: int = 0
     errors: int = 0
@@ -35,11 +35,11 @@ class Counts(NamedTuple):
 
     @property
     def is_bad(self) -> bool:
-        """Return whether something went wrong."""
+        """Return whether there are errors or failures."""
         return bool(self.errors or self.failures)
 
     def plus(self, other: Counts) -> Counts:
-        """Return the counts of both."""
+        """Return the sum of both counts."""
         return Counts(*(mine + theirs for mine, theirs in zip(self, other, strict=True)))
 
 
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_counts(file: Path) -> Counts:
-    """Return the counts of a file, summed over its suites. Raise ValueError with the reason where it is not a result file."""
+    """Return the counts of a file, summed over its suites. Raise ValueError with the reason if it is not a result file."""
     try:
         check_xml(text := file.read_bytes())
         root = ElementTree.fromstring(text)
@@ -69,7 +69,7 @@ def read_counts(file: Path) -> Counts:
 
 
 def results_below(folder: Path) -> Iterator[tuple[Path, Counts | ValueError]]:
-    """Yield each XML file below a folder, sorted, with its counts, or why it has none."""
+    """Yield the XML files below a folder, sorted, each with its counts, or with the error if it has none."""
     for file in sorted(folder.rglob("*.xml")):
         try:
             yield file, read_counts(file)

@@ -1,4 +1,4 @@
-"""catkin, the command of catkin_tools: workspaces without CMake.
+"""catkin, the command of catkin_tools: build workspaces without CMake.
 
 Source: https://catkin-tools.readthedocs.io/.
 """
@@ -37,7 +37,7 @@ _ACCEPTED = """
     -c --continue-on-failure -s --summarize --no-summarize -v --verbose -i --interleave-output --force-cmake --no-status
     --no-color --no-notify --pre-clean --limit-status-rate --unbuilt --env-cache --no-env-cache --jobserver --no-jobserver
 """.split()  # noqa: SIM905
-"""Options of `catkin build` that change nothing if nothing is compiled."""
+"""Options of `catkin build` that have no effect if nothing is compiled; accepted for compatibility."""
 
 
 def catkin(argv: Sequence[str] | None = None) -> int:
@@ -55,7 +55,7 @@ class _Settings(NamedTuple):
 
     @classmethod
     def read(cls, workspace: Workspace) -> _Settings:
-        """Return the settings of a workspace; those of a file that does not read are empty."""
+        """Return the settings of a workspace; empty settings if the file is missing or invalid."""
         try:
             found = json.loads((workspace.root / _SETTINGS).read_bytes())
         except (OSError, ValueError):
@@ -65,7 +65,7 @@ class _Settings(NamedTuple):
         return cls(**{name: found[name] for name in cls._fields if name in found})
 
     def updated(self, new: _Settings) -> _Settings:
-        """Return these settings, replaced by those of ``new`` that are set."""
+        """Return these settings, overridden by those set in ``new``."""
         return _Settings(
             self.install if new.install is None else new.install,
             self.blacklist if new.blacklist is None else new.blacklist,
@@ -74,13 +74,13 @@ class _Settings(NamedTuple):
         )
 
     def write(self, workspace: Workspace) -> None:
-        """Keep the settings."""
+        """Save the settings."""
         given = {name: value for name, value in self._asdict().items() if value is not None}
         (workspace.root / ".catkin_tools").mkdir(exist_ok=True)
         (workspace.root / _SETTINGS).write_text(json.dumps(given, indent=1), encoding="utf-8")
 
     def variables(self) -> dict[str, str]:
-        """Return the settings as variables of CMake."""
+        """Return the settings as CMake variables."""
         return {
             **cmake_variables(self.cmake_args or ()),
             "CATKIN_WHITELIST_PACKAGES": ";".join(self.whitelist or ()),
@@ -89,7 +89,7 @@ class _Settings(NamedTuple):
 
 
 class _CatkinParser(Parser):
-    """The parser of a verb; words for CMake are left out, and become ``cmake_variables``."""
+    """The parser of a verb; CMake arguments are removed; those with -D become the argument ``cmake_words``."""
 
     def __init__(self, verb: str, description: str, *, takes_cmake_words: bool = False) -> None:
         super().__init__(f"catkin {verb}", description)

@@ -1,4 +1,4 @@
-"""The common part of catkin_make and catkin: the folders of a workspace, building, installing, removing."""
+"""The common part of catkin_make and catkin: the folders of a workspace; building, installing and removing."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ TEST_TARGETS = {"run_tests", "test", "tests"}
 
 
 def without_cmake(words: Sequence[str]) -> list[str]:
-    """Return the words without those for CMake: what these set is read by :func:`cmake_variables`."""
+    """Return the words without CMake arguments, which :func:`cmake_variables` parses."""
     return [word for word in words if not word.startswith(("-D", "-W", "-G"))]
 
 
 def cmake_variables(words: Sequence[str]) -> dict[str, str]:
-    """Return what ``-DNAME=VALUE`` and ``-DNAME:TYPE=VALUE`` set."""
+    """Return the variables set by ``-DNAME=VALUE`` and ``-DNAME:TYPE=VALUE``."""
     pairs = [word[2:].partition("=") for word in words if word.startswith("-D")]
     return {name.partition(":")[0]: value for name, equals, value in pairs if equals}
 
@@ -53,7 +53,7 @@ def build_packages(
     with_deps: Collection[str] = (),
     variables: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Plan]:
-    """Build what was chosen, or all, with a line of output for each package; return the plans of all."""
+    """Build the chosen packages, or all, printing a line for each; return the plans of all packages."""
     white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
     plans = read_plans(workspace.source, variables)
     names = {plan.name for plan in plans}
@@ -77,7 +77,7 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # As in catkin, which configures first: what is built is usable where another package has a fault.
+    # As in catkin, which configures first: the workspace can be sourced even if a package fails to build.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:
@@ -98,7 +98,7 @@ def _with_dependencies(plans: Sequence[Plan], names: Collection[str]) -> set[str
 
 
 def install_packages(workspace: Workspace, plans: Sequence[Plan]) -> None:
-    """Install what was built."""
+    """Install the built packages."""
     from minirospy.workspace.install import install
 
     for plan in plans:
@@ -108,7 +108,7 @@ def install_packages(workspace: Workspace, plans: Sequence[Plan]) -> None:
 
 
 def remove_built(workspace: Workspace) -> None:
-    """Delete the folders that a build has made."""
+    """Delete the folders created by a build."""
     for folder in (workspace.build, workspace.devel, workspace.install):
         if folder.is_dir() and ((folder / ".catkin").is_file() or (folder / "minirospy").is_dir()):
             shutil.rmtree(folder)

@@ -1,4 +1,4 @@
-"""cv_bridge: images of messages as numpy arrays, and back. Source: http://wiki.ros.org/cv_bridge."""
+"""cv_bridge: converts image messages to numpy arrays and back. Source: http://wiki.ros.org/cv_bridge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["CvBridge", "CvBridgeError", "getCvType"]
 
 
 def getCvType(encoding: str) -> int:
-    """Return OpenCV's number of an encoding's type, as CV_8UC3 = 16. Raise RuntimeError if it is unknown."""
+    """Return OpenCV's type number for an encoding, such as CV_8UC3 = 16. Raise RuntimeError if the encoding is unknown."""
     try:
         return type_of_encoding(encoding)
     except ValueError as error:

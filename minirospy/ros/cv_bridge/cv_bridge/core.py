@@ -1,4 +1,4 @@
-"""cv_bridge.core: CvBridge. It needs numpy alone; OpenCV for colors of Bayer patterns and YUV."""
+"""cv_bridge.core: CvBridge. It needs only numpy; OpenCV is needed for Bayer patterns and YUV."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["CvBridge", "CvBridgeError"]
 
 
 class CvBridgeError(TypeError):
-    """An image that cannot be converted."""
+    """An image cannot be converted."""
 
 
 class CvBridge:
-    """Converts between messages and the arrays that OpenCV works with: (height, width) or (height, width, channels)."""
+    """Converts messages to OpenCV's arrays, (height, width) or (height, width, channels), and back."""
 
     def __init__(self) -> None:
         self.cvdepth_to_numpy_depth: dict[int, str] = dict(enumerate(DEPTHS.values()))
@@ -41,7 +41,7 @@ class CvBridge:
         }
 
     def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[numpy.generic], n_channels: int) -> str:
-        """Return the name of an array's type, such as 8UC3. Raise CvBridgeError if OpenCV has none."""
+        """Return the OpenCV name of an array type, such as 8UC3. Raise CvBridgeError if OpenCV has no such type."""
         if dtype.name not in self.numpy_type_to_cvtype:
             raise CvBridgeError(
                 f"images of {dtype.name} have no encoding: there is {', '.join(DEPTHS.values())}"
@@ -49,26 +49,28 @@ class CvBridge:
         return f"{self.numpy_type_to_cvtype[dtype.name]}C{n_channels}"
 
     def cvtype2_to_dtype_with_channels(self, cvtype: int) -> tuple[str, int]:
-        """Return numpy's type and the number of channels of OpenCV's number of a type."""
+        """Return the numpy type and the number of channels for an OpenCV type number."""
         return self.cvdepth_to_numpy_depth[cvtype % 8], cvtype // 8 + 1
 
     def encoding_to_cvtype2(self, encoding: str) -> int:
-        """Return OpenCV's number of an encoding's type. Raise CvBridgeError."""
+        """Return the OpenCV type number for an encoding. Raise CvBridgeError."""
         try:
             return type_of_encoding(encoding)
         except ValueError as error:
             raise CvBridgeError(error) from error
 
     def encoding_to_dtype_with_channels(self, encoding: str) -> tuple[str, int]:
-        """Return numpy's type and the number of channels of an encoding. Raise CvBridgeError."""
+        """Return the numpy type and the number of channels for an encoding. Raise CvBridgeError."""
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
     def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> Pixels:
-        """Return the image of a message.
+        """Return the image in a message as an array.
 
-        It is a read-only view of the message's data, without a copy, unless the encoding or the order of bytes has to
-        change. Bytes between the rows (``step``) are left out. Raise CvBridgeError (an unknown encoding, no such
-        conversion, less data than the size needs).
+        It is a read-only view of the message's data, without a copy, unless the encoding or the byte order has to change.
+        Padding
+        between the rows (``step``) is skipped. Raise CvBridgeError if the encoding is unknown, the conversion does not
+        exist, or
+        the message has too little data.
         """
         try:
             image = pixels(img_msg)
@@ -81,9 +83,9 @@ class CvBridge:
     def cv2_to_imgmsg(
         self, cvim: Pixels, encoding: str = "passthrough", header: Header | None = None
     ) -> Image:
-        """Return the message of an image.
+        """Return an array as an image message.
 
-        Raise CvBridgeError if its type is not that of the encoding, TypeError where it is not an array.
+        Raise CvBridgeError if its type does not match the encoding, TypeError if it is not an array.
         """
         _check_array(cvim)
         message = Image()
@@ -103,7 +105,7 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
     ) -> Pixels:
-        """Return the image of a compressed message. Raise CvBridgeError (not an image; unknown conversion)."""
+        """Decode a compressed message. Raise CvBridgeError if it is not an image or the conversion does not exist."""
         try:
             image = decode(bytes(cmprs_img_msg.data))
         except ValueError as error:
@@ -115,9 +117,9 @@ class CvBridge:
         return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
 
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
-        """Return the compressed message of an image: jpg, png, bmp, tiff, webp, ...
+        """Return an array as a compressed message: jpg, png, bmp, tiff, webp, ...
 
-        Raise CvBridgeError if the format cannot hold it, TypeError where it is not an array.
+        Raise CvBridgeError if the format does not support it, TypeError if it is not an array.
         """
         _check_array(cvim)
         try:
@@ -136,7 +138,7 @@ def _check_array(image: object) -> None:
 
 
 def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image in another encoding. Raise CvBridgeError."""
+    """Convert an image to another encoding. Raise CvBridgeError."""
     try:
         if is_converted_by_opencv(source, wanted):
             image, source = _by_opencv(image, source, wanted)
@@ -146,14 +148,14 @@ def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
-    """Return an image of a Bayer pattern or YUV in colors of the same depth, and its encoding then. Raise ValueError."""
+    """Convert a Bayer or YUV image to colors of the same depth; return it with its new encoding. Raise ValueError."""
     cv2 = opencv()
     if cv2 is None:
         raise ValueError(
             f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
-    # OpenCV names a pattern by the pixels of the second row and column.
+    # OpenCV names a Bayer pattern after the pixels in the second row, from the second column on.
     patterns = {
         "bayer_rggb": "BayerBG",
         "bayer_bggr": "BayerRG",

@@ -1,4 +1,4 @@
-"""diagnostic_updater: tasks that fill statuses, and the updater that publishes them on /diagnostics.
+"""diagnostic_updater: tasks that fill diagnostic statuses, and the updater that publishes them on /diagnostics.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """

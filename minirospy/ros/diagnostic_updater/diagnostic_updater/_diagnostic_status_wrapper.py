@@ -1,4 +1,4 @@
-"""A DiagnosticStatus with methods that fill it."""
+"""A DiagnosticStatus with methods that fill its fields."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ ERROR = DiagnosticStatus.ERROR
 
 
 class DiagnosticStatusWrapper(DiagnosticStatus):
-    """A diagnostic_msgs/DiagnosticStatus that is filled step by step; it can be published as it is."""
+    """A diagnostic_msgs/DiagnosticStatus that is filled step by step, and can be published directly."""
 
     def __init__(self, *args: Any, **kwds: Any) -> None:
-        """Take the values of the fields, all in order or some by name."""
+        """Set the fields: all by position, or some by name."""
         super().__init__(*args, **kwds)
 
     @overload
@@ -27,12 +27,12 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def summary(self, level: int, message: object, /) -> None: ...
 
     def summary(self, *args: object) -> None:
-        """Set level and message: ``summary(level, message)``, or ``summary(status)`` with those of another status."""
+        """Set level and message: ``summary(level, message)``, or copy them with ``summary(status)``."""
         self.level, message = _summary_of(args)
         self.message = str(message)
 
     def clearSummary(self) -> None:
-        """Set level OK and no message."""
+        """Set level OK and an empty message."""
         self.summary(OK, "")
 
     @overload
@@ -42,9 +42,9 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def mergeSummary(self, level: int, message: str, /) -> None: ...
 
     def mergeSummary(self, *args: object) -> None:
-        """Take the higher level; join the messages where both are OK or neither is, else keep the one that is not.
+        """Merge a level and a message; the arguments are those of ``summary``.
 
-        Arguments as of ``summary``.
+        The higher level is used. The messages are joined if both are OK or neither is, else the one that is not OK is used.
         """
         level, message = _summary_of(args)
         if (level > OK) == (self.level > OK):
@@ -54,12 +54,12 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
         self.level = max(self.level, level)
 
     def add(self, key: str, val: object) -> None:
-        """Append a pair of a key and a value, as text."""
+        """Append a key and a value, which is converted to a string."""
         self.values.append(KeyValue(key, str(val)))
 
 
 def _summary_of(args: tuple[object, ...]) -> tuple[int, str]:
-    """Return level and message. Raise TypeError for what is neither a status nor a level and a message."""
+    """Return level and message. Raise TypeError if the arguments are neither a status nor a level and a message."""
     if len(args) == 2:
         level, message = args
     elif len(args) == 1 and isinstance(args[0], DiagnosticStatus):

@@ -1,4 +1,4 @@
-"""Tasks, and the updater that runs them and publishes what they report.
+"""Diagnostic tasks, and the updater that runs them and publishes their statuses.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """
@@ -28,8 +28,7 @@ __all__ = [
 Status = DiagnosticStatusWrapper
 Fill = Callable[[Status], Status]
 
-_PERIOD_CHECK = 0.25
-"""Seconds between two looks at ~diagnostic_period."""
+_PERIOD_CHECK = 0.25  # seconds between checks of ~diagnostic_period
 _NO_HARDWARE_ID = (
     "diagnostic_updater: No HW_ID was set. This is probably a bug. Please report it. For devices that do not have a "
     "HW_ID, set this value to 'none'. This warning only occurs once all diagnostics are OK so it is okay to wait until "
@@ -38,7 +37,7 @@ _NO_HARDWARE_ID = (
 
 
 class DiagnosticTask:
-    """A task: its name, and ``run``, which derived classes fill a status in."""
+    """A named task; subclasses override ``run`` to fill a status."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -48,40 +47,40 @@ class DiagnosticTask:
         return self.name
 
     def run(self, stat: Status) -> Status:
-        """Fill a status, and return it."""
+        """Fill a status and return it."""
         return stat
 
 
 class FunctionDiagnosticTask(DiagnosticTask):
-    """A task whose status a function fills."""
+    """A task that calls a function to fill the status."""
 
     def __init__(self, name: str, fn: Fill) -> None:
         super().__init__(name)
         self.fn = fn
 
     def run(self, stat: Status) -> Status:
-        """Call the function with the status; return what it returns."""
+        """Call the function with the status and return its result."""
         return self.fn(stat)
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Several tasks that fill one status: all values, the highest level, the messages merged."""
+    """Several tasks with one status: it has all their values, the highest level, and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.tasks: list[DiagnosticTask] = []
 
     def addTask(self, t: DiagnosticTask) -> None:
-        """Run another task with each run."""
+        """Add a task."""
         self.tasks.append(t)
 
     def run(self, stat: Status) -> Status:
-        """Run each task with the summary that came in, and merge theirs."""
+        """Run each task with the initial summary, then merge their summaries."""
         initial, merged = DiagnosticStatusWrapper(), DiagnosticStatusWrapper()
         initial.summary(stat)
         for task in self.tasks:
             stat.summary(initial)
-            # A task that forgets to return the status has filled it all the same.
+            # Accept a task that returns None: it has filled the status anyway.
             stat = task.run(stat) or stat
             merged.mergeSummary(stat)
         stat.summary(merged)
@@ -89,17 +88,17 @@ class CompositeDiagnosticTask(DiagnosticTask):
 
 
 class DiagnosticTaskVector:
-    """A list of tasks, which threads may change."""
+    """A thread-safe list of tasks."""
 
     class DiagnosticTaskInternal:
-        """A task of the list: a name and a function."""
+        """A list entry: a name and a function."""
 
         def __init__(self, name: str, fn: Fill) -> None:
             self.name = name
             self.fn = fn
 
         def run(self, stat: Status) -> Status:
-            """Name the status, and fill it."""
+            """Set the status's name and fill it."""
             stat.name = self.name
             return self.fn(stat)
 
@@ -108,10 +107,10 @@ class DiagnosticTaskVector:
         self.lock = threading.Lock()
 
     def addedTaskCallback(self, task: DiagnosticTaskInternal) -> None:
-        """Do what a derived class does when a task is added."""
+        """Handle an added task; subclasses override it."""
 
     def add(self, *args: Any) -> None:
-        """Add a task: ``add(task)``, or ``add(name, function)``. Raise TypeError for anything else."""
+        """Add a task: ``add(task)`` or ``add(name, function)``. Raise TypeError for other arguments."""
         if len(args) == 1:
             name, fill = args[0].getName(), args[0].run
         elif len(args) == 2:
@@ -124,7 +123,7 @@ class DiagnosticTaskVector:
             self.addedTaskCallback(task)
 
     def removeByName(self, name: str) -> bool:
-        """Remove the first task of that name; return whether there was one."""
+        """Remove the first task with this name; return whether there was one."""
         with self.lock:
             for task in self.tasks:
                 if task.name == name:
@@ -134,7 +133,7 @@ class DiagnosticTaskVector:
 
 
 class Updater(DiagnosticTaskVector):
-    """Runs its tasks every ~diagnostic_period seconds (1), from ``update``, and publishes them on /diagnostics."""
+    """Runs its tasks in ``update``, every ~diagnostic_period seconds (default 1), and publishes them on /diagnostics."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -153,13 +152,13 @@ class Updater(DiagnosticTaskVector):
         self.hwid = hwid
 
     def update(self) -> None:
-        """Run the tasks if the period has passed; call it often. A clock that jumped back starts a new period."""
+        """Run the tasks if the period has passed; call this often. If the clock jumps back, a new period starts."""
         self._check_diagnostic_period()
         if _has_passed(self.last_time, self.period):
             self.force_update()
 
     def force_update(self) -> None:
-        """Run the tasks now, and publish their statuses."""
+        """Run the tasks immediately and publish their statuses."""
         self.last_time = rospy.Time.now()
         with self.lock:
             statuses = [self._status_of(task) for task in self.tasks]
@@ -180,7 +179,7 @@ class Updater(DiagnosticTaskVector):
         return status
 
     def broadcast(self, lvl: int, msg: str) -> None:
-        """Publish one level and message for every task."""
+        """Publish the same level and message for every task."""
         statuses = []
         for task in self.tasks:
             status = DiagnosticStatusWrapper(name=task.name)
@@ -189,7 +188,7 @@ class Updater(DiagnosticTaskVector):
         self.publish(statuses)
 
     def publish(self, msg: Status | list[Status]) -> None:
-        """Publish a status, or a list of them; their names get the node's in front."""
+        """Publish one or several statuses, with the node's name prepended to their names."""
         statuses = msg if isinstance(msg, list) else [msg]
         for status in statuses:
             status.name = f"{rospy.get_name()[1:]}: {status.name}"
@@ -198,7 +197,7 @@ class Updater(DiagnosticTaskVector):
         self.publisher.publish(array)
 
     def addedTaskCallback(self, task: DiagnosticTaskVector.DiagnosticTaskInternal) -> None:
-        """Publish that the node starts."""
+        """Publish the status "Node starting up" for the task."""
         status = DiagnosticStatusWrapper(name=task.name)
         status.summary(OK, "Node starting up")
         self.publish(status)

@@ -1,4 +1,4 @@
-"""Diagnostics of a topic: how often it is published, and how old its stamps are.
+"""Diagnostics of a topic: its publishing frequency, and the age of its stamps.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """
@@ -25,10 +25,10 @@ __all__ = ["DiagnosedPublisher", "HeaderlessTopicDiagnostic", "TopicDiagnostic"]
 
 
 class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
-    """The frequency of a topic, as a task of an updater."""
+    """A task that reports the frequency of a topic."""
 
     def __init__(self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam) -> None:
-        """Add itself to the updater ``diag`` as "<name> topic status"."""
+        """Create the task, and add it to the updater ``diag`` as "<name> topic status"."""
         super().__init__(f"{name} topic status")
         self.diag = diag
         self.freq = FrequencyStatus(freq)
@@ -40,12 +40,12 @@ class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
         self.freq.tick()
 
     def clear_window(self) -> None:
-        """Start counting again."""
+        """Reset the counts."""
         self.freq.clear()
 
 
 class TopicDiagnostic(HeaderlessTopicDiagnostic):
-    """The frequency of a topic, and the age of its stamps, as a task of an updater."""
+    """A task that reports the frequency of a topic and the age of its stamps."""
 
     def __init__(
         self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam, stamp: TimeStampStatusParam
@@ -55,13 +55,13 @@ class TopicDiagnostic(HeaderlessTopicDiagnostic):
         self.addTask(self.stamp)
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count a message with its stamp."""
+        """Count a message with this stamp."""
         self.stamp.tick(stamp)
         self.freq.tick()
 
 
 class DiagnosedPublisher(TopicDiagnostic):
-    """A publisher of messages with a header, with the diagnostics of its topic."""
+    """Wraps a publisher of messages with headers, and reports its topic's diagnostics."""
 
     def __init__(
         self,
@@ -74,6 +74,6 @@ class DiagnosedPublisher(TopicDiagnostic):
         self.publisher = pub
 
     def publish(self, message: Stamped) -> None:
-        """Count a message with its header's stamp, and publish it."""
+        """Count a message with its header's stamp and publish it."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

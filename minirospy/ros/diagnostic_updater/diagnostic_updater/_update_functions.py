@@ -1,4 +1,4 @@
-"""Tasks that watch how often something happens, how old its stamps are, and that the node lives.
+"""Tasks that monitor the frequency of events, the age of stamps, and whether the node is alive.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """
@@ -27,9 +27,9 @@ class FrequencyStatusParam:
     """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
-        """``freq_bound``: "min" and, where there is one, "max", in Hz; it is read at each run.
+        """``freq_bound``: "min" and optionally "max", in Hz; read at each run.
 
-        ``tolerance``: the part by which a frequency may be outside; ``window_size``: how many runs are looked at.
+        ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: in runs.
         """
         self.freq_bound = freq_bound
         self.tolerance = tolerance
@@ -37,7 +37,7 @@ class FrequencyStatusParam:
 
 
 class FrequencyStatus(DiagnosticTask):
-    """Warn of a frequency outside of its bounds, and report an error where nothing happened in the window."""
+    """Reports a warning if the frequency is out of bounds, and an error if there was no event in the window."""
 
     def __init__(self, params: FrequencyStatusParam, name: str = "FrequencyStatus") -> None:
         super().__init__(name)
@@ -46,7 +46,7 @@ class FrequencyStatus(DiagnosticTask):
         self.clear()
 
     def clear(self) -> None:
-        """Start counting again."""
+        """Reset the counts."""
         with self.lock:
             size = self.params.window_size
             self.count = 0
@@ -60,7 +60,7 @@ class FrequencyStatus(DiagnosticTask):
             self.count += 1
 
     def run(self, stat: Status) -> Status:
-        """Fill a status from the events since the window's start."""
+        """Fill a status from the events in the window."""
         with self.lock:
             now = rospy.Time.now()
             oldest = self.hist_indx
@@ -70,7 +70,7 @@ class FrequencyStatus(DiagnosticTask):
             self.hist_indx = (oldest + 1) % self.params.window_size
             total = self.count
 
-        # A simulated clock may not have advanced.
+        # The window is 0 if a simulated clock has not advanced.
         frequency = events / window if window else math.inf if events else 0.0
         lowest = self.params.freq_bound["min"] * (1 - self.params.tolerance)
         highest = self.params.freq_bound.get("max", math.inf) * (1 + self.params.tolerance)
@@ -101,7 +101,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """The seconds that a stamp may be older than the time at which it is seen; negative: in the future."""
+    """The accepted age of a stamp on arrival, in seconds; a negative age is in the future."""
 
     def __init__(self, min_acceptable: float = -1, max_acceptable: float = 5) -> None:
         self.max_acceptable = max_acceptable
@@ -109,7 +109,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Report stamps that are zero, too old, or too far in the future, since the last run, and how often that was."""
+    """Reports stamps since the last run that are zero, too old, or too far in the future, and counts such runs."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)
@@ -127,7 +127,7 @@ class TimeStampStatus(DiagnosticTask):
         self.deltas_valid = False
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count an event with its stamp: a Time, or seconds as a float."""
+        """Count an event with its stamp: a Time, or seconds."""
         seconds = stamp if isinstance(stamp, (int, float)) else stamp.to_sec()
         with self.lock:
             if seconds == 0:
@@ -172,7 +172,7 @@ class TimeStampStatus(DiagnosticTask):
 
 
 class Heartbeat(DiagnosticTask):
-    """Report OK and "Alive" at each run."""
+    """Reports OK and "Alive" at each run."""
 
     def __init__(self) -> None:
         super().__init__("Heartbeat")

@@ -15,18 +15,17 @@ __all__ = [
 
 _SUFFIX = "/set_parameters"
 
-Value: TypeAlias = bool | int | float | str
-"""A parameter's value."""
+Value: TypeAlias = bool | int | float | str  # the value of a parameter
 
 Values: TypeAlias = Mapping[str, Any]
-"""Values by the names of parameters; ``groups``, if it is there, holds the tree of groups or their states."""
+"""Values by parameter name; ``groups``, if present, has the tree of groups or their states."""
 
 GroupTree: TypeAlias = Mapping[str, Any]
-"""A group, of a type's description or decoded: its number, name and state, its parameters, and the groups in it."""
+"""A group, as in a type's description or decoded: its ID, name and state, its parameters, and its subgroups."""
 
 
 class Entry(TypedDict, total=False):
-    """A parameter or a constant, as a .cfg file describes it and the generated module has it."""
+    """A parameter or a constant, as defined in a .cfg file and in the generated module."""
 
     name: str
     type: str
@@ -35,9 +34,9 @@ class Entry(TypedDict, total=False):
     description: str
     srcfile: str
     srcline: int
-    # Of a constant.
+    # Constants only.
     value: Value
-    # Of a parameter.
+    # Parameters only.
     default: Value | None
     min: Value | None
     max: Value | None
@@ -46,11 +45,11 @@ class Entry(TypedDict, total=False):
 
 
 class DynamicReconfigureException(Exception):
-    """An error of dynamic_reconfigure."""
+    """The base class of dynamic_reconfigure's errors."""
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):
-    """A parameter that the server does not have, or a value that it cannot have."""
+    """The server does not have the parameter, or the value is invalid."""
 
 
 class DynamicReconfigureCallbackException(DynamicReconfigureException):
@@ -58,7 +57,7 @@ class DynamicReconfigureCallbackException(DynamicReconfigureException):
 
 
 class ConfigType(Protocol):
-    """A module ``package.cfg.NAMEConfig``, which is generated from a .cfg file."""
+    """A module ``package.cfg.NAMEConfig``, generated from a .cfg file."""
 
     defaults: Mapping[str, Value]
     min: Mapping[str, Value]
@@ -67,7 +66,7 @@ class ConfigType(Protocol):
 
 
 def find_reconfigure_services() -> list[str]:
-    """Return the names of all servers, sorted. Raise ROSServiceIOException without a master."""
+    """Return the names of all servers, sorted. Raise ROSServiceIOException if the master is unreachable."""
     from minirospy.ros.rosservice import rosservice
 
     names = rosservice.get_service_list()

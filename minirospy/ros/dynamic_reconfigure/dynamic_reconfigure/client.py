@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.client: see and change the parameters of another node."""
+"""dynamic_reconfigure.client: read and change the parameters of another node."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import (
 
 __all__ = ["Client"]
 
-_SLICE_SECONDS = 0.25
-"""How often a wait looks for the node's shutdown."""
+_SLICE_SECONDS = 0.25  # seconds between checks for the node's shutdown while waiting
 
 _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool}
 _TRUE = ("yes", "true", "t", "1")
@@ -41,7 +40,7 @@ DescriptionCallback = Callable[[list[Entry] | None], object]
 
 
 class Client:
-    """The configuration of a server, which is usually a node."""
+    """A client for the configuration of a server, which usually is a node."""
 
     def __init__(
         self,
@@ -50,12 +49,12 @@ class Client:
         config_callback: ConfigCallback | None = None,
         description_callback: DescriptionCallback | None = None,
     ) -> None:
-        """Wait ``timeout`` seconds for the server of this name; without a limit where that is None or 0.
+        """Wait up to ``timeout`` seconds for the server ``name``; None or 0 means no limit.
 
-        ``config_callback(config)`` is called with each change. Raise ROSException if the server is not there in time.
+        ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # It would wait for a server that cannot be.
+            # Without this check it would wait for a server that cannot exist.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -77,7 +76,7 @@ class Client:
         )
 
     def get_configuration(self, timeout: float | None = None) -> Config | None:
-        """Return the server's newest configuration; wait for the first one. None after ``timeout`` seconds, or at shutdown."""
+        """Return the server's latest configuration, waiting for the first; None after ``timeout`` seconds or at shutdown."""
         if not timeout:
             if not self._wait(lambda: self.config is not None, 1.0):
                 print("Waiting for configuration...", file=sys.stderr)
@@ -86,21 +85,21 @@ class Client:
         return self.config
 
     def get_parameter_descriptions(self, timeout: float | None = None) -> list[Entry] | None:
-        """Return a dict for each parameter of the server; None after ``timeout`` seconds, or at shutdown."""
+        """Return a dict for each parameter of the server; None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.param_description is not None, timeout)
         return self.param_description
 
     def get_group_descriptions(self, timeout: float | None = None) -> Config | None:
-        """Return the tree of the server's groups; None after ``timeout`` seconds, or at shutdown."""
+        """Return the tree of the server's groups; None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.group_description is not None, timeout)
         return self.group_description
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values at the server; return the configuration that it has then.
+        """Change values at the server; return the resulting configuration.
 
-        Texts are converted to the type of the parameter; of one with an enum the name of a constant will do.
-        Raise DynamicReconfigureParameterException (a name or value that the server does not have),
-        DynamicReconfigureCallbackException (the server failed, or has left).
+        Strings are converted to the parameter's type; for an enum parameter, the name of a constant is accepted.
+        Raise DynamicReconfigureParameterException for an unknown parameter or an invalid value,
+        DynamicReconfigureCallbackException if the server failed or has disappeared.
         """
         descriptions = self.get_parameter_descriptions() or []
         by_name = {each["name"]: each for each in descriptions}
@@ -120,7 +119,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the tree of the server's groups with other states, by the groups' names."""
+        """Return the tree of the server's groups with the states in ``changes``, given by group name."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:
@@ -136,11 +135,11 @@ class Client:
         self._updates_sub.unregister()
 
     def get_config_callback(self) -> ConfigCallback | None:
-        """Return what is called with each change."""
+        """Return the callback for configuration changes."""
         return self._config_callback
 
     def set_config_callback(self, value: ConfigCallback | None) -> None:
-        """Call this with each change from now on, and first with what there is."""
+        """Set the callback for configuration changes, and call it with the current configuration."""
         self._config_callback = value
         if value is not None:
             value(self.config)
@@ -148,11 +147,11 @@ class Client:
     config_callback = property(get_config_callback, set_config_callback)
 
     def get_description_callback(self) -> DescriptionCallback | None:
-        """Return what is called with the parameters' descriptions."""
+        """Return the callback for parameter descriptions."""
         return self._description_callback
 
     def set_description_callback(self, value: DescriptionCallback | None) -> None:
-        """Call this with the parameters' descriptions from now on, and first with what there is."""
+        """Set the callback for parameter descriptions, and call it with the current ones."""
         self._description_callback = value
         if value is not None:
             value(self.param_description)
@@ -160,7 +159,7 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until something is there; return whether it is. No ``timeout``, or 0: until the node shuts down."""
+        """Wait until ``is_there()`` is true, and return it. With ``timeout`` None or 0, wait until the node shuts down."""
         end = time.monotonic() + timeout if timeout else None
         with self._cv:
             while not is_there() and not rospy.is_shutdown():
@@ -195,7 +194,7 @@ class Client:
         return _TYPES[type_str]
 
     def _converted(self, description: Entry, value: object) -> object:
-        """Return a value in the type of a parameter."""
+        """Return a value converted to the type of a parameter."""
         name = description["name"]
         wanted = self._param_types[name]
         if isinstance(value, str):
@@ -213,7 +212,7 @@ class Client:
 
 
 def _constants(edit_method: str) -> list[dict[str, Any]]:
-    """Return the constants of an enum. It is the text of a dict of Python, and comes from another node: it is not executed."""
+    """Return the constants of an enum. The string is a Python dict from another node, so it is parsed but not executed."""
     try:
         found = ast.literal_eval(edit_method)["enum"] if edit_method else []
     except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError):

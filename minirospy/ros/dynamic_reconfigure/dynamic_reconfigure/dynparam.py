@@ -1,6 +1,6 @@
-"""dynparam: see and change the parameters of a node's dynamic_reconfigure server, at the terminal or from launch files.
+"""dynparam: read and change the parameters of a node's dynamic_reconfigure server, from the terminal or a launch file.
 
-Source: http://wiki.ros.org/dynamic_reconfigure#dynparam_command-line_tool. What is printed is what ROS prints.
+Source: http://wiki.ros.org/dynamic_reconfigure#dynparam_command-line_tool. The output is identical to that of ROS.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ Example launch file:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status. ``argv`` has no program name."""
+    """Run the command; return its exit status. ``argv`` excludes the program's name."""
     words = rospy.myargv(["dynparam", *(sys.argv[1:] if argv is None else argv)])[1:]
     command = COMMANDS.get(words[0]) if words else None
     if command is None:
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(verb: str, usage: str = "", *more: str, missing: Mapping[str, str] | None = None) -> Parser:
-    """Return the parser of a verb that takes a node's name, and more arguments."""
+    """Return the parser of a verb whose arguments are a node's name, and ``more``."""
     parser = Parser(
         f"dynparam {verb}",
         ros_usage=(usage or f"%prog {verb} [options] node{''.join(f' {each}' for each in more)}").replace(
@@ -188,12 +188,12 @@ def _dump(node: str, file: str, timeout: float | None) -> None:
 
 
 def _plain(value: object) -> object:
-    """Return a configuration as dicts, which need no tags in YAML."""
+    """Return a configuration as plain dicts, which YAML dumps without tags."""
     return {key: _plain(each) for key, each in value.items()} if isinstance(value, dict) else value
 
 
 def _connect() -> None:
-    """Become a node. Raise MasterUnreachableError, if ROS waits for a master without a word."""
+    """Initialize a node. Raise MasterUnreachableError; ROS waits silently for a master instead."""
     _check_master()
     rospy.init_node("dynparam", anonymous=True)
 
@@ -213,7 +213,7 @@ def _values_of(node: str, timeout: float | None) -> Config | None:
 
 
 def _change(node: str, values: Values, timeout: float | None) -> None:
-    """Change values at a node. Raise ROSException if it is not there in time, MinirospyError where it fails."""
+    """Change values at a node. Raise ROSException if it does not appear in time, MinirospyError if its server fails."""
     from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.client import Client
 
     client = Client(node, timeout=timeout)

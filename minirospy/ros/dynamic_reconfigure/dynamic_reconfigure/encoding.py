@@ -1,8 +1,8 @@
-"""dynamic_reconfigure.encoding: configurations and descriptions as messages, and back.
+"""dynamic_reconfigure.encoding: conversion of configurations and descriptions to messages, and back.
 
-A configuration is a dict of values by name; under ``groups`` it has the tree of its groups, each a dict with ``id``,
-``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by numbers; 0 is the
-outermost.
+A configuration is a dict of values by name; its key ``groups`` has the tree of its groups, each a dict with ``id``,
+``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is the
+root group.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ _G = TypeVar("_G", bound="Group | GroupState")
 
 
 class Config(dict[str, Any]):
-    """A configuration; its values are attributes as well. A missing one raises KeyError, as in ROS."""
+    """A configuration; its values are also attributes. Reading a missing attribute raises KeyError, as in ROS."""
 
     def __init__(self, *args: Iterable[tuple[str, object]] | Values, **kwargs: object) -> None:
-        """Take the arguments of dict."""
+        """Create it from the arguments of dict."""
         super().__init__(*args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
-            # What copy and pickle look for.
+            # copy and pickle test for special methods and expect AttributeError.
             raise AttributeError(name)
         return self[name]
 
@@ -80,7 +80,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
 
 
 def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
-    """Return a group of a type's description, and all groups in it."""
+    """Return a group of a type's description as a message, followed by all its subgroups."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
         for each in group["parameters"]
@@ -90,9 +90,9 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 
 
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
-    """Return the message of a configuration. Values other than bool, int, float, str and groups are left out.
+    """Return a configuration as a message. Values other than bool, int, float, str and groups are omitted.
 
-    With ``flat`` a group is a tree; without, its values are the groups.
+    With ``flat``, a group is a tree; without, its values are the groups.
     """
     message = ConfigMsg()
     lists: dict[type, tuple[list[Any], type[Any]]] = {
@@ -114,14 +114,14 @@ def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
 
 
 def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
-    """Yield the groups in a group, each after those in it."""
+    """Yield all subgroups of a group, each after its own subgroups."""
     for each in group["groups"].values():
         yield from _inner_groups(each)
         yield each
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without what is in it; of a description its state is True."""
+    """Return a group without its subgroups and parameters; for a description, its state is True."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -134,7 +134,7 @@ def group_dict(group: Group | GroupState) -> Config:
 
 
 def decode_description(msg: ConfigDescription) -> Config:
-    """Return the tree of groups of a type; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
+    """Return the tree of a type's groups; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
     least, greatest, defaults = (decode_config(each) for each in (msg.min, msg.max, msg.dflt))
 
     def described(group: Group) -> Config:
@@ -158,14 +158,14 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return the tree of a message's groups; of ``group``, if that is not the outermost, what is in it."""
+    """Return the tree of a message's groups; if ``group`` is given and not the root, return only its subgroups by name."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
 
 
 def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
-    """Return the outermost group; an empty one where a message has none."""
+    """Return the root group with its subgroups; an empty group if the message has none."""
     outermost = [each for each in groups if each.id == 0]
     if not outermost:
         return Config(groups=Config(), parameters=[])
@@ -175,7 +175,7 @@ def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
 
 
 def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config], above: set[int]) -> Config:
-    """Return the groups in a group by their names. Groups that contain themselves are left out."""
+    """Return the subgroups of a group by name. Groups that contain themselves are omitted."""
     children = Config()
     for each in groups:
         if each.id != 0 and each.parent == parent and each.id not in above:
@@ -186,7 +186,7 @@ def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config],
 
 
 def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a server's first configuration: groups have the states of the type's description."""
+    """Return a server's first configuration: the groups have the states in the type's description."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -201,7 +201,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a configuration; with a type's description, its groups have their parameters' values, too."""
+    """Return a configuration; given the type's description, its groups also contain the values of their parameters."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -222,7 +222,7 @@ def _values(msg: ConfigMsg) -> Config:
 
 
 def _groups_in(group: GroupTree) -> list[GroupTree]:
-    """Return the groups in a group: a list in a type's description, a dict in a decoded one."""
+    """Return the subgroups of a group: they are a list in a type's description, a dict in a decoded one."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, dict) else list(groups)
 
@@ -234,7 +234,7 @@ def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
-    """Yield each group of a configuration with what describes it, by name."""
+    """Yield each group of a configuration with its description, matched by name."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
     for name, each in group["groups"].items():
@@ -243,12 +243,12 @@ def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, G
 
 
 def extract_params(group: GroupTree) -> list[Entry]:
-    """Return the parameters of a group, and of all groups in it."""
+    """Return the parameters of a group and of all its subgroups."""
     return [each for inner in _all_groups(group) for each in inner["parameters"]]
 
 
 def get_parents(group: GroupTree, descriptions: GroupTree) -> list[GroupTree]:
-    """Return the groups that a group is in, the outermost first; ``descriptions["group"]`` has all of them."""
+    """Return the groups that contain a group, outermost first; ``descriptions["group"]`` is the list of all groups."""
     for each in descriptions["group"]:
         if each["id"] == group["parent"] and each is not group:
             return [*get_parents(each, descriptions), each]

@@ -1,7 +1,7 @@
-"""The C++ header that is made of a .cfg file: PACKAGE::NAMEConfig, for dynamic_reconfigure::Server and Client. Pure.
+"""The C++ header generated from a .cfg file: PACKAGE::NAMEConfig, for dynamic_reconfigure::Server and Client. Pure.
 
-The text is our own; the names are those that C++ programs and ROS's server.h and client.h use: the fields, ``groups``, the
-constants, and the functions ``__fromMessage__``, ``__clamp__``, ``__level__`` and so on.
+The code is minirospy's own; the names are those that C++ programs and ROS's server.h and client.h use: the fields,
+``groups``, the constants, and the functions ``__fromMessage__``, ``__clamp__``, ``__level__`` and so on.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/SettingUpDynamicReconfigureForANode(cpp).
 """
 
@@ -283,7 +283,7 @@ inline const std::vector<{config}::AbstractGroupDescriptionConstPtr> &{config}::
 
 
 class Group(Protocol):
-    """A group of a .cfg file, with groups in it."""
+    """A group of a .cfg file, with its subgroups."""
 
     name: str
     type: str
@@ -294,14 +294,14 @@ class Group(Protocol):
 
     @property
     def groups(self) -> Sequence[Group]:
-        """Return the groups in it."""
+        """Return the subgroups."""
 
     def get_class(self, parent: bool = False) -> str:
         """Return the C++ name of its class."""
 
 
 def cpp_header(package: str, name: str, group: Group, constants: Iterable[Entry]) -> str:
-    """Return the text of PACKAGE/NAMEConfig.h. ``group``: the outermost one."""
+    """Return the text of PACKAGE/NAMEConfig.h; ``group`` is the root group."""
     config = f"{name}Config"
     groups = list(_in_order(group, "groups"))
     reads = [
@@ -329,7 +329,7 @@ def cpp_header(package: str, name: str, group: Group, constants: Iterable[Entry]
 
 
 def _in_order(group: Group, path: str) -> Iterator[tuple[Group, str]]:
-    """Yield each group, a group before those in it, and the C++ expression of its member."""
+    """Yield each group before its subgroups, with the C++ expression of its member variable."""
     yield group, path
     for each in group.groups:
         yield from _in_order(each, f"{path}.{each.name.lower()}")
@@ -341,7 +341,7 @@ def _parameters(group: Group) -> Iterator[tuple[Entry, Group]]:
 
 
 def _group_class(group: Group, config: str, member: str, indent: str) -> str:
-    """Return the class of a group and its member."""
+    """Return the C++ class of a group, followed by the member variable of that class."""
     copies = [f"{param['name']} = config.{param['name']};" for param in group.parameters]
     copies += [f"{each.name.lower()}.setParams(config);" for each in group.groups]
     lines = [
@@ -364,7 +364,7 @@ def _group_class(group: Group, config: str, member: str, indent: str) -> str:
 
 
 def _statics(group: Group, config: str) -> Iterator[str]:
-    """Yield the statements that describe a group; it comes after the groups in it."""
+    """Yield the statements that describe a group; a group is added after its subgroups."""
     yield (
         f'    GroupPtr group_{group.id}(new Group("{group.name}", {_literal(group.type)}, {group.parent}, '
         f"{group.id}, {_literal(group.state)}));"
@@ -383,7 +383,7 @@ def _statics(group: Group, config: str) -> Iterator[str]:
 
 
 def _literal(value: Value) -> str:
-    """Return a value as C++ writes it."""
+    """Return a value as a C++ literal."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -397,7 +397,7 @@ def _literal(value: Value) -> str:
             if math.isnan(value)
             else ("-" if value < 0 else "") + limits + "infinity()"
         )
-    # What is not ASCII is written in octal, of which no more than three digits count.
+    # Non-ASCII bytes become octal escapes, which end after at most three digits.
     return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
 
 

@@ -1,6 +1,7 @@
-"""dynamic_reconfigure.parameter_generator_catkin: what a .cfg file, which is a program, describes parameters with.
+"""dynamic_reconfigure.parameter_generator_catkin: the API with which a .cfg file, a Python program, defines parameters.
 
-catkin_make runs it with four folders: of dynamic_reconfigure, and for documents, C++ headers and Python modules.
+catkin_make runs the .cfg file with four folders as arguments: that of dynamic_reconfigure, and the output folders for
+documents, C++ headers and Python modules.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
 
@@ -50,13 +51,13 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception where a description has a quote, which the C++ header cannot hold."""
+    """Raise Exception if a description contains a quote, which the C++ header does not allow."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
 
 def check_name(name: str) -> None:
-    """Raise Exception where a parameter cannot have this name."""
+    """Raise Exception if the name is not allowed for a parameter."""
     if not _NAME.match(name):
         raise Exception(
             f"The name of field '{name}' does not follow the ROS naming conventions, "
@@ -65,14 +66,14 @@ def check_name(name: str) -> None:
 
 
 class ParameterGenerator:
-    """The parameters of a node, in groups; ``generate`` writes what programs import and include."""
+    """The parameters of a node, in groups; ``generate`` writes the files that programs import and include."""
 
     minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
     maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
     defval: Mapping[str, Value] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
 
     class Group:
-        """Parameters that are shown together, and groups in it."""
+        """Parameters that are shown together, and subgroups."""
 
         def __init__(
             self, gen: ParameterGenerator, name: str, type: str, state: bool, id: int, parent: int
@@ -90,11 +91,11 @@ class ParameterGenerator:
             gen._groups[id] = self
 
         def get_group(self, id: int) -> ParameterGenerator.Group:
-            """Return a group by its number. Raise KeyError."""
+            """Return the group with this ID. Raise KeyError."""
             return self.gen._groups[id]
 
         def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
-            """Add a group to this one; return it."""
+            """Add a subgroup and return it."""
             group = self.gen.Group(self.gen, name, type, state, len(self.gen._groups), self.id)
             self.groups.append(group)
             return group
@@ -110,9 +111,9 @@ class ParameterGenerator:
             max: Value | None = None,
             edit_method: str = "",
         ) -> None:
-            """Add a parameter; ``level``: the bits that the server's callback gets when it changes.
+            """Add a parameter; ``level`` is the bit mask passed to the server's callback when it changes.
 
-            Raise Exception (a wrong name, limits of a text), TypeError (a value of another type).
+            Raise Exception for an invalid name or limits on a str or bool parameter, TypeError for a value of another type.
             """
             if paramtype in (str_t, bool_t) and (max is not None or min is not None):
                 raise Exception(f"Max or min specified for {name}, which is of '{paramtype}' type")
@@ -138,26 +139,26 @@ class ParameterGenerator:
             self.parameters.append(param)
 
         def get_parameters(self) -> list[Entry]:
-            """Return its parameters, and those of all groups in it."""
+            """Return the parameters of this group and of all its subgroups."""
             return [*self.parameters, *(each for group in self.groups for each in group.get_parameters())]
 
         def get_parents(self) -> list[str]:
-            """Return the names of the groups that it is in, the outermost first, and its own."""
+            """Return the names of the groups that contain this group, outermost first, then its own name."""
             above = self.get_group(self.parent).get_parents() if self.id else []
             return [*above, self.name]
 
         def get_field(self) -> str:
-            """Return the C++ name of the member that holds it."""
+            """Return the C++ name of the member variable for this group."""
             *above, name = self.get_parents()
             return "::".join([*map(str.upper, above), name.lower()])
 
         def get_class(self, parent: bool = False) -> str:
-            """Return the C++ name of its class; with ``parent`` of the class that holds it."""
+            """Return the C++ name of this group's class; with ``parent``, that of the enclosing class."""
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
         def to_dict(self) -> dict[str, object]:
-            """Return what the generated module knows of it."""
+            """Return the description of this group for the generated module."""
             return {
                 "name": self.name,
                 "type": self.type,
@@ -178,7 +179,7 @@ class ParameterGenerator:
             }
 
     def __init__(self) -> None:
-        """Take the folders from the command line. Raise SystemExit where it has none."""
+        """Read the folders from the command line. Raise SystemExit if they are missing."""
         self._groups: dict[int, ParameterGenerator.Group] = {}
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants: list[Entry] = []
@@ -187,11 +188,11 @@ class ParameterGenerator:
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
 
     def pytype(self, drtype: str) -> type[Value]:
-        """Return the Python type of a parameter's type. Raise KeyError."""
+        """Return the Python type for a parameter type. Raise KeyError."""
         return _PYTHON_TYPES[drtype]
 
     def check_type(self, param: Entry, field: _ValueKey) -> None:
-        """Convert a parameter's value to its type. Raise TypeError if it has another."""
+        """Convert a parameter's value to its type. Raise TypeError if that is not possible."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
@@ -207,14 +208,14 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set the default where there is none. Raise TypeError."""
+        """Convert a parameter's value, or set it to ``default`` if it is None. Raise TypeError."""
         if param[field] is None:
             param[field] = default
         else:
             self.check_type(param, field)
 
     def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
-        """Add a constant ``NAME_name`` to the module; return what ``enum`` takes. Raise Exception, TypeError."""
+        """Add a constant ``NAME_name`` to the module; return it as an argument for ``enum``. Raise Exception, TypeError."""
         srcfile, srcline = _source_line()
         constant: Entry = {
             "name": name,
@@ -231,7 +232,7 @@ class ParameterGenerator:
         return constant
 
     def enum(self, constants: Sequence[Entry], description: str) -> str:
-        """Return the ``edit_method`` of a parameter that is one of some constants. Raise Exception."""
+        """Return the ``edit_method`` of a parameter whose value is one of these constants. Raise Exception."""
         if len({constant["type"] for constant in constants}) != 1:
             raise Exception("Inconsistent types in enum!")
         check_description(description)
@@ -248,15 +249,15 @@ class ParameterGenerator:
         max: Value | None = None,
         edit_method: str = "",
     ) -> None:
-        """Add a parameter to the outermost group, as ``Group.add``."""
+        """Add a parameter to the root group; see ``Group.add``."""
         self.group.add(name, paramtype, level, description, default, min, max, edit_method)
 
     def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
-        """Add a group to the outermost one; return it."""
+        """Add a group to the root group and return it."""
         return self.group.add_group(name, type, state)
 
     def generate(self, pkgname: str, nodename: str, name: str) -> None:
-        """Write NAMEConfig.py, NAMEConfig.h and documents; ``name`` is that of the .cfg file."""
+        """Write NAMEConfig.py, NAMEConfig.h and documents; ``name`` is the name of the .cfg file."""
         self.pkgname, self.nodename, self.name = pkgname, nodename, name
         self.msgname = f"{name}Config"
         print(f"Generating reconfiguration files for {name} in {pkgname}")
@@ -284,7 +285,7 @@ class ParameterGenerator:
 
 
 def _source_line() -> tuple[str, int]:
-    """Return the name of the .cfg file and the line in it that is running, for the headers' comments."""
+    """Return the name of the .cfg file and its currently executed line, for comments in the headers."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

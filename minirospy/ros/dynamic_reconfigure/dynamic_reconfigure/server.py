@@ -1,6 +1,6 @@
-"""dynamic_reconfigure.server: a node's parameters that others may change.
+"""dynamic_reconfigure.server: parameters of a node that other nodes can change.
 
-Topics ``~parameter_descriptions`` and ``~parameter_updates``, latched; service ``~set_parameters``.
+Latched topics ``~parameter_descriptions`` and ``~parameter_updates``; service ``~set_parameters``.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import (
 
 __all__ = ["Server"]
 
+# Python types allowed by each parameter type; rosparam stores a double without a decimal point as an int.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),
     "bool": (bool, int),
     "str": (str,),
 }
-"""What values a parameter may have. A number that rosparam has written without a point is a double, too."""
 
 
 class Server:
-    """Serves a configuration: ``callback(config, level)`` is called first and with each change, and returns it.
+    """Serves a configuration: ``callback(config, level)`` is called initially and on each change, and returns the configuration.
 
-    ``level`` has the bits of all parameters that changed; -1 in the first call. Values beyond the limits become the limits.
+    ``level`` has the bits of all changed parameters; it is -1 in the first call. Values are clamped to the limits.
     """
 
     def __init__(
         self, type: ConfigType, callback: Callable[[Config, int], Config | None], namespace: str = ""
     ) -> None:
-        """``type``: the module package.cfg.NAMEConfig; ``namespace``: of its names, in the node's own one.
+        """``type`` is the module package.cfg.NAMEConfig; ``namespace`` is for the topics and the service, below the node's name.
 
-        Raise DynamicReconfigureCallbackException if the callback returns None, and what it raises.
+        Raise DynamicReconfigureCallbackException if the callback returns None, or any exception that the callback raises.
         """
         self.mutex = threading.Lock()
         if not namespace or namespace == "~":
@@ -83,7 +83,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values; return the configuration that the callback returned. Raise what the callback raises."""
+        """Change values; return the configuration returned by the callback. Raise any exception that the callback raises."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)
@@ -96,7 +96,7 @@ class Server:
         return encode_config(self.update_configuration(changes))
 
     def _copy_from_parameter_server(self, config: Config) -> None:
-        """Take the values that are on the parameter server; report those that do not fit."""
+        """Use the values on the parameter server; log an error for values of a wrong type."""
         for param in self._params:
             name = param["name"]
             value = rospy.get_param(self.ns + name, None)
@@ -155,7 +155,7 @@ class Server:
 
 
 def _fits(param: Entry, value: object) -> bool:
-    """Return whether a parameter may have a value."""
+    """Return whether the value's type is allowed for a parameter."""
     allowed = _TYPES.get(param["type"])
     if allowed is None:
         return True
@@ -163,7 +163,7 @@ def _fits(param: Entry, value: object) -> bool:
 
 
 def _converted(param: Entry, value: Value) -> Value:
-    """Return a value in the type that its message has."""
+    """Return a value converted to the type of its message field."""
     if param["type"] == "double":
         return float(value)
     return bool(value) if param["type"] == "bool" else value

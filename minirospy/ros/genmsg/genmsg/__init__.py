@@ -1,1 +1,1 @@
-"""genmsg: definitions of messages and services, as code generators read them."""
+"""genmsg: message and service definitions, for code generators."""

@@ -1,4 +1,4 @@
-"""genmsg.base: the signs and suffixes of definition files, and the error of one that does not parse."""
+"""genmsg.base: constants of definition files, and the exception for a definition that cannot be parsed."""
 
 from __future__ import annotations
 
@@ -25,4 +25,4 @@ IODELIM = "---"
 
 
 class InvalidMsgSpec(Exception):
-    """A definition does not parse."""
+    """A definition cannot be parsed."""

@@ -8,7 +8,7 @@ __all__ = ["includepath_to_dict"]
 
 
 def includepath_to_dict(includepath: Iterable[str] | None) -> dict[str, list[str]]:
-    """Return package -> folders of the values ``package:folder`` of the option ``-I``; those without a package at ''."""
+    """Return package -> folders for the values ``package:folder`` of option ``-I``; the key is '' if there is no package."""
     found: dict[str, list[str]] = {}
     for value in includepath or ():
         package, colon, folder = value.partition(":")

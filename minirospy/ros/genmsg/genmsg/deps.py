@@ -1,4 +1,4 @@
-"""genmsg.deps: the files that a definition needs, as build rules name them. Source: http://docs.ros.org/api/genmsg/html/."""
+"""genmsg.deps: the files on which a definition depends, for build rules. Source: http://docs.ros.org/api/genmsg/html/."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ __all__ = [
 def find_msg_dependencies_with_type(
     pkg_name: str, msg_file: str, search_path: SearchPath
 ) -> list[tuple[str, str | None]]:
-    """Return (type, file) of each message that the one of ``msg_file`` needs. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return (type, file) of each message that the message in ``msg_file`` uses. Raise InvalidMsgSpec, MsgNotFound."""
     context = MsgContext.create_default()
     return _needed(context, load_msg_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
 
 
 def find_msg_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
-    """Return the files of the messages that the one of ``msg_file`` needs. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return the files of the messages that the message in ``msg_file`` uses. Raise InvalidMsgSpec, MsgNotFound."""
     return [file for _, file in find_msg_dependencies_with_type(pkg_name, msg_file, search_path)]
 
 
 def find_srv_dependencies_with_type(
     pkg_name: str, msg_file: str, search_path: SearchPath
 ) -> list[tuple[str, str | None]]:
-    """Return (type, file) of each message that a service needs. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return (type, file) of each message that a service uses. Raise InvalidMsgSpec, MsgNotFound."""
     context = MsgContext.create_default()
     return _needed(context, load_srv_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
 
 
 def find_srv_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
-    """Return the files of the messages that a service needs. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return the files of the messages that a service uses. Raise InvalidMsgSpec, MsgNotFound."""
     return [file for _, file in find_srv_dependencies_with_type(pkg_name, msg_file, search_path)]
 
 

@@ -1,4 +1,4 @@
-"""genmsg's classes and functions, over our parser; `import genmsg` re-exports them for programs that generate code.
+"""genmsg's classes and functions, based on minirospy's parser; `import genmsg` re-exports them for code generators.
 
 Source: http://docs.ros.org/api/genmsg/html/.
 """
@@ -46,8 +46,7 @@ __all__ = [
 
 _BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)
 
-SearchPath = Mapping[str, Sequence[str]]
-"""Package -> folders of its definitions."""
+SearchPath = Mapping[str, Sequence[str]]  # package -> folders of its definitions
 
 
 class MsgNotFound(Exception):
@@ -67,7 +66,7 @@ class MsgNotFound(Exception):
 
 
 class MsgContext:
-    """The messages that are known, their files, and what each needs."""
+    """The known messages, their files, and the messages that each uses."""
 
     def __init__(self) -> None:
         self._specs: dict[str, MsgSpec] = {}
@@ -76,7 +75,7 @@ class MsgContext:
 
     @staticmethod
     def create_default() -> MsgContext:
-        """Return a context that knows ``time`` and ``duration``."""
+        """Return a context that contains ``time`` and ``duration``."""
         context = MsgContext()
         for name, kind in (("time", "uint32"), ("duration", "int32")):
             text = f"{kind} secs\n{kind} nsecs"
@@ -88,11 +87,11 @@ class MsgContext:
         self._specs[bare_msg_type(full_msg_type)] = msgspec
 
     def is_registered(self, full_msg_type: str) -> bool:
-        """Return whether a message, or that of an array, is known."""
+        """Return whether a message type, or an array's element type, is known."""
         return bare_msg_type(full_msg_type) in self._specs
 
     def get_registered(self, full_msg_type: str) -> MsgSpec:
-        """Return a message that is known. Raise KeyError."""
+        """Return a known message. Raise KeyError."""
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
@@ -100,19 +99,19 @@ class MsgContext:
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """Return the file of a definition; None if that is not known."""
+        """Return the file of a definition; None if it is unknown."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
-        """Set which messages one has in its fields."""
+        """Set the message types of a message's fields."""
         self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
-        """Return the messages that one has in its fields; None before :func:`load_depends`."""
+        """Return the message types of a message's fields; None before :func:`load_depends`."""
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return the messages that one needs, each before those that it needs itself. Raise KeyError."""
+        """Return all messages used by a message, directly or indirectly, each before those that it uses. Raise KeyError."""
         found: list[str] = []
         for name in self._depends[full_msg_type]:
             found += [each for each in (name, *self.get_all_depends(name)) if each not in found]
@@ -120,7 +119,7 @@ class MsgContext:
 
 
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
-    """Return the file of a definition. Raise MsgNotFound, ValueError where the search path is not a dictionary."""
+    """Return the file of a definition. Raise MsgNotFound; ValueError if the search path is not a dictionary."""
     if not isinstance(search_path, Mapping):
         raise ValueError("search_path must be a dictionary of namespaces to lists of folders")
     if package not in search_path:
@@ -150,14 +149,14 @@ def get_srv_file(package: str, base_type: str, search_path: SearchPath) -> str:
 
 
 def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> MsgSpec:
-    """Add the message of a text to the context, and return it. Raise InvalidMsgSpec."""
+    """Parse a message definition, add it to the context, and return it. Raise InvalidMsgSpec."""
     spec = _msg_spec(_parsed(text, full_name))
     msg_context.register(full_name, spec)
     return spec
 
 
 def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> MsgSpec:
-    """Add the message of a file to the context, and return it. Raise InvalidMsgSpec, OSError."""
+    """Load a message from a file, add it to the context, and return it. Raise InvalidMsgSpec, OSError."""
     text = _text(file_path)
     try:
         spec = load_msg_from_string(msg_context, text, full_name)
@@ -168,14 +167,14 @@ def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 
 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
-    """Add a message to the context by its name, and return it. Raise InvalidMsgSpec, MsgNotFound."""
+    """Load a message by its type, add it to the context, and return it. Raise InvalidMsgSpec, MsgNotFound."""
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
     package, base = package_resource_name(name)
     return load_msg_from_file(msg_context, get_msg_file(package, base, search_path), name)
 
 
 def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> SrvSpec:
-    """Return the service of a text; add its request and response to the context. Raise InvalidMsgSpec."""
+    """Parse a service definition and return it; add its request and response to the context. Raise InvalidMsgSpec."""
     parsed = parsed_service(text, full_name)
     request, response = _msg_spec(parsed.request), _msg_spec(parsed.response)
     for spec in (request, response):
@@ -184,22 +183,22 @@ def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> 
 
 
 def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> SrvSpec:
-    """Return the service of a file. Raise InvalidMsgSpec, OSError."""
+    """Load a service from a file. Raise InvalidMsgSpec, OSError."""
     spec = load_srv_from_string(msg_context, _text(file_path), full_name)
     msg_context.set_file(full_name, file_path)
     return spec
 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
-    """Return a service by its name. Raise InvalidMsgSpec, MsgNotFound."""
+    """Load a service by its type. Raise InvalidMsgSpec, MsgNotFound."""
     package, base = package_resource_name(srv_type)
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
 
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
-    """Add all that a message or service needs to the context; return the messages of its fields, each once.
+    """Load all messages that a message or service uses into the context; return the types of its fields, without duplicates.
 
-    Raise InvalidMsgSpec, MsgNotFound, ValueError where the spec is something else.
+    Raise InvalidMsgSpec, MsgNotFound; ValueError if ``spec`` is not a message or service.
     """
     if not isinstance(spec, MsgSpec | SrvSpec):
         raise ValueError(f"spec does not appear to be a message or service: {spec}")
@@ -228,12 +227,12 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
-    """Return a function of a name that returns our spec of a message in a context, or raises KeyError."""
+    """Return a function that looks up a message in a context as minirospy's MessageSpec, or raises KeyError."""
     return lambda name: parsed_message(msg_context.get_registered(name))
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Return our spec of a message. Raise InvalidMsgSpec."""
+    """Return a message as minirospy's MessageSpec. Raise InvalidMsgSpec."""
     return _parsed(spec.text, spec.full_name)
 
 
@@ -249,7 +248,7 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
-        # genmsg reads a text without the line between, and one with several, too.
+        # genmsg also accepts a text without a separator line, or with several.
         text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)

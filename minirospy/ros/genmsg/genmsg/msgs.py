@@ -1,4 +1,4 @@
-"""genmsg.msgs: types, fields and constants of messages."""
+"""genmsg.msgs: message types, fields and constants."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class _Constant(NamedTuple):
 
 
 class Constant(_Constant):
-    """A constant: ``val`` is its value, ``val_text`` what the definition says. Raise ValueError if one is None."""
+    """A constant: ``val`` is its value, ``val_text`` its text in the definition. Raise ValueError if an argument is None."""
 
     __slots__ = ()
 
@@ -75,7 +75,7 @@ class Constant(_Constant):
 
 
 class Field:
-    """A field, its type taken apart."""
+    """A field, with its parsed type."""
 
     def __init__(self, name: str, type: str) -> None:
         self.name = name
@@ -95,7 +95,7 @@ class Field:
 
 
 class MsgSpec:
-    """A message: ``types`` and ``names`` of its fields, its constants, its text and name."""
+    """A message: ``types`` and ``names`` of its fields, its constants, text and name."""
 
     def __init__(
         self,
@@ -128,11 +128,11 @@ class MsgSpec:
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
-        """Return the fields, their types taken apart."""
+        """Return the fields with parsed types."""
         return [Field(name, type_) for type_, name in self.fields()]
 
     def has_header(self) -> bool:
-        """Return whether it starts with a header that publishers fill in."""
+        """Return whether the first field is a header, which publishers fill in."""
         return self.fields()[:1] == [(HEADER_FULL_NAME, "header")]
 
     def __eq__(self, other: object) -> bool:
@@ -154,27 +154,27 @@ class MsgSpec:
 
 
 def is_builtin(msg_type_name: str) -> bool:
-    """Return whether a type is built in, not a message."""
+    """Return whether a type is built-in rather than a message."""
     return msg_type_name in BUILTIN_TYPES
 
 
 def is_header_type(msg_type: str) -> bool:
-    """Return whether a type is that of a header, by any of its names."""
+    """Return whether a type is one of the names of std_msgs/Header."""
     return msg_type in _HEADERS
 
 
 def is_valid_msg_type(x: str) -> bool:
-    """Return whether a text is a type's name, with or without brackets."""
+    """Return whether a string is a valid type name, with or without brackets."""
     return bool(x) and re.match(r"(?!.*//)[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
 
 
 def is_valid_msg_field_name(x: str | None) -> bool:
-    """Return whether a text is a field's name."""
+    """Return whether a string is a valid field name."""
     return x is not None and re.match(r"[A-Za-z]\w*\Z", x, re.ASCII) is not None
 
 
 def is_valid_constant_type(x: str) -> bool:
-    """Return whether a constant can be of a type."""
+    """Return whether a constant can have this type."""
     return x in PRIMITIVE_TYPES
 
 
@@ -184,16 +184,16 @@ def bare_msg_type(msg_type: str) -> str:
 
 
 def resolve_type(msg_type: str, package_context: str) -> str:
-    """Return a type with its package, as definitions in ``package_context`` mean it."""
+    """Return a type's full name, as it is resolved in definitions of ``package_context``."""
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
-    # ROS's own forgets the brackets behind a Header.
+    # ROS's genmsg drops the brackets after Header; they are kept here.
     return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
 
 
 def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
-    """Return (type without brackets, whether it is an array, its length where that is fixed). Raise ValueError."""
+    """Return (base type, whether it is an array, its length if fixed). Raise ValueError."""
     if not msg_type:
         raise ValueError("Invalid empty type")
     if "[" not in msg_type:
@@ -208,7 +208,7 @@ def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
 
 
 def why_invalid(text: str) -> str | None:
-    """Return genmsg's words for the first fault of a definition; None if genmsg finds none."""
+    """Return genmsg's message for the first error in a definition; None if genmsg finds none."""
     names: list[str] = []
     for line in text.splitlines():
         bare = line.split("#")[0].strip()

@@ -1,4 +1,4 @@
-"""genmsg.srvs: the spec of a service."""
+"""genmsg.srvs: service definitions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["SrvSpec"]
 
 
 class SrvSpec:
-    """A service: the messages of its request and response."""
+    """A service: its request and response messages."""
 
     def __init__(
         self,

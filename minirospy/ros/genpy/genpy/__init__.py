@@ -1,1 +1,1 @@
-"""genpy: what generated messages import."""
+"""genpy: the names that generated message modules import."""

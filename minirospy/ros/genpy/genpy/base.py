@@ -1,4 +1,4 @@
-"""genpy.base: the types that `struct` packs."""
+"""genpy.base: the types that the `struct` module packs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ SIMPLE_TYPES = list(SIMPLE_TYPES_DICT)
 
 
 class MsgGenerationException(MessageException):
-    """A definition that no class can be made from."""
+    """No class can be generated from a definition."""
 
 
 def is_simple(type_: str) -> bool:
-    """Return whether ``struct`` packs a type."""
+    """Return whether the ``struct`` module can pack a type."""
     return type_ in SIMPLE_TYPES

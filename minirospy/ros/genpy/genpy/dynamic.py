@@ -1,4 +1,4 @@
-"""genpy.dynamic: message classes from a full text."""
+"""genpy.dynamic: generate message classes from a full definition."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["generate_dynamic"]
 
 
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
-    """Return the classes of a full text and of all types in it, by name.
+    """Return the classes of a full definition and of all types in it, by name.
 
-    Raise InvalidMsgSpec, MsgNotFound where the text lacks a type, MsgGenerationException where a part of it is unnamed.
+    Raise InvalidMsgSpec; MsgNotFound if a type is missing; MsgGenerationException if a part has no name.
     """
     from minirospy.core.idl import load
 
@@ -26,7 +26,7 @@ def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
 
 
 def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception:
-    """Return the error that genpy raises of a full text."""
+    """Return the error that genpy raises for an invalid full definition."""
     from minirospy.ros.genmsg.genmsg.base import InvalidMsgSpec
     from minirospy.ros.genmsg.genmsg.msg_loader import (
         MsgContext,
@@ -53,6 +53,6 @@ def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception
     except (InvalidMsgSpec, MsgNotFound) as found:
         return found
     except (ValueError, RecursionError):
-        # A name that is none, and a message that contains itself: our error says so.
+        # An invalid name, or a message that contains itself: use the text of minirospy's error.
         pass
     return InvalidMsgSpec(str(error))

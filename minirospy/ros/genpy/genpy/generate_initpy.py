@@ -1,4 +1,4 @@
-"""genpy.generate_initpy: the ``__init__`` of a folder of generated modules. Source: http://wiki.ros.org/genpy."""
+"""genpy.generate_initpy: writes ``__init__.py`` for a folder of generated modules. Source: http://wiki.ros.org/genpy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["write_module", "write_modules"]
 
 
 def write_modules(outdir: str) -> int:
-    """Write the ``__init__.py`` of a folder for all generated modules in it. Return 0."""
+    """Write ``__init__.py`` for all generated modules in a folder. Return 0."""
     folder = Path(outdir)
     if not folder.is_dir():
         print(f"{outdir} is not a folder: no __init__.py is written", file=sys.stderr)
@@ -20,6 +20,6 @@ def write_modules(outdir: str) -> int:
 
 
 def write_module(basedir: str, generated_modules: Iterable[str]) -> None:
-    """Write an ``__init__.py`` that passes on the names of these modules. Raise OSError."""
+    """Write an ``__init__.py`` that re-exports the names of these modules. Raise OSError."""
     lines = [f"from .{module} import *\n" for module in generated_modules]
     Path(basedir, "__init__.py").write_text("".join(lines), encoding="utf-8")

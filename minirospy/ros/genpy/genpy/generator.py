@@ -1,4 +1,4 @@
-"""genpy.generator: Python modules of definitions, written by our compiler. Source: http://wiki.ros.org/genpy."""
+"""genpy.generator: generates Python modules from definitions, with minirospy's compiler. Source: http://wiki.ros.org/genpy."""
 
 from __future__ import annotations
 
@@ -63,17 +63,17 @@ def srv_generator(msg_context: MsgContext, spec: SrvSpec, search_path: SearchPat
 
 
 def compute_resource_name(filename: str, ext: str) -> str:
-    """Return the name of the type that a file defines."""
+    """Return the name of the type defined in a file."""
     return os.path.basename(filename)[: -len(ext)]
 
 
 def compute_outfile_name(outdir: str, infile_name: str, ext: str) -> str:
-    """Return the path of the module for a file's definition."""
+    """Return the path of the module generated from a definition file."""
     return os.path.join(outdir, f"_{compute_resource_name(infile_name, ext)}.py")
 
 
 def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
-    """Return package and name of a type that definitions in ``package`` use. Raise MsgGenerationException."""
+    """Return package and name of a type used by definitions in ``package``. Raise MsgGenerationException."""
     words = type_.split("/")
     if len(words) > 2:
         raise MsgGenerationException(f"illegal message type: {type_}")
@@ -81,7 +81,7 @@ def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
 
 
 def make_python_safe(spec: MsgSpec) -> MsgSpec:
-    """Return a message whose fields and constants have the names that they have in Python."""
+    """Return a message in which Python's reserved words are renamed in fields and constants."""
     constants = [
         Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
     ]
@@ -96,7 +96,7 @@ def _remap_reserved(field_name: str) -> str:
 
 
 class Generator:
-    """Writes a module for each definition: ``what`` they are, the ``ext`` of their files, how they are read and emitted."""
+    """Generates modules: ``what`` names the kind of definition, ``ext`` is the file extension; the functions load and emit it."""
 
     def __init__(self, what: str, ext: str, spec_loader_fn: _Loader, generator_fn: _Emitter) -> None:
         self.what = what
@@ -107,7 +107,7 @@ class Generator:
     def generate(
         self, msg_context: MsgContext, full_type: str, f: str, outdir: str, search_path: SearchPath
     ) -> str:
-        """Write the module of the definition in the file ``f``, and return its path.
+        """Generate the module for the definition file ``f``; return the module's path.
 
         Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound, OSError.
         """
@@ -121,7 +121,7 @@ class Generator:
     def generate_messages(
         self, package: str, package_files: Sequence[str], outdir: str, search_path: SearchPath
     ) -> int:
-        """Write the modules of a package's files into ``outdir``. Return 0, or 1 where one failed: standard error says why."""
+        """Generate modules for a package's files in ``outdir``; return 0, or 1 after an error, which is printed to stderr."""
         msg_context = MsgContext.create_default()
         status = 0
         for file in package_files:
@@ -139,7 +139,7 @@ class Generator:
                 OSError,
                 UnicodeDecodeError,
             ) as error:
-                # One definition's fault does not keep the others from being written.
+                # Continue with the other definitions after an error.
                 text = f"ERROR: Unable to generate {self.what} for package '{package}': while processing '{file}': {error}"
                 print(f"\n{text}\n", file=sys.stderr)
                 status = 1
@@ -147,14 +147,14 @@ class Generator:
 
 
 class MsgGenerator(Generator):
-    """The generator of messages."""
+    """Generates the modules of messages."""
 
     def __init__(self) -> None:
         super().__init__("messages", ".msg", load_msg_from_file, msg_generator)
 
 
 class SrvGenerator(Generator):
-    """The generator of services."""
+    """Generates the modules of services."""
 
     def __init__(self) -> None:
         super().__init__("services", ".srv", load_srv_from_file, srv_generator)

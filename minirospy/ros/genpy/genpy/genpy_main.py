@@ -19,14 +19,14 @@ __all__ = ["genmain", "usage"]
 
 
 def usage(progname: str) -> None:
-    """Print how a generator is called."""
+    """Print the usage of a generator."""
     print(f"{progname} file(s)")
 
 
 def genmain(argv: Sequence[str], progname: str, gen: Generator) -> NoReturn:
-    """Generate what a command line, program name included, calls for, and exit: 0, or 1 to 3 for an error, 2 for a usage error.
+    """Run a generator with a command line, program name included, and exit: 0, 1 to 3 after an error, 2 after a usage error.
 
-    ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER FILE ...``, or ``--initpy -o FOLDER``.
+    Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER FILE ...``, or ``--initpy -o FOLDER``.
     """
     parser = OptionParser(f"{progname} file")
     parser.add_option("--initpy", action="store_true", default=False)

@@ -1,6 +1,6 @@
-"""image_geometry.cameramodels: the models of one camera and of two. Pixels are (u, v), points (x, y, z) in meters.
+"""image_geometry.cameramodels: models of one and of two cameras. Pixels are (u, v), points are (x, y, z) in meters.
 
-K is the camera matrix of the raw image, D its distortion, R the rotation to the rectified image, P the projection of that.
+K is the raw image's camera matrix, D its distortion, R the rotation to the rectified image, P that image's projection.
 Source: http://wiki.ros.org/image_geometry, http://wiki.ros.org/image_pipeline/CameraInfo.
 """
 
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from sensor_msgs.msg import CameraInfo, RegionOfInterest
 
-    Matrix: TypeAlias = Any
-    """A numpy.matrix of doubles, which is what programs get from ROS."""
+    Matrix: TypeAlias = Any  # a numpy.matrix of doubles, as in ROS
     Array: TypeAlias = NDArray[Any]
     Point: TypeAlias = Sequence[float]
 
@@ -32,14 +31,14 @@ __all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
 
 
 def mkmat(rows: int, cols: int, L: Sequence[float]) -> Matrix:
-    """Return a matrix of these values, row by row. Raise ValueError if they are not ``rows`` x ``cols``."""
+    """Return a matrix of these values, given by rows. Raise ValueError if their number is not ``rows`` x ``cols``."""
     import numpy as np
 
     return np.array(L, np.float64).reshape(rows, cols).view(np.matrix)
 
 
 class PinholeCameraModel:
-    """A camera, as its CameraInfo describes it; binning and region of interest are applied to K and P."""
+    """A camera described by its CameraInfo; binning and region of interest are applied to K and P."""
 
     def __init__(self) -> None:
         self.K: Matrix = None
@@ -57,7 +56,7 @@ class PinholeCameraModel:
         self.stamp: genpy.Time | None = None
 
     def fromCameraInfo(self, msg: CameraInfo) -> None:
-        """Set the parameters of the camera."""
+        """Set the camera's parameters."""
         self.K = mkmat(3, 3, msg.K)
         self.D = mkmat(len(msg.D), 1, msg.D) if msg.D else None
         self.R = mkmat(3, 3, msg.R)
@@ -72,7 +71,7 @@ class PinholeCameraModel:
         if not any((msg.roi.x_offset, msg.roi.y_offset, msg.roi.width, msg.roi.height)):
             self.raw_roi.width, self.raw_roi.height = self.width, self.height
 
-        # The principal point first moves with the region's corner, then everything shrinks by the binning.
+        # First shift the principal point by the region's offset, then scale by the binning.
         for matrix in (self.K, self.P):
             matrix[0, 2] -= self.raw_roi.x_offset
             matrix[1, 2] -= self.raw_roi.y_offset
@@ -80,21 +79,21 @@ class PinholeCameraModel:
             matrix[1, :3] /= self.binning_y
 
     def rectifyImage(self, raw: Array, rectified: Array) -> None:
-        """Write the rectified image of a raw one into ``rectified``, an array of the same shape and type.
+        """Rectify the image ``raw`` into ``rectified``, an array of the same shape and type.
 
-        By OpenCV where it is installed, else by numpy with the same interpolation. Raise ValueError if the arrays do
-        not fit each other, or an uncalibrated camera has no size.
+        Use OpenCV if it is installed, else numpy with the same interpolation. Raise ValueError if the arrays do not match, or
+        an uncalibrated camera has no size.
         """
         self._check()
         rectified_image(raw, rectified, (self.K, self._distortion(), self.R, self.P), self.resolution)
 
     def rectifyPoint(self, uv_raw: Point) -> Array:
-        """Return the pixel of the rectified image, as an array (u, v), for one of the raw image."""
+        """Convert a pixel of the raw image to the rectified image; return an array (u, v)."""
         self._check()
         return undistorted(uv_raw, self.K, self._distortion(), self.R, self.P)
 
     def unrectifyPoint(self, uv_rect: Point) -> Array:
-        """Return the pixel of the raw image, as an array (u, v), for one of the rectified image, as the C++ class does."""
+        """Convert a pixel of the rectified image to the raw image, as the C++ class does; return an array (u, v)."""
         import numpy as np
 
         self._check()
@@ -103,7 +102,7 @@ class PinholeCameraModel:
         return np.array([raw_u[0], raw_v[0]])
 
     def project3dToPixel(self, point: Point) -> tuple[float, float]:
-        """Return the rectified pixel (u, v) of a point; (nan, nan) of one in the plane of the camera's center."""
+        """Return the rectified pixel (u, v) of a point; (nan, nan) if the point is in the plane of the camera's center."""
         u, v, w = (float(row) for row in self._checked_P() @ [point[0], point[1], point[2], 1.0])
         return (u / w, v / w) if w != 0 else (math.nan, math.nan)
 
@@ -115,32 +114,32 @@ class PinholeCameraModel:
         return _ratio(x, norm), _ratio(y, norm), 1.0 / norm
 
     def getDeltaU(self, deltaX: float, Z: float) -> float:
-        """Return how many pixels ``deltaX`` meters are at the distance ``Z``; inf at zero."""
+        """Return the size in pixels of ``deltaX`` meters at distance ``Z``; inf if ``Z`` is 0."""
         return self.fx() * deltaX / Z if Z else math.inf
 
     def getDeltaV(self, deltaY: float, Z: float) -> float:
-        """Return how many pixels ``deltaY`` meters are at the distance ``Z``; inf at zero."""
+        """Return the size in pixels of ``deltaY`` meters at distance ``Z``; inf if ``Z`` is 0."""
         return self.fy() * deltaY / Z if Z else math.inf
 
     def getDeltaX(self, deltaU: float, Z: float) -> float:
-        """Return how many meters ``deltaU`` pixels are at the distance ``Z``."""
+        """Return the size in meters of ``deltaU`` pixels at distance ``Z``."""
         return _ratio(Z * deltaU, self.fx())
 
     def getDeltaY(self, deltaV: float, Z: float) -> float:
-        """Return how many meters ``deltaV`` pixels are at the distance ``Z``."""
+        """Return the size in meters of ``deltaV`` pixels at distance ``Z``."""
         return _ratio(Z * deltaV, self.fy())
 
     def fullResolution(self) -> tuple[int, int]:
-        """Return (width, height) of the whole sensor in pixels."""
+        """Return (width, height) of the full sensor in pixels."""
         self._check()
         return self.resolution
 
     def intrinsicMatrix(self) -> Matrix:
-        """Return K, 3x3; None before ``fromCameraInfo``, as the following."""
+        """Return K, 3x3. This and the following matrices are None before ``fromCameraInfo``."""
         return self.K
 
     def distortionCoeffs(self) -> Matrix:
-        """Return D, a column; None without distortion."""
+        """Return D as a column; None if there is no distortion."""
         return self.D
 
     def rotationMatrix(self) -> Matrix:
@@ -152,35 +151,35 @@ class PinholeCameraModel:
         return self.P
 
     def fullIntrinsicMatrix(self) -> Matrix:
-        """Return K of the whole sensor."""
+        """Return K of the full sensor."""
         return self.full_K
 
     def fullProjectionMatrix(self) -> Matrix:
-        """Return P of the whole sensor."""
+        """Return P of the full sensor."""
         return self.full_P
 
     def cx(self) -> float:
-        """Return the principal point's u."""
+        """Return the u coordinate of the principal point."""
         return self._of_P(0, 2)
 
     def cy(self) -> float:
-        """Return the principal point's v."""
+        """Return the v coordinate of the principal point."""
         return self._of_P(1, 2)
 
     def fx(self) -> float:
-        """Return the focal length in pixels, horizontally."""
+        """Return the horizontal focal length in pixels."""
         return self._of_P(0, 0)
 
     def fy(self) -> float:
-        """Return the focal length in pixels, vertically."""
+        """Return the vertical focal length in pixels."""
         return self._of_P(1, 1)
 
     def Tx(self) -> float:
-        """Return P's translation in x: of a right camera, minus fx times the baseline."""
+        """Return the x translation in P; for the right camera of a pair it is -fx times the baseline."""
         return self._of_P(0, 3)
 
     def Ty(self) -> float:
-        """Return P's translation in y."""
+        """Return the y translation in P."""
         return self._of_P(1, 3)
 
     def fovX(self) -> float:
@@ -192,7 +191,7 @@ class PinholeCameraModel:
         return 2 * math.atan(_ratio(self.fullResolution()[1], 2 * self.fy()))
 
     def tfFrame(self) -> str | None:
-        """Return the camera's frame."""
+        """Return the camera's frame ID."""
         return self.tf_frame
 
     def _of_P(self, row: int, column: int) -> float:
@@ -213,7 +212,7 @@ class PinholeCameraModel:
 
 
 class StereoCameraModel:
-    """Two rectified cameras, of which the right one has the baseline in its P."""
+    """A pair of rectified cameras; the baseline is in the right camera's P."""
 
     def __init__(self) -> None:
         self.left = PinholeCameraModel()
@@ -234,7 +233,7 @@ class StereoCameraModel:
         self.Q[3, 2] = _ratio(1.0, baseline)
 
     def tfFrame(self) -> str | None:
-        """Return the frame of the points, which is that of the left camera."""
+        """Return the frame ID of the points, which is that of the left camera."""
         return self.left.tfFrame()
 
     def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -242,17 +241,17 @@ class StereoCameraModel:
         return self.left.project3dToPixel(point), self.right.project3dToPixel(point)
 
     def projectPixelTo3d(self, left_uv: Point, disparity: float) -> tuple[float, float, float]:
-        """Return the point of a rectified pixel of the left image; (0, 0, 0) where it is infinitely far away."""
+        """Return the point at a rectified pixel of the left image; (0, 0, 0) if it is infinitely far away."""
         self._check()
         x, y, z, w = (float(row) for row in self.Q @ [left_uv[0], left_uv[1], disparity, 1.0])
         return (x / w, y / w, z / w) if w != 0 else (0.0, 0.0, 0.0)
 
     def getZ(self, disparity: float) -> float:
-        """Return the distance in meters of a disparity in pixels; inf for zero."""
+        """Return the distance in meters for a disparity in pixels; inf for 0."""
         return -self.right.Tx() / disparity if disparity else math.inf
 
     def getDisparity(self, Z: float) -> float:
-        """Return the disparity in pixels of a distance in meters; inf for zero."""
+        """Return the disparity in pixels for a distance in meters; inf for 0."""
         return -self.right.Tx() / Z if Z else math.inf
 
     def _check(self) -> None:
@@ -261,7 +260,7 @@ class StereoCameraModel:
 
 
 def _ratio(above: float, below: float) -> float:
-    """Return a quotient; by zero inf or nan, as numpy divides, but without its warning."""
+    """Return a quotient; for a division by zero return inf or nan, as numpy does, without its warning."""
     if below:
         return above / below
     if above == 0 or math.isnan(above):

@@ -1,4 +1,4 @@
-"""Lens distortion: of a point, and of each pixel of an image. By numpy, with OpenCV's model and results. Pure.
+"""Lens distortion of single points and of whole images, in numpy, with OpenCV's model and results. Pure.
 
 Source: https://docs.opencv.org (calib3d: undistortPoints, initUndistortRectifyMap; imgproc: remap with INTER_CUBIC).
 """
@@ -14,26 +14,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Values: TypeAlias = NDArray[Any]
+    # K1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or empty.
     Distortion: TypeAlias = Sequence[float] | Values
-    """k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or nothing."""
-    Calibration: TypeAlias = tuple[Values, Distortion, Values, Values]
-    """K, D, R and P."""
+    Calibration: TypeAlias = tuple[Values, Distortion, Values, Values]  # K, D, R and P
 else:
     Distortion = "Distortion"
 
 __all__ = ["Distortion", "distorted", "rectified_image", "undistorted"]
 
-_ITERATIONS = 5
-"""The number of times that OpenCV improves the point that it looks for."""
-_STEPS = 32
-"""Into how many parts OpenCV divides a pixel to interpolate."""
-_ONE = 1 << 15
-"""The sum of the weights of a pixel's neighbors, where they are integers."""
+_ITERATIONS = 5  # iterations of OpenCV's undistortPoints
+_STEPS = 32  # subpixel positions per pixel in OpenCV's interpolation
+_ONE = 1 << 15  # sum of the integer weights of a pixel's neighbors
 _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return the rectified pixel of a raw one. Raise ValueError if D has another number of coefficients."""
+    """Return the rectified pixel for a raw one. Raise ValueError if the number of coefficients in D is not supported."""
     import numpy as np
 
     k = _coefficients(D)
@@ -63,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels of rectified ones, all u and all v. Raise ValueError if D has another length."""
+    """Return the raw pixels for rectified ones: all u and all v. Raise ValueError if the length of D is not supported."""
     import numpy as np
 
     k = _coefficients(D)
@@ -92,7 +88,7 @@ def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Valu
 def rectified_image(
     raw: Values, target: Values, calibration: Calibration, resolution: tuple[int, int]
 ) -> None:
-    """Write the rectified image into ``target``. Raise ValueError (a size of zero, arrays that do not fit)."""
+    """Write the rectified image into ``target``. Raise ValueError if a size is zero or the arrays do not match."""
     import numpy as np
 
     width, height = resolution
@@ -121,7 +117,7 @@ def _coefficients(D: Distortion) -> list[float]:
 
 
 def _tilt(tau_x: float, tau_y: float) -> Values:
-    """Return the matrix of a sensor that is tilted towards the lens."""
+    """Return the matrix for a sensor that is tilted relative to the lens."""
     import numpy as np
 
     cx, sx, cy, sy = math.cos(tau_x), math.sin(tau_x), math.cos(tau_y), math.sin(tau_y)
@@ -134,7 +130,7 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return the image with each pixel taken from a place of another, by bicubic interpolation; black outside."""
+    """Return an image whose pixels are read from ``raw`` at the map's positions, with bicubic interpolation; black outside."""
     import numpy as np
 
     if raw.dtype not in (np.uint8, np.uint16, np.int16, np.float32, np.float64):
@@ -168,7 +164,7 @@ def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
 
 
 def _weights() -> Values:
-    """Return the weights of the 4x4 neighbors: of shape (parts of v, parts of u, 4, 4)."""
+    """Return the weights of the 4x4 neighbors, with shape (_STEPS of v, _STEPS of u, 4, 4)."""
     import numpy as np
 
     a, x = np.float32(-0.75), (np.arange(_STEPS) / np.float32(_STEPS)).astype(np.float32)
@@ -182,11 +178,11 @@ def _weights() -> Values:
 
 @functools.cache
 def _fixed_weights() -> Values:
-    """Return the weights as integers whose sum is ``_ONE``, rounded as OpenCV rounds them."""
+    """Return the weights as integers with sum ``_ONE``, rounded as in OpenCV."""
     import numpy as np
 
     table: Values = np.rint(_weights() * np.float32(_ONE)).astype(np.int32)
-    # OpenCV corrects what rounding leaves at the largest or the smallest of these four.
+    # OpenCV adds the rounding error to the largest or the smallest of these four weights.
     corner = table[:, :, 2:, 2:].reshape(_STEPS, _STEPS, 4)
     excess = table.sum(axis=(2, 3)) - _ONE
     places = np.where(excess < 0, corner.argmax(axis=2), corner.argmin(axis=2))

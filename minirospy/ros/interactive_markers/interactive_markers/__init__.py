@@ -1,1 +1,1 @@
-"""interactive_markers: markers that are moved and clicked in a viewer. Source: http://wiki.ros.org/interactive_markers."""
+"""interactive_markers: markers that the user moves and clicks in a viewer. Source: http://wiki.ros.org/interactive_markers."""

@@ -1,4 +1,4 @@
-"""The server of interactive markers: what a program inserts, moves and erases, and what viewers report.
+"""The server of interactive markers: publishes a program's changes to them, and receives feedback from viewers.
 
 Topics: NS/update, NS/update_full (latched, all markers), NS/feedback.
 Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Basic%20Controls.
@@ -27,15 +27,13 @@ __all__ = ["InteractiveMarkerServer", "MarkerContext", "UpdateContext"]
 Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
-_KEEP_ALIVE = 0.5
-"""Seconds between two updates, so that viewers know that the server is there."""
-_TURN = 1.0
-"""Seconds for which a marker belongs to the viewer that moved it last."""
+_KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
+_TURN = 1.0  # seconds for which feedback from viewers other than the last one is ignored
 _UNCHANGED: Callback | int = -1
 
 
 class MarkerContext:
-    """A marker that viewers know."""
+    """A published marker."""
 
     def __init__(self) -> None:
         self.last_feedback = rospy.Time.now()
@@ -47,7 +45,7 @@ class MarkerContext:
 
 @dataclass
 class UpdateContext:
-    """A change of a marker that is not published yet."""
+    """A pending change of a marker."""
 
     FULL_UPDATE = 0
     POSE_UPDATE = 1
@@ -60,12 +58,12 @@ class UpdateContext:
 
 
 class InteractiveMarkerServer:
-    """Markers of one namespace. What changes them is published by ``applyChanges``."""
+    """The markers of one namespace. Changes are published by ``applyChanges``."""
 
     DEFAULT_FEEDBACK_CB = 255
 
     def __init__(self, topic_ns: str, server_id: str = "", q_size: int = 100) -> None:
-        """``server_id``: to be given where a node has several servers; ``q_size``: of the feedback's queue."""
+        """``server_id``: required if a node has several servers; ``q_size``: the feedback queue's size."""
         self.topic_ns = topic_ns
         self.seq_num = 0
         self.mutex = Lock()
@@ -85,7 +83,7 @@ class InteractiveMarkerServer:
         self._timer = rospy.Timer(rospy.Duration(_KEEP_ALIVE), self.keepAlive, reset=True)
         self.publishInit()
 
-    # What a program calls.
+    # Public methods.
 
     def insert(
         self,
@@ -104,9 +102,9 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set what is called with feedback of a type, or with all feedback that has no function of its own.
+        """Set the callback for feedback of one type, or for all feedback whose type has no own callback.
 
-        None: nothing. Return whether there is such a marker. It takes effect immediately.
+        None removes the callback. Takes effect immediately. Return whether the marker exists.
         """
         with self.mutex:
             found = [
@@ -124,9 +122,9 @@ class InteractiveMarkerServer:
             return bool(found)
 
     def setPose(self, name: str, pose: Pose, header: Header = Header()) -> bool:  # noqa: B008 - it is only read
-        """Move a marker; a header without a frame keeps the marker's. Return whether viewers know such a marker.
+        """Move a marker; a header without a frame keeps the marker's header. Return whether the marker has been published.
 
-        As in ROS, one that is to be added or replaced by the next ``applyChanges`` is not moved.
+        As in ROS, a marker that the next ``applyChanges`` adds or replaces is not moved.
         """
         with self.mutex:
             context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
@@ -138,7 +136,7 @@ class InteractiveMarkerServer:
             return True
 
     def erase(self, name: str) -> bool:
-        """Erase a marker; return whether there is one."""
+        """Erase a marker; return whether it exists."""
         with self.mutex:
             if name not in self.pending_updates and name not in self.marker_contexts:
                 return False
@@ -146,12 +144,12 @@ class InteractiveMarkerServer:
             return True
 
     def clear(self) -> None:
-        """Erase all markers, and forget changes that are not published."""
+        """Erase all markers, and discard pending changes."""
         with self.mutex:
             self.pending_updates = {name: UpdateContext(UpdateContext.ERASE) for name in self.marker_contexts}
 
     def get(self, name: str) -> InteractiveMarker | None:
-        """Return a marker as it will be after the changes; None without it."""
+        """Return a marker with its pending changes; None if it does not exist."""
         context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
         if update is None:
             return context.int_marker if context else None
@@ -163,7 +161,7 @@ class InteractiveMarkerServer:
         return context.int_marker
 
     def applyChanges(self) -> None:
-        """Publish what has changed."""
+        """Publish the pending changes."""
         with self.mutex:
             if not self.pending_updates:
                 return
@@ -172,12 +170,12 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-            # Nothing with the new number comes before it.
+            # Still with the lock: no other message with the new sequence number may precede it.
             self.publish(message)
         self.publishInit()
 
     def _apply(self, name: str, update: UpdateContext, message: InteractiveMarkerUpdate) -> None:
-        """Change a marker, and add that to a message."""
+        """Apply a change to a marker, and add it to a message."""
         context = self.marker_contexts.get(name)
         if update.update_type == UpdateContext.FULL_UPDATE:
             if context is None:
@@ -187,7 +185,7 @@ class InteractiveMarkerServer:
             context.int_marker = update.int_marker
             message.markers.append(context.int_marker)
         elif context is None:
-            # A marker that was to be added and was erased before; viewers never knew it.
+            # The marker was added and erased between two applyChanges(): it was never published.
             return
         elif update.update_type == UpdateContext.POSE_UPDATE:
             marker = context.int_marker
@@ -199,12 +197,12 @@ class InteractiveMarkerServer:
             del self.marker_contexts[name]
             message.erases.append(name)
 
-    # What comes from viewers, and goes to them.
+    # Messages from and to viewers.
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Move a marker as a viewer says, and call the program's function.
+        """Move a marker as requested by a viewer, and call the program's callback.
 
-        For a second, another viewer's feedback for the marker is ignored.
+        For one second, feedback for the marker from other viewers is ignored.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)
@@ -212,7 +210,7 @@ class InteractiveMarkerServer:
                 return
             now = rospy.Time.now()
             age = (now - context.last_feedback).to_sec()
-            # Negative: the clock has jumped back.
+            # A negative age means that the clock has jumped back.
             if context.last_client_id != feedback.client_id and 0 <= age < _TURN:
                 rospy.logdebug(
                     f"Rejecting feedback for {feedback.marker_name}: conflicting feedback from separate clients."
@@ -221,7 +219,7 @@ class InteractiveMarkerServer:
             context.last_feedback, context.last_client_id = now, feedback.client_id
 
             if feedback.event_type == feedback.POSE_UPDATE:
-                # A marker without a stamp stays in its frame.
+                # A marker without a stamp keeps its frame.
                 header = context.int_marker.header
                 self.doSetPose(
                     self.pending_updates.get(feedback.marker_name),
@@ -239,13 +237,13 @@ class InteractiveMarkerServer:
             self.publish(InteractiveMarkerUpdate(type=InteractiveMarkerUpdate.KEEP_ALIVE))
 
     def publish(self, update: InteractiveMarkerUpdate) -> None:
-        """Publish an update with the server's name and the number of its last change; the caller holds the lock."""
+        """Publish an update with the server's ID and sequence number; the caller holds the lock."""
         update.server_id = self.server_id
         update.seq_num = self.seq_num
         self.update_pub.publish(update)
 
     def publishInit(self) -> None:
-        """Publish all markers, for viewers that come later."""
+        """Publish all markers, latched for viewers that connect later."""
         with self.mutex:
             markers = [context.int_marker for context in self.marker_contexts.values()]
             self.init_pub.publish(
@@ -253,7 +251,7 @@ class InteractiveMarkerServer:
             )
 
     def doSetPose(self, update: UpdateContext | None, name: str, pose: Pose, header: Header) -> None:
-        """Move a marker with the next changes; the lock is held by the caller."""
+        """Add a move to the pending changes; the caller holds the lock."""
         if update is None:
             update = self.pending_updates[name] = UpdateContext(UpdateContext.POSE_UPDATE)
         elif update.update_type != UpdateContext.FULL_UPDATE:

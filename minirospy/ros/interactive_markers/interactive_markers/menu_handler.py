@@ -1,4 +1,4 @@
-"""Menus of interactive markers: entries, checkboxes, and what is called when one is selected."""
+"""Menus of interactive markers: entries, checkboxes, and callbacks for selected entries."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class EntryContext:
 
 
 class MenuHandler:
-    """A menu, which ``apply`` gives to markers. Entries are numbered from 1: their handles."""
+    """A menu, which ``apply`` attaches to markers. Entries are identified by handles, numbered from 1."""
 
     NO_CHECKBOX = 0
     CHECKED = 1
@@ -51,7 +51,7 @@ class MenuHandler:
         command: str = "",
         callback: Callback | None = None,
     ) -> int | None:
-        """Add an entry, below ``parent`` where that is given; return its handle, None if there is no such parent."""
+        """Add an entry, below ``parent`` if given; return its handle, or None if the parent does not exist."""
         handle = self.doInsert(title, command_type, command, callback)
         if parent is None:
             self.top_level_handles_.append(handle)
@@ -63,38 +63,38 @@ class MenuHandler:
         return handle
 
     def doInsert(self, title: str, command_type: int, command: str, feedback_cb: Callback | None) -> int:
-        """Make an entry that is in no menu yet; return its handle."""
+        """Create an entry that is not in a menu yet; return its handle."""
         handle = self.current_handle_
         self.current_handle_ += 1
         self.entry_contexts_[handle] = EntryContext(title, command, command_type, feedback_cb=feedback_cb)
         return handle
 
     def setVisible(self, handle: int, visible: bool) -> bool:
-        """Show or hide an entry; return whether there is one."""
+        """Show or hide an entry; return whether it exists."""
         if handle not in self.entry_contexts_:
             return False
         self.entry_contexts_[handle].visible = visible
         return True
 
     def setCheckState(self, handle: int, check_state: int) -> bool:
-        """Set one of NO_CHECKBOX, CHECKED, UNCHECKED; return whether there is such an entry."""
+        """Set the check state to NO_CHECKBOX, CHECKED or UNCHECKED; return whether the entry exists."""
         if handle not in self.entry_contexts_:
             return False
         self.entry_contexts_[handle].check_state = check_state
         return True
 
     def getCheckState(self, handle: int) -> int | None:
-        """Return one of NO_CHECKBOX, CHECKED, UNCHECKED; None without such an entry."""
+        """Return NO_CHECKBOX, CHECKED or UNCHECKED; None if the entry does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.check_state if context else None
 
     def getTitle(self, handle: int) -> str | None:
-        """Return the title of an entry; None without such an entry."""
+        """Return the title of an entry; None if it does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.title if context else None
 
     def apply(self, server: InteractiveMarkerServer, marker_name: str) -> bool:
-        """Give a marker the menu as it is now, when the server's changes are applied; return whether there is a marker."""
+        """Attach the menu in its current state to a marker, effective at ``applyChanges``; return whether the marker exists."""
         marker = server.get(marker_name)
         if not marker:
             self.managed_markers_.discard(marker_name)
@@ -106,13 +106,13 @@ class MenuHandler:
         return True
 
     def reApply(self, server: InteractiveMarkerServer) -> bool:
-        """Apply to all markers that it was applied to; return whether they are all there."""
-        # Each of them, also after one that is not there.
+        """Apply the menu again to all markers that have it; return whether they all still exist."""
+        # A list, not a generator: continue after a missing marker.
         found = [self.apply(server, marker) for marker in list(self.managed_markers_)]
         return all(found)
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Call the function of the entry that was selected."""
+        """Call the callback of the selected entry."""
         context = self.entry_contexts_.get(feedback.menu_entry_id)
         if context is not None and context.feedback_cb is not None:
             context.feedback_cb(feedback)
@@ -120,7 +120,7 @@ class MenuHandler:
     def pushMenuEntries(
         self, handles_in: Iterable[int], entries_out: list[MenuEntry], parent_handle: int
     ) -> bool:
-        """Append the messages of entries and of those below them; return whether they are all there."""
+        """Append the messages of entries and of their submenus; return whether all of them exist."""
         for handle in handles_in:
             context = self.entry_contexts_.get(handle)
             if context is None:
@@ -133,7 +133,7 @@ class MenuHandler:
         return True
 
     def makeEntry(self, context: EntryContext, handle: int, parent_handle: int) -> MenuEntry:
-        """Return the message of an entry; checkboxes are part of its title."""
+        """Return the message of an entry; its title includes the checkbox."""
         box = {self.CHECKED: "[x] ", self.UNCHECKED: "[ ] "}.get(context.check_state, "")
         return MenuEntry(
             id=handle,

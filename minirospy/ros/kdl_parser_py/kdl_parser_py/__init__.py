@@ -1,1 +1,1 @@
-"""kdl_parser_py: a robot description as a tree of segments. Source: http://wiki.ros.org/kdl_parser_py."""
+"""kdl_parser_py: converts a robot description to a tree of segments. Source: http://wiki.ros.org/kdl_parser_py."""

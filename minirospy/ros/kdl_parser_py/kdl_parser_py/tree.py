@@ -1,4 +1,4 @@
-"""The tree of a robot under PyKDL's names, as far as a tree goes: segments, joints, chains, poses. Without solvers.
+"""A robot's tree with PyKDL's names: segments, joints, chains and poses, but no solvers.
 
 Source: https://www.orocos.org/kdl, http://wiki.ros.org/kdl_parser.
 """
@@ -32,12 +32,12 @@ class Joint:
         return self._joint.name
 
     def getTypeName(self) -> str:
-        """Return RotAxis, TransAxis or None, KDL's name of what does not move."""
+        """Return RotAxis, TransAxis, or None, which is KDL's name for a fixed joint."""
         return _TYPE_NAMES.get(self._joint.type, "None")
 
 
 class Segment:
-    """A joint and the link below it."""
+    """A joint and its child link."""
 
     def __init__(self, joint: UrdfJoint) -> None:
         self._segment = JointSegment(joint)
@@ -45,12 +45,12 @@ class Segment:
 
     @property
     def is_moving(self) -> bool:
-        """Return whether its joint has a position."""
+        """Return whether the joint is movable."""
         return self._segment.is_moving
 
     @property
     def parent(self) -> str:
-        """The link above."""
+        """The parent link's name."""
         return self._segment.joint.parent
 
     def getName(self) -> str:
@@ -62,12 +62,12 @@ class Segment:
         return self._joint
 
     def pose(self, q: float) -> Pose:
-        """Return the link's pose in the link above: translation, and rotation as (x, y, z, w)."""
+        """Return the link's pose in its parent link: translation, and rotation as (x, y, z, w)."""
         return self._segment.pose(q)
 
 
 class Chain:
-    """Segments one below the other."""
+    """Segments from a link down to one of its descendants."""
 
     def __init__(self, segments: list[Segment]) -> None:
         self._segments = segments
@@ -77,11 +77,11 @@ class Chain:
         return len(self._segments)
 
     def getNrOfJoints(self) -> int:
-        """Return the number of joints that move."""
+        """Return the number of movable joints."""
         return sum(segment.is_moving for segment in self._segments)
 
     def getSegment(self, nr: int) -> Segment:
-        """Return a segment, the uppermost is 0."""
+        """Return a segment; number 0 is the topmost."""
         return self._segments[nr]
 
 
@@ -93,7 +93,7 @@ class Tree:
         self._segments: dict[str, Segment] = {}
 
     def addSegment(self, segment: Segment, hook_name: str) -> bool:
-        """Add a segment below a link; return False if that is not there, or the segment is there already."""
+        """Add a segment below a link; return False if the link does not exist, or the segment already does."""
         name = segment.getName()
         is_known = hook_name == self._root or hook_name in self._segments
         if not is_known or name in self._segments or name == self._root:
@@ -102,15 +102,15 @@ class Tree:
         return True
 
     def getNrOfSegments(self) -> int:
-        """Return the number of segments, the root not counted."""
+        """Return the number of segments, without the root."""
         return len(self._segments)
 
     def getNrOfJoints(self) -> int:
-        """Return the number of joints that move."""
+        """Return the number of movable joints."""
         return sum(segment.is_moving for segment in self._segments.values())
 
     def getChain(self, chain_root: str, chain_tip: str) -> Chain:
-        """Return the segments from a link down to one below it. Raise ValueError if it is not below."""
+        """Return the segments from a link down to a descendant. Raise ValueError if it is not a descendant."""
         found: list[Segment] = []
         link = chain_tip
         while link != chain_root:
@@ -123,7 +123,7 @@ class Tree:
 
 
 def tree_of(robot: Robot) -> Tree:
-    """Return the tree of a robot, each link after the one above it."""
+    """Return the tree of a robot, adding each link after its parent."""
     tree = Tree(robot.root)
     for joint in _downwards(robot):
         tree.addSegment(Segment(joint), joint.parent)

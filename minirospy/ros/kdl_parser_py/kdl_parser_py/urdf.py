@@ -1,4 +1,4 @@
-"""The functions of kdl_parser_py.urdf: each returns (whether it went well, the tree). Source: http://wiki.ros.org/kdl_parser_py."""
+"""The functions of kdl_parser_py.urdf: each returns (success, tree). Source: http://wiki.ros.org/kdl_parser_py."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ __all__ = ["treeFromFile", "treeFromParam", "treeFromString", "treeFromUrdfModel
 
 
 class Writable(Protocol):
-    """A robot that can be written, such as urdf_parser_py's."""
+    """A robot model that can be serialized, such as urdf_parser_py's."""
 
     def to_xml_string(self) -> str:
-        """Return the description."""
+        """Return the description as XML."""
 
 
 def treeFromFile(filename: str) -> tuple[bool, Tree]:
-    """Return the tree of a file. Raise UrdfError, OSError."""
+    """Return the tree of a description file. Raise UrdfError, OSError."""
     return True, tree_of(read_robot(filename))
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Return the tree of a parameter. Raise KeyError if it is not set, UrdfError."""
+    """Return the tree of a description in a parameter. Raise KeyError if it is not set, UrdfError."""
     from minirospy import client as rospy
 
     return True, tree_of(parse_robot(rospy.get_param(param), param))
@@ -35,7 +35,7 @@ def treeFromString(xml: str | bytes) -> tuple[bool, Tree]:
 
 
 def treeFromUrdfModel(robot_model: Writable, quiet: bool = False) -> tuple[bool, Tree]:
-    """Return the tree of urdf_parser_py's robot; a root with an inertia is warned of unless ``quiet``. Raise UrdfError."""
+    """Return the tree of urdf_parser_py's robot; warn if the root has an inertia, unless ``quiet``. Raise UrdfError."""
     robot = parse_robot(robot_model.to_xml_string())
     if robot.links[robot.root].inertial and not quiet:
         print(

@@ -1,4 +1,4 @@
-"""laser_geometry: clouds of points from laser scans. Source: http://wiki.ros.org/laser_geometry."""
+"""laser_geometry: converts laser scans to point clouds. Source: http://wiki.ros.org/laser_geometry."""
 
 from minirospy.ros.laser_geometry.laser_geometry.laser_geometry import LaserProjection
 

@@ -1,4 +1,4 @@
-"""laser_geometry.laser_geometry: LaserProjection. By numpy, with the bytes of ROS's Python module.
+"""laser_geometry.laser_geometry: LaserProjection, in numpy; its clouds are byte-identical to those of ROS's Python module.
 
 Source: http://wiki.ros.org/laser_geometry.
 """
@@ -26,19 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["LaserProjection", "PointCloud2"]
 
 _VIEWPOINT = ("vp_x", "vp_y", "vp_z")
-_INT32, _FLOAT32 = 5, 7
-"""PointField's numbers of the types."""
+_INT32, _FLOAT32 = 5, 7  # type numbers of PointField
 
 
 class LaserProjection:
-    """Makes clouds of scans; keeps the directions of the beams from one scan to the next."""
+    """Converts scans to clouds; caches the directions of the beams between scans."""
 
     LASER_SCAN_INVALID = -1.0
     LASER_SCAN_MIN_RANGE = -2.0
     LASER_SCAN_MAX_RANGE = -3.0
 
     class ChannelOption:
-        """The fields that a cloud has besides x, y and z, as bits."""
+        """The fields of a cloud in addition to x, y and z, as bits."""
 
         NONE = 0x00
         INTENSITY = 0x01
@@ -58,10 +57,10 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return the cloud of a scan, in the scan's frame; ranges outside of the scan's limits are left out.
+        """Return the cloud of a scan, in the scan's frame; ranges outside the scan's limits are omitted.
 
-        ``range_cutoff``: meters from which on points are left out, too; negative for the scan's own limit.
-        ``channel_options``: the fields, of ``ChannelOption``; ``INTENSITY`` only if the scan has any.
+        ``range_cutoff``: omit ranges from this distance in meters; if negative, only the scan's limit applies.
+        ``channel_options``: the fields, from ``ChannelOption``; ``INTENSITY`` is ignored if the scan has no intensities.
         Raise IndexError if the scan has fewer intensities than ranges.
         """
         import numpy as np
@@ -103,10 +102,11 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return the cloud of a scan in another frame, each point by where the laser was when it was measured.
+        """Return the cloud of a scan in another frame, each point transformed with the laser's pose at its measurement.
 
-        The transforms of the scan's first and last beam are looked up in a tf2 buffer, and interpolated between, as the
-        C++ class does; ROS's Python module lacks this method. Raise what ``lookup_transform`` raises.
+        The transforms at the first and last beam are looked up in a tf2 buffer, and interpolated in between, as in the
+        C++ class;
+        ROS's Python module lacks this method. Raise the exceptions of ``lookup_transform``.
         """
         import numpy as np
 
@@ -141,7 +141,7 @@ class LaserProjection:
         return transformed
 
     def _directions_of(self, scan: LaserScan, count: int) -> Values:
-        """Return the cosines and sines of the beams' angles: of shape (2, beams)."""
+        """Return the cosines and sines of the beams' angles, with shape (2, beams)."""
         import numpy as np
 
         beams = scan.angle_min, scan.angle_increment, count
@@ -152,7 +152,7 @@ class LaserProjection:
 
 
 def _cloud(scan: LaserScan, columns: Sequence[tuple[str, int, Values | int]], count: int) -> PointCloud2:
-    """Return a cloud of these fields: (name, type, values)."""
+    """Return a cloud with these fields, given as (name, type, values)."""
     import numpy as np
 
     fields = [PointField(name, 4 * at, datatype, 1) for at, (name, datatype, _) in enumerate(columns)]
@@ -178,7 +178,7 @@ def _later(stamp: genpy.Time, seconds: float) -> genpy.Time:
 
 
 def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Values) -> Values:
-    """Return the rotations between two, along the shorter arc: of shape (4, ratios), x y z w."""
+    """Interpolate between two rotations, along the shorter arc; return x y z w with shape (4, ratios)."""
     import numpy as np
 
     start, end = (
@@ -198,7 +198,7 @@ def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Value
 
 
 def _rotated(points: Values, rotations: Values) -> Values:
-    """Return the points, each turned by its rotation: of shape (3, points)."""
+    """Return the points, each rotated by its rotation, with shape (3, points)."""
     import numpy as np
 
     vectors = np.array([points[axis] for axis in "xyz"], np.float64)

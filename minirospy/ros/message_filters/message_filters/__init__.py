@@ -1,6 +1,6 @@
-"""message_filters: messages of several topics that belong together by their stamps.
+"""message_filters: combine messages of several topics by their stamps.
 
-A filter calls its callbacks with each message, or set of messages, that passes; filters are connected one after the other.
+A filter calls its callbacks with each message, or set of messages, that passes; filters can be chained.
 Source: http://wiki.ros.org/message_filters.
 """
 
@@ -30,32 +30,32 @@ _NO_HEADER = (
 
 
 class Input(Protocol):
-    """An object that a filter can be connected to."""
+    """An object to which a filter can be connected."""
 
     def registerCallback(self, cb: Callback, *args: object) -> object:
-        """Call ``cb`` with each message, and ``args`` after it."""
+        """Register ``cb`` to be called with each message, followed by ``args``."""
 
 
 class SimpleFilter:
-    """A filter: holds callbacks, and calls them with what passes."""
+    """The base class of filters: stores callbacks, and calls them with the messages that pass."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callback, tuple[object, ...]]] = {}
 
     def registerCallback(self, cb: Callback, *args: object) -> int:
-        """Call ``cb`` with what passes, and ``args`` after it; return the callback's number."""
+        """Register ``cb`` to be called with each message or set that passes, followed by ``args``; return the callback's ID."""
         conn = len(self.callbacks)
         self.callbacks[conn] = (cb, args)
         return conn
 
     def signalMessage(self, *msg: object) -> None:
-        """Call every callback with a message, or a set of messages."""
+        """Call every callback with a message or a set of messages."""
         for cb, args in tuple(self.callbacks.values()):
             cb(*msg, *args)
 
 
 class Subscriber(SimpleFilter):
-    """The messages of a topic; the arguments, and every other attribute, are those of rospy.Subscriber."""
+    """Passes on the messages of a topic; arguments and all other attributes are those of rospy.Subscriber."""
 
     def __init__(self, *args: object, **kwargs: object) -> None:
         super().__init__()
@@ -68,21 +68,21 @@ class Subscriber(SimpleFilter):
         self.signalMessage(msg)
 
     def getTopic(self) -> object:
-        """Return the topic's name as it was given."""
+        """Return the topic's name as given to the constructor."""
         return self.topic
 
     def __getattr__(self, key: str) -> object:
-        # Copies of an object start without attributes.
+        # A copied object has no attributes at first: avoid an infinite recursion.
         if key == "sub":
             raise AttributeError(key)
         return getattr(self.sub, key)
 
 
 class Cache(SimpleFilter):
-    """The newest ``cache_size`` messages of a filter, which can be looked up by their times; passes each message on."""
+    """Stores the last ``cache_size`` messages of a filter for look-up by time, and passes each message on."""
 
     def __init__(self, f: Input, cache_size: int = 1, allow_headerless: bool = False) -> None:
-        """``allow_headerless``: a message without a header counts as stamped when it arrives, instead of a warning."""
+        """``allow_headerless``: stamp a message without a header with its arrival time, instead of warning and dropping it."""
         super().__init__()
         self.cache_size = cache_size
         self.cache_msgs: list[object] = []
@@ -92,7 +92,7 @@ class Cache(SimpleFilter):
         self.connectInput(f)
 
     def connectInput(self, f: Input) -> None:
-        """Take the messages of a filter."""
+        """Connect a filter as the input."""
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: object) -> None:
@@ -111,34 +111,34 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[object]:
-        """Return the messages of a span of time, both ends included. Raise AssertionError if it is turned round."""
+        """Return the messages from one stamp to another, inclusive. Raise AssertionError if the interval is reversed."""
         assert from_stamp <= to_stamp
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> object | None:
-        """Return the first stored message that is not older than ``stamp``; None without one."""
+        """Return the first stored message that is not older than ``stamp``, or None."""
         return next((msg for time, msg in self._stored() if time >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Time) -> object | None:
-        """Return the last stored message that is not newer than ``stamp``; None without one."""
+        """Return the last stored message that is not newer than ``stamp``, or None."""
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
-        """Return the stamp of the message that was stored last; None without one."""
+        """Return the stamp of the message that was stored last, or None."""
         stored = self._stored()
         return stored[-1][0] if stored else None
 
     def getLastestTime(self) -> Time | None:
-        """Return the same as ``getLatestTime``; the name that it had first."""
+        """Return ``getLatestTime()``; this is its old, misspelt name."""
         return self.getLatestTime()
 
     def getOldestTime(self) -> Time | None:
-        """Return the stamp of the message that was stored first; None without one."""
+        """Return the stamp of the message that was stored first, or None."""
         stored = self._stored()
         return stored[0][0] if stored else None
 
     def getLast(self) -> object | None:
-        """Return the first stored message that is not older than the last; None without one."""
+        """Return the first stored message that is not older than the one stored last, or None."""
         latest = self.getLatestTime()
         return None if latest is None else self.getElemAfterTime(latest)
 
@@ -148,25 +148,25 @@ class Cache(SimpleFilter):
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Sets of messages, one of each input, with the same stamp.
+    """Passes on sets of messages with the same stamp, one from each input.
 
-    A callback gets as many messages as there are inputs. One callback runs at a time.
+    A callback's arguments are one message per input. Callbacks do not run concurrently.
     """
 
     def __init__(self, fs: Iterable[Input], queue_size: int, reset: bool = False) -> None:
-        """``queue_size``: how many messages of an input wait for the others.
+        """``queue_size``: the number of messages per input that wait for the other inputs.
 
-        ``reset``: where simulated time jumps back, forget what an input has delivered.
+        ``reset``: if simulated time jumps back, discard the input's queued messages.
         """
         super().__init__()
         self.queue_size = queue_size
-        # One that its own thread may take again: a callback may publish to an input of the same process.
+        # A reentrant lock: a callback may publish to an input in the same process.
         self.lock = threading.RLock()
         self.enable_reset = reset
         self.connectInput(fs)
 
     def connectInput(self, fs: Iterable[Input]) -> None:
-        """Take the messages of these filters."""
+        """Connect these filters as the inputs."""
         inputs = list(fs)
         self._stamp_queues = [StampQueue() for _ in inputs]
         self._orders = [queue.order for queue in self._stamp_queues]
@@ -178,9 +178,9 @@ class TimeSynchronizer(SimpleFilter):
         ]
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message of an input; pass on each set that is complete.
+        """Store a message from an input; pass on each complete set.
 
-        Raise AttributeError if it has no header.
+        Raise AttributeError if the message has no header.
         """
         stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         with self.lock:
@@ -191,12 +191,12 @@ class TimeSynchronizer(SimpleFilter):
                 return
 
             for each in sorted(set(self.queues[0]).intersection(*self.queues[1:]) if self.queues else ()):
-                # A callback may have added messages to the queues, and so completed this set.
+                # A callback may have added messages to the queues and thereby already completed this set.
                 if all(each in queue for queue in self.queues):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
     def _reset_if_time_jumped(self, my_queue: Queue, my_queue_index: int | None) -> bool:
-        """Clear an input's queue where simulated time jumped back; return whether another input has a later time."""
+        """Clear an input's queue if simulated time has jumped back; return whether another input has a later time."""
         if not self.enable_reset or is_wallclock():
             return False
         now = rospy.Time.now()
@@ -209,10 +209,10 @@ class TimeSynchronizer(SimpleFilter):
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """Sets of messages, one of each input, with stamps that are less than ``slop`` seconds apart.
+    """Passes on sets of messages, one from each input, whose stamps differ by less than ``slop`` seconds.
 
-    A new message is matched with the closest ones of the other inputs: of the sets that are possible, the first in the order
-    in which ROS tries them.
+    A new message is matched with the closest messages of the other inputs: of all possible sets, the first in the order in
+    which ROS tries them.
     """
 
     def __init__(
@@ -223,14 +223,14 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         allow_headerless: bool = False,
         reset: bool = False,
     ) -> None:
-        """``slop``: in seconds. ``allow_headerless``: a message without a header counts as stamped when it arrives."""
+        """``slop``: in seconds. ``allow_headerless``: stamp a message without a header with its arrival time."""
         self.slop: Duration = rospy.Duration.from_sec(slop)
         self.allow_headerless = allow_headerless
         self._last_added = 0
         super().__init__(fs, queue_size, reset)
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message of an input; pass on the set that it completes."""
+        """Store a message from an input; pass on the set that it completes."""
         try:
             stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         except AttributeError:
@@ -257,12 +257,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
                 if my_queue_index is not None and stamp not in my_queue:
-                    # It was older than all that the queue keeps.
+                    # The new message was removed again, because it is older than all others in the queue.
                     return
             if is_stale:
                 return
 
-            # Most messages come while another input has none: no search for them.
+            # Skip the search if an input has no messages, which is the most frequent case.
             if self.queues is self._stamp_queues and not all(self._orders):
                 return
             found = self._match(my_queue_index, nanoseconds)
@@ -271,12 +271,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     @property
     def last_added(self) -> Time:
-        """When a message arrived last."""
+        """The time at which the last message arrived."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
-        """Take the set that a stamp completes out of the queues; return its messages, none without such a set."""
-        # A class that is derived from this one may have made its own list, of dicts.
+        """Remove the set that a stamp completes from the queues, and return its messages; [] if there is no such set."""
+        # A subclass may have created its own list ``queues``, of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]
@@ -292,7 +292,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
 
 def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
-    """Return a message's stamp; of one without, the time now, or None and a warning."""
+    """Return a message's stamp. Without a header return the current time, or None with a warning."""
     try:
         stamp: Time = message.header.stamp  # type: ignore[attr-defined]
     except AttributeError:
@@ -312,7 +312,7 @@ def _now() -> int:
 
 
 def _keep_newest(queue: Queue, size: int) -> None:
-    """Remove the oldest messages of a queue, so that at most ``size`` are left."""
+    """Remove the oldest messages of a queue until at most ``size`` are left."""
     if isinstance(queue, StampQueue):
         queue.keep_newest(size)
     else:

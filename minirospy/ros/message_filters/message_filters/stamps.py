@@ -1,4 +1,4 @@
-"""Queues of messages by their stamps, and the search for a set of stamps that are close together. Pure."""
+"""Queues of messages by stamp, and the search for a set of stamps that are close together. Pure."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["StampQueue", "closest_stamps"]
 
 
 class StampQueue(MutableMapping[Time, object]):
-    """The messages of one input by their stamps: a dict of ROS's, which keeps its stamps sorted in addition."""
+    """The messages of one input by stamp: a dict as in ROS, which also has a sorted list of its stamps."""
 
     __slots__ = ("_entries", "order")
 
     def __init__(self, messages: Mapping[Time, object] | None = None) -> None:
-        """``messages``: what it holds from the start, in the order of their arrival."""
+        """``messages``: the initial contents, in order of arrival."""
         self.order: list[int] = []
-        """The stamps, in nanoseconds, ascending; the same list as long as the queue lives."""
+        """Stamps in nanoseconds, ascending; always the same list object."""
         self._entries: dict[int, tuple[Time, object]] = {}
         if messages:
             self.update(messages)
@@ -45,10 +45,10 @@ class StampQueue(MutableMapping[Time, object]):
         return repr(dict(self))
 
     def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
-        """Store a message by its stamp, given in nanoseconds, too."""
+        """Store a message by its stamp, which is given in both forms."""
         entries, order = self._entries, self.order
         if nanoseconds in entries:
-            # As in a dict, the key that is there keeps its place and its identity.
+            # As in a dict, an existing key keeps its position and its identity.
             stamp = entries[nanoseconds][0]
         elif order and nanoseconds < order[-1]:
             insort(order, nanoseconds)
@@ -62,23 +62,23 @@ class StampQueue(MutableMapping[Time, object]):
         self._entries.clear()
 
     def take(self, nanoseconds: int) -> object:
-        """Remove a message by its stamp in nanoseconds, and return it. Raise KeyError."""
+        """Remove the message with this stamp in nanoseconds, and return it. Raise KeyError."""
         message = self._entries.pop(nanoseconds)[1]
         order = self.order
         del order[bisect_left(order, nanoseconds) if nanoseconds > order[0] else 0]
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
-        """Return the stamp as it was given. Raise KeyError."""
+        """Return the stamp object that was stored. Raise KeyError."""
         return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
-        """Remove the oldest messages, so that at most ``size`` are left."""
+        """Remove the oldest messages until at most ``size`` are left."""
         while len(self.order) > size:
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stamp that is closest to another one; of two, that which arrived first. Raise IndexError if empty."""
+        """Return the stored stamp closest to ``stamp``; of two, the one that arrived first. Raise IndexError if empty."""
         order = self.order
         if order[-1] <= stamp:
             return order[-1]
@@ -95,7 +95,7 @@ class StampQueue(MutableMapping[Time, object]):
         return self.order[bisect_left(self.order, first) : bisect_right(self.order, last)]
 
     def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
-        """Return some of its stamps, the closest to ``stamp`` first; equally close ones in the order of their arrival."""
+        """Sort some of the queue's stamps by distance to ``stamp``; at equal distance, by order of arrival."""
         ranks = {each: rank for rank, each in enumerate(self._entries)}
         return sorted(stamps, key=lambda each: (abs(each - stamp), ranks[each]))
 
@@ -103,13 +103,13 @@ class StampQueue(MutableMapping[Time, object]):
 def closest_stamps(
     queues: Sequence[StampQueue], stamp: int, slop: int, index: int | None = None
 ) -> list[int] | None:
-    """Return one stamp of each queue so that all of them are less than ``slop`` apart; None without such a set.
+    """Return one stamp from each queue so that all differ by less than ``slop``; None if there is no such set.
 
-    ``stamp`` is the new one; ``index`` the queue that it is in: of that queue it is the one of the set.
+    ``stamp`` is the new one, in queue number ``index``; the set contains it.
 
-    It is the set that ROS finds first: ROS tries every combination of the stamps that are at most ``slop`` from
-    ``stamp``, those of the first queue in the outermost loop, closest first. Here the number of steps grows with the number
-    of stamps (times its logarithm), not with the product over all queues. All values are nanoseconds.
+    The result is the set that ROS finds first. ROS tries all combinations of the stamps within ``slop`` of ``stamp``, closest
+    first, with the first queue in the outermost loop. This function takes O(n log n) steps for n stamps, instead of the
+    product over all queues. All values are in nanoseconds.
     """
     nearest = []
     for at, queue in enumerate(queues):
@@ -119,7 +119,7 @@ def closest_stamps(
         if at == index:
             nearest.append(stamp)
         else:
-            # The most frequent case first: the new message is the newest of all.
+            # Fast path for the most frequent case: the new message is the newest of all.
             nearest.append(newest if (newest := order[-1]) <= stamp else queue.nearest(stamp))
     first, last = min(nearest), max(nearest)
     if first < stamp - slop or last > stamp + slop:
@@ -127,19 +127,19 @@ def closest_stamps(
     if last - first < slop:
         return nearest
 
-    # Stamps that are less than `slop` apart are in a window of that width, which starts at one of them.
+    # Stamps that differ by less than `slop` are in a window of that width that starts at one of them.
     candidates = [
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)
     ]
-    # A window with the new stamp starts before it, or at it.
+    # The window must contain the new stamp, so it starts at it or before it.
     last = stamp + slop if index is None else stamp
     starts = {each for stamps in candidates for each in stamps if each <= last}
     windows = [start for start in sorted(starts) if _has_each(candidates, start, start + slop - 1)]
 
     chosen = []
     for queue, stamps in zip(queues, candidates, strict=True):
-        # The first stamp with which a window is left is the one that ROS's loops arrive at first.
+        # Choose the first stamp that is in a remaining window: ROS's loops reach it first.
         for each in queue.by_distance(stamps, stamp):
             if left := _around(windows, each, slop):
                 windows = left
@@ -151,7 +151,7 @@ def closest_stamps(
 
 
 def _around(windows: Sequence[int], stamp: int, slop: int) -> list[int]:
-    """Return the starts of those windows that contain a stamp."""
+    """Return the starts of the windows that contain ``stamp``."""
     return list(windows[bisect_right(windows, stamp - slop) : bisect_right(windows, stamp)])
 
 

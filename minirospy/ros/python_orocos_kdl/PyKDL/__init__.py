@@ -1,4 +1,4 @@
-"""PyKDL: the frame types that programs use with tf; solvers and chains refuse by name. Source: http://wiki.ros.org/kdl."""
+"""PyKDL: the geometry types used with tf; chains and solvers raise NotImplementedError. Source: http://wiki.ros.org/kdl."""
 
 from __future__ import annotations
 

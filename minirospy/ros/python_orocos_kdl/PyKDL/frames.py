@@ -1,4 +1,4 @@
-"""PyKDL.Rotation and Frame: 3x3 matrices, and those with a position. Source: http://docs.ros.org/en/diamondback/api/kdl/."""
+"""PyKDL.Rotation and PyKDL.Frame: rotation matrices and poses. Source: http://docs.ros.org/en/diamondback/api/kdl/."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _T = TypeVar("_T", Vector, Twist, Wrench)
 
 
 class Rotation:
-    """A rotation matrix, given by rows."""
+    """A 3x3 rotation matrix, stored by rows."""
 
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *args: Any) -> None:
-        """Make it of nothing (no turn), nine numbers row by row, the images of the three axes, or another one."""
+        """Create it from nothing (identity), nine numbers by rows, three column vectors, or another Rotation."""
         if not args:
             self._m = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         elif len(args) == 1 and isinstance(args[0], Rotation):
@@ -40,37 +40,37 @@ class Rotation:
 
     @staticmethod
     def Identity() -> Rotation:
-        """Return the rotation that turns nothing."""
+        """Return the identity rotation."""
         return Rotation()
 
     @staticmethod
     def RotX(angle: float) -> Rotation:
-        """Return a turn about x."""
+        """Return a rotation about x."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(1, 0, 0, 0, c, -s, 0, s, c)
 
     @staticmethod
     def RotY(angle: float) -> Rotation:
-        """Return a turn about y."""
+        """Return a rotation about y."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(c, 0, s, 0, 1, 0, -s, 0, c)
 
     @staticmethod
     def RotZ(angle: float) -> Rotation:
-        """Return a turn about z."""
+        """Return a rotation about z."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(c, -s, 0, s, c, 0, 0, 0, 1)
 
     @staticmethod
     def Rot(axis: Vector, angle: float) -> Rotation:
-        """Return a turn about an axis of any length."""
+        """Return a rotation about an axis of any length."""
         unit = Vector(axis)
         unit.Normalize()
         return Rotation.Rot2(unit, angle)
 
     @staticmethod
     def Rot2(axis: Vector, angle: float) -> Rotation:
-        """Return a turn about an axis of length 1."""
+        """Return a rotation about an axis of length 1."""
         x, y, z = axis._v
         c, s = math.cos(angle), math.sin(angle)
         v = 1.0 - c
@@ -82,22 +82,22 @@ class Rotation:
 
     @staticmethod
     def RPY(roll: float, pitch: float, yaw: float) -> Rotation:
-        """Return the turn about the fixed x, then y, then z."""
+        """Return a rotation about the fixed axes x, then y, then z."""
         return Rotation.RotZ(yaw) * Rotation.RotY(pitch) * Rotation.RotX(roll)
 
     @staticmethod
     def EulerZYX(alfa: float, beta: float, gamma: float) -> Rotation:
-        """Return the turn about z, then the new y, then the new x."""
+        """Return a rotation about z, then the new y, then the new x."""
         return Rotation.RPY(gamma, beta, alfa)
 
     @staticmethod
     def EulerZYZ(alfa: float, beta: float, gamma: float) -> Rotation:
-        """Return the turn about z, then the new y, then the new z."""
+        """Return a rotation about z, then the new y, then the new z."""
         return Rotation.RotZ(alfa) * Rotation.RotY(beta) * Rotation.RotZ(gamma)
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return the rotation of a quaternion, which is not normalised."""
+        """Return the rotation of a quaternion, without normalising it."""
         xx, yy, zz, ww = x * x, y * y, z * z, w * w
         return Rotation(
             ww + xx - yy - zz, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y,
@@ -146,14 +146,14 @@ class Rotation:
         return (m[2] + m[6]) / s, (m[5] + m[7]) / s, 0.25 * s, (m[3] - m[1]) / s
 
     def GetRotAngle(self, eps: float = EPSILON) -> tuple[float, Vector]:
-        """Return the angle and the axis; of no turn the axis is z."""
+        """Return the angle and the axis; without rotation, the axis is z."""
         m = self._m
         cosine = (m[0] + m[4] + m[8] - 1) / 2.0
         tolerance = eps * eps / 2.0
         if cosine > 1 - tolerance:
             return 0.0, Vector(0, 0, 1)
         if cosine < -1 + tolerance:
-            # A half turn has two axes; the one that KDL chooses points up.
+            # A rotation by 180 degrees has two possible axes; return the one that KDL returns, which points up.
             x, y, z = (math.sqrt(max(0.0, (m[each] + 1.0) / 2)) for each in (0, 4, 8))
             x = -x if m[2] < 0 else x
             y = -y if m[7] < 0 else y
@@ -164,38 +164,38 @@ class Rotation:
         return math.atan2(length / 2, cosine), axis / length
 
     def GetRot(self) -> Vector:
-        """Return the axis, as long as the angle."""
+        """Return the rotation vector: the axis, with the angle as its length."""
         angle, axis = self.GetRotAngle()
         return axis * angle
 
     def UnitX(self, value: Vector | None = None) -> Vector | None:
-        """Return the image of x, or set it."""
+        """Return the x axis, the first column, or set it."""
         return self._column(0, value)
 
     def UnitY(self, value: Vector | None = None) -> Vector | None:
-        """Return the image of y, or set it."""
+        """Return the y axis, the second column, or set it."""
         return self._column(1, value)
 
     def UnitZ(self, value: Vector | None = None) -> Vector | None:
-        """Return the image of z, or set it."""
+        """Return the z axis, the third column, or set it."""
         return self._column(2, value)
 
     # --- changed
 
     def DoRotX(self, angle: float) -> None:
-        """Turn about the own x."""
+        """Rotate about the local x axis."""
         self._m = (self * Rotation.RotX(angle))._m
 
     def DoRotY(self, angle: float) -> None:
-        """Turn about the own y."""
+        """Rotate about the local y axis."""
         self._m = (self * Rotation.RotY(angle))._m
 
     def DoRotZ(self, angle: float) -> None:
-        """Turn about the own z."""
+        """Rotate about the local z axis."""
         self._m = (self * Rotation.RotZ(angle))._m
 
     def SetInverse(self) -> None:
-        """Become the inverse."""
+        """Invert the rotation in place."""
         self._m = self.Inverse()._m
 
     @overload
@@ -204,7 +204,7 @@ class Rotation:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: Vector | Twist | Wrench | None = None) -> object:
-        """Return the inverse, or a vector, twist or wrench that it turns back."""
+        """Return the inverse, or a vector, twist or wrench rotated by the inverse."""
         m = self._m
         inverse = Rotation(m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
         return inverse if arg is None else inverse * arg
@@ -269,11 +269,10 @@ class Frame:
     """A pose: the rotation ``M`` and the position ``p``."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header
-    """Where tf2_ros.Stamped has set it."""
+    header: Header  # set by tf2_ros.Stamped only
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
-        """Make it of a Rotation and a Vector, of one of them, of another Frame, or of nothing."""
+        """Create it from a Rotation and a Vector, from one of them, from another Frame, or from nothing (identity)."""
         self.M: Rotation
         self.p: Vector
         if isinstance(R, Frame):
@@ -289,12 +288,12 @@ class Frame:
 
     @staticmethod
     def Identity() -> Frame:
-        """Return the pose at the origin."""
+        """Return the identity pose."""
         return Frame()
 
     @staticmethod
     def DH(a: float, alpha: float, d: float, theta: float) -> Frame:
-        """Return the pose of Denavit's and Hartenberg's parameters."""
+        """Return the pose for Denavit-Hartenberg parameters."""
         ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
         return Frame(
             Rotation(ct, -st * ca, st * sa, st, ct * ca, -ct * sa, 0, sa, ca), Vector(a * ct, a * st, d)
@@ -302,14 +301,14 @@ class Frame:
 
     @staticmethod
     def DH_Craig1989(a: float, alpha: float, d: float, theta: float) -> Frame:
-        """Return the pose of Denavit's and Hartenberg's parameters as Craig's book has them."""
+        """Return the pose for modified Denavit-Hartenberg parameters, as defined by Craig (1989)."""
         ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
         return Frame(
             Rotation(ct, -st, 0, st * ca, ct * ca, -sa, st * sa, ct * sa, ca), Vector(a, -sa * d, ca * d)
         )
 
     def Integrate(self, twist: Twist, frequency: float) -> None:
-        """Move with a twist, given in this frame, for one period."""
+        """Move by a twist, given in this frame, for ``1 / frequency`` seconds."""
         angle = twist.rot.Norm() / frequency
         if angle < EPSILON:
             self.p = self.p + self.M * (twist.vel / frequency)
@@ -323,7 +322,7 @@ class Frame:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: object = None) -> object:
-        """Return the inverse, or a point, twist or wrench as seen from this frame."""
+        """Return the inverse, or a point, twist or wrench transformed into this frame."""
         back = self.M.Inverse()
         if arg is None:
             return Frame(back, -(back * self.p))

@@ -1,4 +1,4 @@
-"""PyKDL's functions on frames, and what of PyKDL is left out: kinematic chains and their solvers."""
+"""PyKDL's functions on frames, and placeholders for the missing part: kinematic chains and their solvers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def dot(a: Vector | Twist | Wrench, b: Vector | Twist | Wrench) -> float:
 
 
 def Equal(a: object, b: object, eps: float = EPSILON) -> bool:
-    """Return whether two objects of a type differ in no number by ``eps`` or more. Raise TypeError."""
+    """Return whether two objects of the same type are equal within ``eps`` in each number. Raise TypeError."""
     kinds = Vector | Rotation | Frame | Screw
     if type(a) is not type(b) or not isinstance(a, kinds) or not isinstance(b, kinds):
         raise TypeError("Equal() takes two objects of one type: Vector, Rotation, Frame, Twist or Wrench")
@@ -50,7 +50,7 @@ def diff(a: Wrench, b: Wrench, dt: float = 1) -> Wrench: ...
 
 
 def diff(a: Any, b: Any, dt: float = 1) -> Any:
-    """Return the velocity that leads from ``a`` to ``b`` within ``dt``: of poses a twist, in the frame of the base."""
+    """Return the velocity that leads from ``a`` to ``b`` within ``dt``; for poses it is a twist in the base frame."""
     if isinstance(a, Frame) and isinstance(b, Frame):
         return Twist(diff(a.p, b.p, dt), diff(a.M, b.M, dt))
     if isinstance(a, Rotation) and isinstance(b, Rotation):
@@ -59,7 +59,7 @@ def diff(a: Any, b: Any, dt: float = 1) -> Any:
 
 
 def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
-    """Return where the velocity ``da`` leads from ``a`` within ``dt``; the inverse of :func:`diff`."""
+    """Return the result of moving ``a`` with the velocity ``da`` for ``dt``; the inverse of :func:`diff`."""
     if isinstance(a, Frame):
         return Frame(addDelta(a.M, da.rot, dt), addDelta(a.p, da.vel, dt))
     if isinstance(a, Rotation):
@@ -70,7 +70,7 @@ def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
 
 
 def refusal(name: str) -> type:
-    """Return a class of this name that refuses to be made, and says what to do."""
+    """Return a placeholder class of this name; creating an instance raises NotImplementedError with advice."""
 
     def refuse(*_: object, **__: object) -> NoReturn:
         raise NotImplementedError(

@@ -16,11 +16,10 @@ _S = TypeVar("_S", bound="Screw")
 
 
 class Vector:
-    """Three floats: a point, or a direction. Other attributes may be set."""
+    """Three floats: a point or a direction. Other attributes can be set."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header
-    """Where tf2_ros.Stamped has set it."""
+    header: Header  # set by tf2_ros.Stamped only
 
     @overload
     def __init__(self, x: float, y: float, z: float) -> None: ...
@@ -42,7 +41,7 @@ class Vector:
 
     @staticmethod
     def Zero() -> Vector:
-        """Return the vector of zeros."""
+        """Return the zero vector."""
         return Vector()
 
     @overload
@@ -78,13 +77,13 @@ class Vector:
         return 0.0 if length < eps else length
 
     def Normalize(self, eps: float = EPSILON) -> float:
-        """Make the length 1, and return what it was; one that is shorter than ``eps`` becomes (1, 0, 0)."""
+        """Scale the vector to length 1, and return its old length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
         length = self.Norm(eps)
         self._v = [1.0, 0.0, 0.0] if length < eps else [each / length for each in self._v]
         return length
 
     def ReverseSign(self) -> None:
-        """Change the sign."""
+        """Negate the vector in place."""
         self._v = [-each for each in self._v]
 
     def __getitem__(self, index: int) -> float:
@@ -118,7 +117,7 @@ class Vector:
     def __mul__(self, other: float) -> Vector: ...
 
     def __mul__(self, other: Vector | float) -> Vector:
-        """Return the cross product with a vector, or a multiple."""
+        """Return the cross product with a vector, or the product with a number."""
         if isinstance(other, Vector):
             (a, b, c), (x, y, z) = self._v, other._v
             return Vector(b * z - c * y, c * x - a * z, a * y - b * x)
@@ -131,7 +130,7 @@ class Vector:
     def __truediv__(self, other: float) -> Vector:
         if not isinstance(other, int | float):
             return NotImplemented
-        # Of a division by zero, KDL (in C++) makes infinities.
+        # KDL, in C++, returns infinities for a division by zero.
         return self * (1.0 / other if other else math.inf)
 
     def __eq__(self, other: object) -> bool:
@@ -150,12 +149,11 @@ class Vector:
 
 
 class Screw:
-    """The common part of Twist and Wrench: two vectors, of which six numbers are made."""
+    """The base class of Twist and Wrench: two vectors, indexed as six numbers."""
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]
-    header: Header
-    """Where tf2_ros.Stamped has set it."""
+    header: Header  # set by tf2_ros.Stamped only
 
     def _parts(self) -> tuple[Vector, Vector]:
         first, second = (getattr(self, name) for name in self._NAMES)
@@ -168,7 +166,7 @@ class Screw:
         return made
 
     def ReverseSign(self) -> None:
-        """Change the sign."""
+        """Negate both vectors in place."""
         for part in self._parts():
             part.ReverseSign()
 
@@ -223,7 +221,7 @@ class Screw:
 
 
 class Twist(Screw):
-    """A velocity: the linear one ``vel`` and the angular one ``rot``."""
+    """A velocity: linear velocity ``vel`` and angular velocity ``rot``."""
 
     _NAMES = ("vel", "rot")
 
@@ -237,16 +235,16 @@ class Twist(Screw):
 
     @staticmethod
     def Zero() -> Twist:
-        """Return the twist of zeros."""
+        """Return the zero twist."""
         return Twist()
 
     def RefPoint(self, base: Vector) -> Twist:
-        """Return the same motion, with the velocity of the point ``base``."""
+        """Return the same motion, expressed as the velocity of the point ``base``."""
         return Twist(self.vel + self.rot * base, self.rot)
 
 
 class Wrench(Screw):
-    """A force ``force`` and a torque ``torque``."""
+    """A load: ``force`` and ``torque``."""
 
     _NAMES = ("force", "torque")
 
@@ -260,7 +258,7 @@ class Wrench(Screw):
 
     @staticmethod
     def Zero() -> Wrench:
-        """Return the wrench of zeros."""
+        """Return the zero wrench."""
         return Wrench()
 
     def RefPoint(self, base: Vector) -> Wrench:
@@ -269,10 +267,10 @@ class Wrench(Screw):
 
 
 def are_near(a: Sequence[float], b: Sequence[float], eps: float = EPSILON) -> bool:
-    """Return whether no two numbers differ by ``eps`` or more: what KDL means by equal."""
+    """Return whether all pairs of numbers differ by less than ``eps``, KDL's criterion of equality."""
     return all(abs(x - y) < eps for x, y in zip(a, b, strict=True))
 
 
 def numbers_text(values: list[float]) -> str:
-    """Return numbers as KDL prints them: in columns of twelve."""
+    """Return numbers formatted as KDL prints them: in columns of twelve characters."""
     return f"[{','.join(f'{each:12.6g}' for each in values)}]"

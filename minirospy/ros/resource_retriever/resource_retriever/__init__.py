@@ -1,4 +1,4 @@
-"""resource_retriever: files and pages by their URL, package:// too. Source: http://wiki.ros.org/resource_retriever."""
+"""resource_retriever: retrieve files and pages by URL, including package://. Source: http://wiki.ros.org/resource_retriever."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from minirospy.ros.rospkg.rospkg.rospack import RosPack
 __all__ = ["PACKAGE_PREFIX", "URLError", "get", "get_filename", "urlopen"]
 
 PACKAGE_PREFIX = "package://"
-_TIMEOUT = 60.0
-"""Seconds without any byte from a server, after which it counts as unreachable."""
+_TIMEOUT = 60.0  # seconds without data from a server until it counts as unreachable
 
 
 def get(url: str) -> bytes:
-    """Return what is at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or what urllib opens, as http and https.
+    """Return the data at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or one that urllib opens, such as http and https.
 
-    Raise Exception, as ROS does, where there is nothing; ResourceNotFound where the package is not found, ValueError
-    where it is not a URL.
+    Raise Exception, as ROS does, if there is no such resource; ResourceNotFound if the package is not found; ValueError if it
+    is not a URL.
     """
     try:
         if url.startswith(PACKAGE_PREFIX):
@@ -33,9 +32,10 @@ def get(url: str) -> bytes:
 
 
 def get_filename(url: str, use_protocol: bool = True) -> str:
-    """Return a package:// URL as one of the file; any other as it is.
+    """Convert a package:// URL to a file:// URL; return other URLs unchanged.
 
-    Without ``use_protocol`` the result is the file's path. Raise ResourceNotFound (no such package), Exception (no file).
+    Without ``use_protocol``, return the file's path. Raise ResourceNotFound if the package is not found, Exception if the URL
+    names no file.
     """
     if not url.startswith(PACKAGE_PREFIX):
         return url

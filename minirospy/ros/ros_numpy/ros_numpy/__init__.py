@@ -1,5 +1,5 @@
-"""ros_numpy: messages as numpy arrays, and back. Source: http://wiki.ros.org/ros_numpy.
+"""ros_numpy: converts messages to numpy arrays and back. Source: http://wiki.ros.org/ros_numpy.
 
-``numpify(message)`` and ``msgify(class, array)`` choose the conversion by the type of the message; programs add their own
-with the decorators ``converts_to_numpy(class)`` and ``converts_from_numpy(class)``.
+``numpify(message)`` and ``msgify(class, array)`` select the conversion by message type; programs add conversions with the
+decorators ``converts_to_numpy(class)`` and ``converts_from_numpy(class)``.
 """

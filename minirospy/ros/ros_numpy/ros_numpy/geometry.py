@@ -1,6 +1,6 @@
-"""ros_numpy.geometry: points, vectors and quaternions as arrays; poses and transforms as 4x4 matrices; and back.
+"""ros_numpy.geometry: converts points, vectors and quaternions to arrays, poses and transforms to 4x4 matrices; and back.
 
-Arrays of more dimensions become arrays of messages.
+An array with more dimensions is converted to an array of messages.
 """
 
 from __future__ import annotations
@@ -31,20 +31,19 @@ __all__ = [
     "vector3_to_numpy",
 ]
 
-Floats: TypeAlias = NDArray[np.float64]
-"""Vectors, quaternions and matrices."""
+Floats: TypeAlias = NDArray[np.float64]  # vectors, quaternions and matrices
 _P = TypeVar("_P", Point, Vector3)
 
 
 @converts_to_numpy(Vector3)
 def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
-    """Return x, y, z; with ``hom`` a 0 after them."""
+    """Return x, y, z; with ``hom``, followed by 0."""
     return np.array([msg.x, msg.y, msg.z, *([0] if hom else [])])
 
 
 @converts_from_numpy(Vector3)
 def numpy_to_vector3(arr: Array) -> object:
-    """Return three values, or four of which the last is 0, as a vector. Raise AssertionError if it is not."""
+    """Return a vector from three values, or from four of which the last is 0. Raise AssertionError for other values."""
     if arr.shape[-1] == 4:
         assert np.all(arr[..., -1] == 0)
         arr = arr[..., :-1]
@@ -53,13 +52,13 @@ def numpy_to_vector3(arr: Array) -> object:
 
 @converts_to_numpy(Point)
 def point_to_numpy(msg: Point, hom: bool = False) -> Floats:
-    """Return x, y, z; with ``hom`` a 1 after them."""
+    """Return x, y, z; with ``hom``, followed by 1."""
     return np.array([msg.x, msg.y, msg.z, *([1] if hom else [])])
 
 
 @converts_from_numpy(Point)
 def numpy_to_point(arr: Array) -> object:
-    """Return three values, or four homogeneous ones, as a point."""
+    """Return a point from three values, or from four homogeneous coordinates."""
     if arr.shape[-1] == 4:
         arr = arr[..., :-1] / arr[..., -1:]
     return _each(arr, 1, lambda row: Point(*row.tolist()))
@@ -73,7 +72,7 @@ def quat_to_numpy(msg: Quaternion) -> Floats:
 
 @converts_from_numpy(Quaternion)
 def numpy_to_quat(arr: Array) -> object:
-    """Return x, y, z, w as a quaternion. Raise AssertionError if there are not four."""
+    """Return a quaternion from x, y, z, w. Raise AssertionError if there are not four values."""
     assert arr.shape[-1] == 4
     return _each(arr, 1, lambda row: Quaternion(*row.tolist()))
 
@@ -86,7 +85,7 @@ def transform_to_numpy(msg: Transform) -> Floats:
 
 @converts_from_numpy(Transform)
 def numpy_to_transform(arr: Array) -> object:
-    """Return a 4x4 matrix as a transform. Raise AssertionError if it is not one."""
+    """Return a transform from a 4x4 matrix. Raise AssertionError if the matrix has another shape."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Transform(*_parts(matrix, Vector3)))
 
@@ -99,7 +98,7 @@ def pose_to_numpy(msg: Pose) -> Floats:
 
 @converts_from_numpy(Pose)
 def numpy_to_pose(arr: Array) -> object:
-    """Return a 4x4 matrix as a pose. Raise AssertionError if it is not one."""
+    """Return a pose from a 4x4 matrix. Raise AssertionError if the matrix has another shape."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Pose(*_parts(matrix, Point)))
 
@@ -116,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
 
 
 def _each(arr: Array, dimensions: int, make: Callable[[Array], object]) -> object:
-    """Return a message of the last dimensions; an array of messages where there are more."""
+    """Return a message made from the last ``dimensions`` axes; an array of messages if there are more axes."""
     if arr.ndim == dimensions:
         return make(arr)
     shape = arr.shape[:-dimensions]

@@ -1,4 +1,4 @@
-"""ros_numpy.image: images as arrays (height, width) or (height, width, channels), and back."""
+"""ros_numpy.image: converts images to arrays (height, width) or (height, width, channels), and back."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["image_to_numpy", "numpy_to_image"]
 
 @converts_to_numpy(Image)
 def image_to_numpy(msg: Image) -> Array:
-    """Return an image, a read-only view of the message where its bytes are in this machine's order. Raise TypeError."""
+    """Return an image as an array; a read-only view of the message if it has the native byte order. Raise TypeError."""
     return CvBridge().imgmsg_to_cv2(msg)
 
 
 @converts_from_numpy(Image)
 def numpy_to_image(arr: Array, encoding: str) -> Image:
-    """Return an array as an image of an encoding. Raise TypeError if the encoding has another type."""
+    """Return an array as an image with this encoding. Raise TypeError if the array's type does not match."""
     dtype, channels = CvBridge().encoding_to_dtype_with_channels(encoding)
     if arr.ndim not in (2, 3):
         raise TypeError("Array must be two or three dimensional")

@@ -1,4 +1,4 @@
-"""ros_numpy.occupancy_grid: maps as masked arrays (height, width), and back."""
+"""ros_numpy.occupancy_grid: converts maps to masked arrays (height, width), and back."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["numpy_to_occupancy_grid", "occupancygrid_to_numpy"]
 
 @converts_to_numpy(OccupancyGrid)
 def occupancygrid_to_numpy(msg: OccupancyGrid) -> np.ma.MaskedArray[tuple[int, int], np.dtype[np.int8]]:
-    """Return a map whose unknown cells, -1, are masked. Raise ValueError if it has less data than its size needs."""
+    """Return a map as an array in which unknown cells, -1, are masked. Raise ValueError if it has too little data."""
     data = np.asarray(msg.data, dtype=np.int8).reshape(msg.info.height, msg.info.width)
     return np.ma.MaskedArray(data, mask=data == -1, fill_value=-1)
 
 
 @converts_from_numpy(OccupancyGrid)
 def numpy_to_occupancy_grid(arr: Array, info: MapMetaData | None = None) -> OccupancyGrid:
-    """Return an array of int8 as a map; masked cells are unknown. Raise TypeError."""
+    """Return an int8 array as a map; masked cells become unknown. Raise TypeError."""
     if arr.ndim != 2:
         raise TypeError("Array must be 2D")
     if arr.dtype != np.int8:

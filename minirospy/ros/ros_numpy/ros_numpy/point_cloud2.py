@@ -1,4 +1,4 @@
-"""ros_numpy.point_cloud2: clouds as structured arrays, and back."""
+"""ros_numpy.point_cloud2: converts point clouds to structured arrays, and back."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _DATATYPES = {np.dtype(dtype): datatype for datatype, dtype in _DTYPES.items()}
 def fields_to_dtype(
     fields: list[PointField], point_step: int, is_bigendian: bool = False
 ) -> np.dtype[np.void]:
-    """Return the type of a point. Raise ValueError if a field's type is unknown."""
+    """Return the structured dtype for a cloud's fields. Raise ValueError if a field's type is unknown."""
     ordered = sorted(fields, key=lambda each: each.offset)
     for each in ordered:
         if each.datatype not in _DTYPES:
@@ -67,7 +67,7 @@ def fields_to_dtype(
 
 @converts_from_numpy(PointField, plural=True)
 def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
-    """Return the fields of a structured type. Raise KeyError if a point cannot have a type."""
+    """Return the PointFields for a structured dtype. Raise KeyError if PointField does not support a type."""
     fields = []
     for name in dtype.names or ():
         item, offset = dtype.fields[name][:2]  # type: ignore[index]
@@ -78,9 +78,9 @@ def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
 
 @converts_to_numpy(PointCloud2)
 def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
-    """Return the points as a read-only view of the message: (height, width), or (width,) of one row with ``squeeze``.
+    """Return the points as a read-only view: shape (height, width), or (width,) for a single row with ``squeeze``.
 
-    Raise ValueError if the message has less data than its size needs.
+    Raise ValueError if the message has too little data for its size.
     """
     dtype = fields_to_dtype(cloud_msg.fields, cloud_msg.point_step, bool(cloud_msg.is_bigendian))
     shape = cloud_msg.height, cloud_msg.width
@@ -102,7 +102,7 @@ def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
 def array_to_pointcloud2(
     cloud_arr: Array, stamp: Time | None = None, frame_id: str | None = None
 ) -> PointCloud2:
-    """Return a structured array as a cloud. It is dense where all its values are finite."""
+    """Return a structured array as a cloud; it is marked as dense if all values are finite."""
     cloud_arr = np.atleast_2d(cloud_arr)
     cloud = PointCloud2()
     if stamp is not None:
@@ -120,7 +120,7 @@ def array_to_pointcloud2(
 
 
 def merge_rgb_fields(cloud_arr: Array) -> Array:
-    """Return an array whose fields r, g and b are one field rgb, a float whose bits are the colors, as PCL has it."""
+    """Merge the fields r, g and b into one field rgb: a float with the color's bits, as in PCL."""
     red, green, blue = (np.asarray(cloud_arr[name], np.uint32) for name in "rgb")
     merged = _without(cloud_arr, ("r", "g", "b"), [("rgb", np.float32)])
     merged["rgb"] = np.asarray((red << 16) | (green << 8) | blue, np.uint32).view(np.float32)
@@ -128,7 +128,7 @@ def merge_rgb_fields(cloud_arr: Array) -> Array:
 
 
 def split_rgb_field(cloud_arr: Array) -> Array:
-    """Return an array whose field rgb is three fields r, g and b of bytes."""
+    """Split the field rgb into three byte fields r, g and b."""
     bits = np.ascontiguousarray(cloud_arr["rgb"], np.float32).view(np.uint32)
     split = _without(cloud_arr, ("rgb",), [(name, np.uint8) for name in "rgb"])
     for name, shift in (("r", 16), ("g", 8), ("b", 0)):
@@ -146,7 +146,7 @@ def _without(cloud: Array, left_out: tuple[str, ...], added: list[tuple[str, typ
 
 
 def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLike = float) -> Array:
-    """Return x, y and z as an array whose last axis has three values; without points that are not finite."""
+    """Return x, y and z on the last axis of an array; with ``remove_nans``, without points that are not finite."""
     if remove_nans:
         good = np.isfinite(cloud_array["x"]) & np.isfinite(cloud_array["y"]) & np.isfinite(cloud_array["z"])
         cloud_array = cloud_array[good]
@@ -154,5 +154,5 @@ def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLik
 
 
 def pointcloud2_to_xyz_array(cloud_msg: PointCloud2, remove_nans: bool = True) -> Array:
-    """Return x, y and z of a cloud as ``get_xyz_points`` does."""
+    """Return x, y and z of a cloud, see ``get_xyz_points``."""
     return get_xyz_points(pointcloud2_to_array(cloud_msg), remove_nans=remove_nans)

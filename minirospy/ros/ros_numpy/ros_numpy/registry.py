@@ -1,4 +1,4 @@
-"""ros_numpy.registry: which function converts which type."""
+"""ros_numpy.registry: the conversion functions, by message type."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from minirospy.core.idl.protocols import Message
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Array: TypeAlias = NDArray[Any]
-    """An array of any type and shape."""
+    Array: TypeAlias = NDArray[Any]  # an array of any type and shape
 
 __all__ = ["converts_from_numpy", "converts_to_numpy", "msgify", "numpify"]
 
@@ -20,11 +19,11 @@ _F = TypeVar("_F", bound=_Function)
 
 _to_numpy: dict[tuple[str, bool], _Function] = {}
 _from_numpy: dict[tuple[str, bool], _Function] = {}
-"""By the name of the type: a message of a bag is of another class. And whether a list of messages is meant."""
+"""Both are keyed by type name, because a bag's messages have other classes, and by whether they convert a list of messages."""
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator: the function gets a message of a type, or with ``plural`` a list of them."""
+    """Return a decorator that registers a function for messages of a type, or with ``plural`` for lists of them."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -34,7 +33,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator: the function gets an array, and returns a message of a type, or a list of them."""
+    """Return a decorator that registers a function from an array to a message of a type, or to a list of them."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function
@@ -44,7 +43,7 @@ def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callabl
 
 
 def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
-    """Return a message, or a list of messages, as an array; None for None. Raise ValueError without a conversion."""
+    """Convert a message or a list of messages to an array; None to None. Raise ValueError if there is no conversion."""
     if msg is None:
         return None
     plural = isinstance(msg, Sequence)
@@ -60,7 +59,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Return an array as a message of a type, with ``plural`` as a list. Raise ValueError without a conversion."""
+    """Convert an array to a message, with ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

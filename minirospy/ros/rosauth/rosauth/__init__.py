@@ -1,1 +1,1 @@
-"""rosauth: whether a web client may use this ROS. Source: http://wiki.ros.org/rosauth."""
+"""rosauth: authentication of web clients. Source: http://wiki.ros.org/rosauth."""

@@ -1,6 +1,6 @@
-"""The node ros_mac_authentication: service ``authenticate``, which checks that a client knows a secret.
+"""The node ros_mac_authentication: its service ``authenticate`` checks that a client knows a secret.
 
-Parameters: ~secret_file_location (a file with 16 characters), ~allowed_time_delta (5 seconds; negative: any time).
+Parameters: ~secret_file_location (a file with 16 characters), ~allowed_time_delta (5 seconds; negative: no limit).
 Source: http://wiki.ros.org/rosauth, http://wiki.ros.org/rosauth/Tutorials/Authenticating%20a%20ROS%20Connection.
 """
 
@@ -19,12 +19,12 @@ __all__ = ["is_authentic", "mac_of", "main"]
 
 SECRET_LENGTH = 16
 _SECRET_FILE = "secret_file_location"
-# What ROS's node returns: -1, -2, -3.
+# ROS's node returns -1, -2 and -3, which become these exit statuses.
 _NO_PARAMETER, _NO_FILE, _NO_SECRET = 255, 254, 253
 
 
 def main() -> int:
-    """Run the node; return the exit status: 255 without the parameter, 254 without the file, 253 for a wrong secret."""
+    """Run the node; return the exit status: 255 without the parameter, 254 without the file, 253 for an invalid secret."""
     rospy.init_node("ros_mac_authentication")
     file = rospy.get_param(f"~{_SECRET_FILE}", None)
     if not isinstance(file, str):
@@ -57,13 +57,13 @@ def main() -> int:
 
 
 def mac_of(request: AuthenticationRequest, secret: str) -> str:
-    """Return the MAC that a request has if its sender knows the secret: SHA-512, in hexadecimal digits."""
+    """Return the MAC of a request from a sender that knows the secret: SHA-512, in hexadecimal."""
     text = f"{secret}{request.client}{request.dest}{request.rand}{request.t.secs}{request.level}{request.end.secs}"
     return hashlib.sha512(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def is_authentic(request: AuthenticationRequest, secret: str, now: times.Time, allowed_delta: float) -> bool:
-    """Return whether a request has the right MAC, was made just now, and its session has not ended."""
+    """Return whether a request has the right MAC and, unless ``allowed_delta`` is negative, is recent and has not expired."""
     is_in_time = allowed_delta < 0 or (abs(request.t - now).secs < allowed_delta and request.end > now)
     mac = request.mac.encode("utf-8", "surrogateescape")
     return is_in_time and hmac.compare_digest(mac, mac_of(request, secret).encode("ascii"))

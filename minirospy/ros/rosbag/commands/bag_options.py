@@ -1,6 +1,6 @@
-"""The option -b of `rostopic list`, `rostopic echo` and `rosmsg show`: a bag file instead of the graph.
+"""The option -b of `rostopic list`, `rostopic echo` and `rosmsg show`: read from a bag file instead of the graph.
 
-Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints; no master is needed.
+Source: http://wiki.ros.org/rostopic. The output is identical to that of ROS; no master is needed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["echo_bag", "list_bag", "show_bag"]
 
 @contextmanager
 def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
-    """Yield a reader of a bag. Raise MinirospyError, in ROS's words where the file does not exist."""
+    """Open a bag and yield its reader. Raise MinirospyError; if the file does not exist, with ROS's message."""
     if not os.path.exists(path):
         text = f"bag file [{path}] does not exist"
         raise WordedError(NotFoundError("bag file", path), RosText(f"{ros_error}{text}"))
@@ -38,7 +38,10 @@ def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
 
 
 def list_bag(path: str, topic: str | None) -> None:
-    """Print the topics of a bag in the order of their first messages; with ``topic``, how many messages are on and below it."""
+    """Print the topics of a bag, ordered by first message.
+
+    With ``topic``: print the message counts of that topic and of the topics below it.
+    """
     with _opened(path, "ERROR: ") as reader:
         if topic is None:
             for name in _topics_in_order(reader):
@@ -75,9 +78,9 @@ def _topics_in_order(reader: BagReader) -> list[str]:
 
 
 class EchoOptions(NamedTuple):
-    """The options of showing a bag's messages.
+    """Options for printing the messages of a bag.
 
-    ``make`` returns the Echo of a topic or field; ``keep`` selects messages; at most ``limit`` are printed, each behind
+    ``make`` returns the Echo for a topic or field; ``keep`` filters messages; at most ``limit`` are printed, each after
     ``prefix``.
     """
 
@@ -88,7 +91,7 @@ class EchoOptions(NamedTuple):
 
 
 def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
-    """Print the messages of a bag on a topic, or a field of them; of all topics where ``name`` is None."""
+    """Print the messages of topic ``name`` in a bag, or one field of them if ``name`` ends in a field; if None, of all topics."""
     from minirospy.introspect.streams import Received
     from minirospy.introspect.topics import TopicField
 
@@ -100,7 +103,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # One for all topics: what -p prints starts with one line of names.
+            # Topics without a field share one Echo: the output of -p starts with a single line of column names.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
@@ -123,11 +126,11 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
 
 
 def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
-    """Return the connections whose messages are shown, and the path of the field of each: "" for whole messages."""
+    """Return the IDs of the connections to print, each with the path of the field to print: "" for the whole message."""
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # A topic of the whole name comes before a field of a shorter one.
+    # The longest matching topic wins: a topic with the full name precedes a field of a topic with a shorter name.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {
@@ -138,12 +141,12 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
 
 
 def _global(topic: str) -> str:
-    """Return a topic as the graph would have it: bags may have relative names."""
+    """Return the global name of a topic: a bag may contain relative names."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
 def show_bag(path: str, type_: str, *, raw: bool) -> None:
-    """Print the definition of a type as a bag has it: unfolded, or as it is stored."""
+    """Print the definition of a type as stored in a bag: expanded, or as raw text."""
     from minirospy.core.idl.load import specs_of_text
     from minirospy.introspect.interfaces import describe
 

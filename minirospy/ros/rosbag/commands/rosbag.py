@@ -1,7 +1,7 @@
-"""rosbag: record and play bags, look into them, repair and rewrite them.
+"""rosbag: record, play, inspect, repair and rewrite bags.
 
-Source: http://wiki.ros.org/rosbag/Commandline. What is printed is what ROS prints, and the exit statuses are ROS's: an unknown
-verb is 0. Each verb is in a separate module; a new one is a line of the table.
+Source: http://wiki.ros.org/rosbag/Commandline. Output and exit statuses are those of ROS: 0 for an unknown verb. Each verb
+has its own module; add a verb with a line in the table.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ FAMILY = Family(
     summary="record, play and change bags",
     help_status=HelpStatus(0, 0, 0, 0),
 )
-"""The verbs. Those of ROS's command are listed by `rosbag -h` in the order of the alphabet."""
+"""The verbs. `rosbag -h` lists those that ROS also has, in alphabetical order."""
 
 _ABOUT = """\
 Usage: rosbag <subcommand> [options] [args]

@@ -1,4 +1,4 @@
-"""`rosbag convert`: bags to MCAP files and back. A command of minirospy's; ROS has none for it."""
+"""`rosbag convert`: convert bags to MCAP files and back. ROS has no such command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`rosbag info` and `rosbag filter`: what is in a bag, and a part of it. Source: http://wiki.ros.org/rosbag/Commandline."""
+"""`rosbag info` and `rosbag filter`: summarize a bag, or copy a part of it. Source: http://wiki.ros.org/rosbag/Commandline."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ __all__ = ["VERBS", "report"]
 
 
 def report(line: str) -> None:
-    """Print a line of ROS's on stderr, after all that was printed before."""
+    """Print a message to stderr, after flushing stdout."""
     sys.stdout.flush()
     print(escaped(line, "\n"), file=sys.stderr)
 
 
 def unreadable(path: str, error: BagError | OSError) -> str:
-    """Return ROS's line about a bag that cannot be opened or read."""
+    """Return ROS's message for a bag that cannot be opened or read."""
     if isinstance(error, BagEncryptedError):
         return f"ERROR: {error}"
     if isinstance(error, McapUnindexedError):
@@ -137,7 +137,7 @@ def _filter(words: list[str], print: str | None) -> int:
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
 
-    # Before the progress is shown.
+    # Check the name before the progress is shown.
     bags.check_bag_name(target)
     keep = bags.Expression(text)
     show = bags.Expression(print) if print else None
@@ -149,7 +149,7 @@ def _filter(words: list[str], print: str | None) -> int:
         return 0 if isinstance(error, BagEncryptedError) else 1
 
     try:
-        # A bar and lines would overwrite each other on a terminal.
+        # Without the progress bar if matches are printed on a terminal: they would overwrite each other.
         with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:

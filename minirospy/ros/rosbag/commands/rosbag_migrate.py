@@ -1,4 +1,4 @@
-"""`rosbag check` and `rosbag fix`: messages of types that have changed. Source: http://wiki.ros.org/rosbag/migration."""
+"""`rosbag check` and `rosbag fix`: migrate messages whose types have changed. Source: http://wiki.ros.org/rosbag/migration."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _check_rule_file(path: str, *, append: bool) -> None:
 
 
 def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpdateRule]) -> int:
-    """Write the missing rules for a person to complete; where a type has moved, ask for the new name."""
+    """Write the missing rules to a file for the user to complete; if a type has moved, prompt for its new name."""
     left = migrator.filter_rules_unique(rules)
     if not left:
         print(f"\nNo additional rule files needed to be generated.  {path} not created.")
@@ -132,7 +132,7 @@ def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpd
 
 
 def _ask_new_class(old_type: str) -> type[Message] | None:
-    """Return the class of the type that is typed; None at the end of the input."""
+    """Prompt for the new type's name and return its class; None at end of input."""
     from minirospy.core.idl.load import get_message_class
 
     print(f"The message type {old_type} appears to have moved.  Please enter the type to migrate it to.")
@@ -226,7 +226,7 @@ def make_migrator(rule_files: Sequence[str], *, noplugins: bool) -> MessageMigra
 
 
 def print_migrations(migrations: Sequence[Migration]) -> list[MessageUpdateRule]:
-    """Print what has to be migrated; return the rules that are missing."""
+    """Print the required migrations; return the rules that are missing."""
     rules = []
     for path, missing in migrations:
         _print_change(path[0].old_class, path[-1].new_class, 0)

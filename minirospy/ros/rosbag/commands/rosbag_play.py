@@ -1,4 +1,4 @@
-"""`rosbag play` and `rosrun rosbag play`: publish what bags hold, in its own time.
+"""`rosbag play` and `rosrun rosbag play`: publish the messages of bags with their original timing.
 
 Source: http://wiki.ros.org/rosbag/Commandline#play. Options and texts are those of ROS's command and of its C++ program.
 """
@@ -60,7 +60,7 @@ def _parser() -> Parser:
         help="keep alive past end of bag (useful for publishing latched topics)")  # fmt: skip
     add("--try-future-version", action="store_true",
         help="still try to open a bag file, even if the version number is not known to the player")  # fmt: skip
-    # Their values are no part of ROS's help.
+    # ROS's help shows no metavar for --topics and --pause-topics.
     lists = (
         ("--topics", "topics to play back"),
         ("--pause-topics", "topics to pause on during playback"),
@@ -154,7 +154,7 @@ def _nanoseconds(name: str, seconds: float) -> int:
 
 
 def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> int:
-    # Imported here: the help needs none of it.
+    # Imported here: --help does not need the client library.
     from minirospy import client
     from minirospy.ros.rosbag.recording.player import Player
     from minirospy.ros.rosbag.recording.sources import Bags
@@ -173,17 +173,17 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             print("\n".join(bridge.lines), flush=True)
 
         try:
-            # Without the ROS time: that is what it may publish.
+            # Use wall time: the player may itself publish /clock.
             client.init_node("play", anonymous=True, disable_rostime=True)
             for path in paths:
                 client.loginfo("Opening %s", path)
             if options.prefix:
-                # With both quotes, as the C++ program prints it.
+                # Two closing quotes, as the C++ program prints them.
                 client.loginfo("Using prefix '%s'' for topics ", options.prefix)
             player = Player(bags, options, serve if foxglove_port is not None else None)
             return player.run()
         except ROSInterruptException:
-            return 0  # while it registered
+            return 0  # interrupted during registration
         finally:
             client.signal_shutdown("the end")
 

@@ -1,4 +1,4 @@
-"""The progress of a long command of rosbag: a bar on a terminal, ROS's text on a pipe, nothing when it is to be quiet."""
+"""The progress of long rosbag commands: a bar on a terminal, ROS's text on a pipe, nothing if quiet."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from minirospy.base.escape import escaped, own_output
 __all__ = ["showing_progress"]
 
 _REFRESH = 1.0
-_BESIDE_PATH = 37
-"""Columns of ROS's line besides the path."""
+_BESIDE_PATH = 37  # columns of ROS's progress line without the path
 
 
 @contextlib.contextmanager
 def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function that is called with the bytes that are done, of ``total``.
+    """Yield a function to be called with the number of bytes done, out of ``total``.
 
-    What is printed ends with the end of a line, whatever the block raises.
+    The output ends with a newline, even if the block raises an exception.
     """
     if quiet:
         yield lambda done: None
@@ -33,7 +32,7 @@ def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable
         try:
             yield meter.step
         except BaseException:
-            # What is reported next is a line below.
+            # Print the next message on a new line.
             print()
             raise
         meter.finish()
@@ -50,7 +49,8 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    # The bar moves the cursor, which the commands' own stream does not let pass; what is printed goes through that.
+    # The commands' own stdout escapes control sequences, and the bar needs them to move the cursor: write to the
+    # wrapped stream.
     console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))
@@ -59,7 +59,7 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
 
 
 class _Meter:
-    """ROS's line, written again each second."""
+    """ROS's progress line, rewritten every second."""
 
     def __init__(self, path: str, total: int) -> None:
         width = int(os.environ.get("COLUMNS", "") or 80) if os.environ.get("COLUMNS", "80").isdigit() else 80

@@ -25,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words with ``--split --size N`` for the ``--split=N`` and ``--split N`` of old launch files and scripts."""
+    """Yield the words, replacing ``--split=N`` and ``--split N`` of old launch files and scripts by ``--split --size N``."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
@@ -106,7 +106,7 @@ def _parser() -> Parser:
 
 
 def _record_verb(output_prefix: str, output_name: str, **others: Any) -> int:
-    # `rosrun rosbag record` takes both, and the name counts.
+    # `rosrun rosbag record` accepts both options, and the name takes precedence.
     if output_prefix and output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)
@@ -194,7 +194,7 @@ def _record(
 
 
 def _run(options: RecordOptions, *, quiet: bool) -> int:
-    # Imported here: the help needs none of it.
+    # Imported here: --help does not need the client library.
     from minirospy import client
     from minirospy.core.bag.compression import check_compression
     from minirospy.core.bag.mcap_writer import check_mcap
@@ -208,7 +208,7 @@ def _run(options: RecordOptions, *, quiet: bool) -> int:
     try:
         client.init_node("record", anonymous=True, log_level=client.WARN if quiet else None)
     except ROSInterruptException:
-        return 0  # while it waited for the master
+        return 0  # interrupted while waiting for the master
     return recorder.run()
 
 

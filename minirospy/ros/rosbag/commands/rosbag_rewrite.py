@@ -1,6 +1,6 @@
-"""`rosbag compress`, `decompress` and `reindex`, which write a bag again and keep the original; `encrypt` and `decrypt` refuse.
+"""`rosbag compress`, `decompress` and `reindex` rewrite a bag and keep the original; `encrypt` and `decrypt` are refused.
 
-Source: http://wiki.ros.org/rosbag/Commandline. As in ROS, a file that cannot be read is reported, and the next one is done.
+Source: http://wiki.ros.org/rosbag/Commandline. As in ROS, an unreadable file is reported, and the next one is processed.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) 
 
 
 def _reindex_one(source: str, target: str, quiet: bool) -> None:
-    import shutil  # whose import takes longer than the commands
+    import shutil  # imported here: it takes longer to import than the commands take
 
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
@@ -110,7 +110,7 @@ def _rewrite(
     *,
     unindexed: bool = False,
 ) -> int:
-    """Have ``write(source, target)`` write each bag again: into a folder, or in its place, the original kept beside it.
+    """Rewrite each bag with ``write(source, target)``: into a folder, or in place, with a backup of the original.
 
     Return the exit status.
     """
@@ -133,7 +133,7 @@ def _rewrite(
             target = os.path.join(output_dir, os.path.basename(path))
             if os.path.realpath(target) != os.path.realpath(path):
                 if not _write(path, path, target, write) and unindexed:
-                    # As in ROS, where compress and decompress go on with status 0.
+                    # As in ROS, only reindex fails then: compress and decompress continue with status 0.
                     status = 1
                 continue
 
@@ -150,7 +150,7 @@ def _rewrite(
         try:
             _write(path, backup, path, write)
         except BaseException:
-            # Ctrl-C, or a disk that is full: the bag is again where it was.
+            # After Ctrl-C or an error such as a full disk, restore the original bag.
             with contextlib.suppress(OSError):
                 private_files.replace_file(backup, path)
             raise
@@ -163,7 +163,7 @@ def _is_readable(path: str, *, unindexed: bool) -> bool:
     try:
         with open_reader(path) as reader:
             if not unindexed:
-                # This reads the headers of all chunks: where one is damaged the bag stays as it is.
+                # This reads the headers of all chunks: a bag with a damaged one is not rewritten.
                 data_size(reader)
             return True
     except (BagError, OSError) as error:
@@ -174,7 +174,7 @@ def _is_readable(path: str, *, unindexed: bool) -> bool:
 
 
 def _write(path: str, source: str, target: str, write: Callable[[str, str], None]) -> bool:
-    """Write a bag again; return False if the target cannot be created."""
+    """Rewrite a bag; return False if the target cannot be created."""
     try:
         with open(target, "wb"):
             pass
@@ -187,7 +187,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
     try:
         write(source, target)
     except BagError as error:
-        # What was before the damage is in the target.
+        # The target contains the messages before the damage.
         print()
         report(f"ERROR operating on {source}: {error}")
     except OSError as error:

@@ -1,6 +1,6 @@
-"""The programs of ROS's package rosbag besides record and play: `rosrun rosbag topic_renamer.py ...`.
+"""The programs of ROS's package rosbag other than record and play: `rosrun rosbag topic_renamer.py ...`.
 
-Arguments, output and exit statuses are those of ROS's; every publisher's connection is kept.
+Arguments, output and exit statuses are those of ROS; the connection of each publisher is preserved.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def _copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> _Script:
-    """Return a program that copies a bag; its last but one and its last word, or the second and the last, are bags."""
+    """Return a program that copies a bag and changes its connections.
+
+    Source and target are its second and fourth argument if it has four, else its first and second.
+    """
 
     def script(words: list[str]) -> int:
         from minirospy.introspect.bags import copy_bag
@@ -65,7 +68,7 @@ def _with_md5sum_of_definition(connection: Connection) -> Connection:
 
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
-    """Return the connection with the definition that its md5sum belongs to, if rules or packages have it."""
+    """Return the connection with the definition that matches its md5sum, if a rule or an installed package has it."""
     from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
     from minirospy.ros.rosbag.migration.rules_files import MessageMigrator
@@ -84,7 +87,7 @@ def _with_definition_of_md5sum(connection: Connection) -> Connection:
 
 
 def _fix_each(words: list[str], usage: str, verb: str, fix: Callable[[str, str], bool]) -> int:
-    """Have ``fix(bag, temporary)`` write each bag again; the original becomes BAG.old."""
+    """Rewrite each bag with ``fix(bag, temporary)``; the original is renamed to BAG.old."""
     if not words:
         print(usage)
         return 0
@@ -237,4 +240,4 @@ SCRIPTS: dict[str, _Script] = {
     "savemsg.py": _savemsg,
     "makerule.py": _makerule,
 }
-"""The programs by their names."""
+"""The programs, by name."""

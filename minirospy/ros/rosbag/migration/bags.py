@@ -1,4 +1,4 @@
-"""Bags whose messages have types that have changed: what is to be migrated, and a bag in which it is."""
+"""Bags with messages whose types have changed: find the required migrations, and write a migrated bag."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["check_bag", "check_classes", "fix_bag"]
 
 
 def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations that messages of these classes need, each class once."""
+    """Return the migrations that messages of these classes need, one per class."""
     found = []
     seen = set()
     for each in classes:
@@ -28,7 +28,7 @@ def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) ->
 
 
 def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object]) -> list[Migration]:
-    """Return the migrations that the messages of a bag need, in the order of their first one. Raise BagError, OSError."""
+    """Return the migrations that the messages of a bag need, in order of first use. Raise BagError, OSError."""
     with open_reader(path) as reader:
         connections = list(reader.connections.values())
         first: dict[int, MessageClass] = {}
@@ -44,9 +44,10 @@ def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object
 def fix_bag(
     migrator: MessageMigrator, source: str, target: str, warn: Callable[[str], object], *, force: bool = False
 ) -> list[Migration]:
-    """Write a bag again with its messages migrated; return the migrations that have no rule: then nothing is written.
+    """Write a bag with its messages migrated; return the migrations without a rule. If there are any, write nothing.
 
-    ``force``: write it all the same, and copy what cannot be migrated. Raise BagError, OSError, BagMigrationException.
+    ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError, OSError,
+    BagMigrationException.
     """
     missing = [each for each in check_bag(migrator, source, warn) if each.missing]
     if missing and not force:

@@ -1,7 +1,7 @@
-"""Rules that turn a message of an old type into one of a new type, as .bmr files define them, and rules made from two types.
+"""Rules that convert a message of an old type to a new type: from .bmr files, or generated from the two types.
 
-Source: http://wiki.ros.org/rosbag/migration. A rule that is made from two types copies the fields of one name and type; it is
-valid if nothing is lost or invented. Nothing of a bag's text is executed.
+Source: http://wiki.ros.org/rosbag/migration. A generated rule copies the fields whose name and type are equal; it is valid
+if no field is lost or needs an invented value. No text from a bag is executed.
 """
 
 from __future__ import annotations
@@ -34,45 +34,45 @@ __all__ = [
 ]
 
 MessageClass = Any
-"""A message class, or None; .bmr files of third parties handle them without types."""
+"""A message class, or None; untyped, because third-party .bmr files handle such classes without types."""
 
 Key = tuple[str, str]
 
 
 class BagMigrationException(Exception):
-    """A migration is not possible, or a rule is used wrongly."""
+    """A migration is not possible, or a rule is used incorrectly."""
 
 
 class _Step(Protocol):
-    """A step of a path."""
+    """A step of a migration path."""
 
     @property
     def rule(self) -> MessageUpdateRule:
-        """Return the rule that leads from one class to another."""
+        """Return the rule that converts one class to another."""
 
 
 class Migrator(Protocol):
-    """The part that a rule needs of :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator`."""
+    """The methods that a rule needs of :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator`."""
 
     rename_map: dict[str, set[str]]
 
     def find_path(self, old_class: MessageClass, new_class: MessageClass) -> Sequence[_Step]:
-        """Return the nodes of the scaffold that lead from one class to another."""
+        """Return the steps that lead from one class to another."""
 
     def filter_rules_unique(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
-        """Return the rules without repetitions."""
+        """Return the rules without duplicates."""
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill one message from another."""
+        """Fill a new message from an old one."""
 
     def migrate_array(self, msg_from_array: Sequence[Message], msg_to_array: Sequence[Message]) -> None:
-        """Fill messages from others."""
+        """Fill new messages from old ones."""
 
 
 class MessageUpdateRule:
-    """The base of all rules: subclasses set the class attributes and override :meth:`update`.
+    """The base class of all rules: subclasses set the class attributes and override :meth:`update`.
 
-    ``order`` sorts the rules of a type; ``migrated_types`` are the pairs of types of fields that update() migrates.
+    ``order`` sorts the rules of a type; ``migrated_types`` has the pairs (old, new) of field types that update() migrates.
     """
 
     old_type = ""
@@ -96,7 +96,7 @@ class MessageUpdateRule:
         self.sub_rules: list[MessageUpdateRule] = []
 
     def find_sub_paths(self) -> None:
-        """Find the rules for the migrated types; a warning names those for which there is none."""
+        """Find the rules for the migrated field types; print a warning for each type without one."""
         self.sub_rules_valid = True
         for old_name, new_name in self.migrated_types:
             try:
@@ -130,14 +130,14 @@ class MessageUpdateRule:
         return _class_named(t, self.old_types, self.old_type)
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a field's message from the old one, in update(). Raise BagMigrationException."""
+        """Fill a message field from the old one; called in update(). Raise BagMigrationException."""
         self._check_migrated(msg_from._type, msg_to._type)
         self.migrator.migrate(msg_from, msg_to)
 
     def migrate_array(
         self, msg_from_array: Sequence[Message], msg_to_array: list[Message], msg_to_name: str
     ) -> None:
-        """Fill an array of messages from the old one, in update(). Raise BagMigrationException, KeyError."""
+        """Fill an array of messages from the old one; called in update(). Raise BagMigrationException, KeyError."""
         msg_to_class = self.get_new_class(msg_to_name)
         msg_to_array[:] = [msg_to_class() for _ in msg_from_array]
         if msg_from_array:
@@ -145,11 +145,11 @@ class MessageUpdateRule:
             self.migrator.migrate_array(msg_from_array, msg_to_array)
 
     def get_class_def(self) -> str | None:
-        """Return the rule's text for a .bmr file, if it was made from two types."""
+        """Return the source code of a generated rule for a .bmr file; None for other rules."""
         return None
 
     def apply(self, old_msg: Message) -> Message:
-        """Return a new message made from an old one. Raise BagMigrationException."""
+        """Return a new message converted from an old one. Raise BagMigrationException."""
         if not self.valid:
             raise BagMigrationException("Attempted to apply an invalid rule")
         if not self.sub_rules_done:
@@ -182,7 +182,7 @@ class MessageUpdateRule:
 
 
 def clean_name(name: str, top_name: str) -> str:
-    """Return a type's name without std_msgs and without the package of the message that has it."""
+    """Remove the package from a type's name if it is std_msgs, or that of the enclosing message ``top_name``."""
     parts = name.split("/")
     for package in ("std_msgs", top_name.split("/", maxsplit=1)[0]):
         if package in parts:
@@ -191,7 +191,7 @@ def clean_name(name: str, top_name: str) -> str:
 
 
 def qualified_name(name: str, top_name: str) -> str:
-    """Return a type's name with its package; ``top_name`` is the message that has it."""
+    """Return a type's name with its package; ``top_name`` is the enclosing message."""
     clean = clean_name(name, top_name)
     if "/" in clean or clean in PRIMITIVES:
         return clean
@@ -199,7 +199,7 @@ def qualified_name(name: str, top_name: str) -> str:
 
 
 def get_message_key(c: MessageClass) -> Key | None:
-    """Return what identifies a message class: its type and md5sum; None of what is not one."""
+    """Return the key of a message class: its type and md5sum; None if it is not a message class."""
     try:
         return c._type, c._md5sum
     except AttributeError:
@@ -207,7 +207,7 @@ def get_message_key(c: MessageClass) -> Key | None:
 
 
 def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | None]:
-    """Return what identifies a migration from one class to another."""
+    """Return the key of a migration from one class to another."""
     return get_message_key(c1), get_message_key(c2)
 
 
@@ -219,7 +219,7 @@ def copy_message(msg_from: Message, msg_to: Message) -> None:
 
 
 def migration_default_value(field_type: str) -> str:
-    """Return the text of a new field's value in a .bmr file."""
+    """Return the source code of a new field's default value in a .bmr file."""
     type_ = _parsed(field_type)
     if type_.is_array:
         if type_.base in ("byte", "uint8"):
@@ -237,7 +237,7 @@ def migration_default_value(field_type: str) -> str:
 
 
 def constants_from_def(core_type: str, msg_def: str) -> set[tuple[str, object, str]]:
-    """Return the constants of a full text: name, value and type."""
+    """Return the constants of a full message definition: name, value and type."""
     from minirospy.core.idl.load import specs_of_text
 
     spec = specs_of_text(core_type, msg_def)[core_type]
@@ -250,7 +250,7 @@ Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 def make_update_rule(
     migrator: Migrator, old_class: MessageClass, new_class: MessageClass
 ) -> type[MessageUpdateRule]:
-    """Return the rule that copies the fields of one name; it is valid if nothing is lost or invented."""
+    """Return a rule that copies the fields of equal name; it is valid if no field is lost or needs an invented value."""
     lines: list[str] = []
     steps: list[Step] = []
     migrated: list[tuple[str, str]] = []
@@ -294,13 +294,13 @@ def make_update_rule(
 
 
 def make_old_half_rule(old_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return the invalid rule of a type that has moved to an unknown place."""
+    """Return an invalid rule from a type whose new type is unknown."""
     name = f"update__{old_class._type.replace('/', '_')}__{old_class._md5sum}"
     return _rule(name, old_class, None, ["pass"], [], valid=False)
 
 
 def make_new_half_rule(new_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return the invalid rule of a type that has come from an unknown place."""
+    """Return an invalid rule to a type whose old type is unknown."""
     name = f"update_to_{new_class._type.replace('/', '_')}_{new_class._md5sum}"
     return _rule(name, None, new_class, ["pass"], [], valid=False)
 
@@ -315,7 +315,7 @@ def _rule(
     valid: bool,
     update: Step | None = None,
 ) -> type[MessageUpdateRule]:
-    """Return a class that is also a text for a .bmr file."""
+    """Return a rule class that also has its own source code for a .bmr file."""
     old_type, old_text = (old_class._type, old_class._full_text.strip()) if old_class else ("", "")
     new_type, new_text = (new_class._type, new_class._full_text.strip()) if new_class else ("", "")
     pairs = "".join(f'\n\t\t("{old}","{new}"),' for old, new in migrated)
@@ -343,12 +343,12 @@ def _rule(
 
 
 def _quoted(text: str) -> str:
-    """Return a definition as it is written between three quotes: it must not end them."""
+    """Return a definition escaped for a triple-quoted string."""
     return text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
 
 
 def _mismatch(old_type: str | None, new_type: str) -> str:
-    """Return why a field cannot be copied as it is, "" if it can, as far as its form goes."""
+    """Return the reason why a field cannot be copied, judged by array form and primitive type; "" if it can."""
     if old_type is None:
         return "No matching field name in old message"
     old, new = _parsed(old_type), _parsed(new_type)
@@ -366,7 +366,10 @@ def _mismatch(old_type: str | None, new_type: str) -> str:
 
 
 def _message_pair(migrator: Migrator, old: tuple[str, str], new: tuple[str, str]) -> tuple[str, str] | str:
-    """Return the names of two fields' message types, or why none becomes the other; given are (field, message)."""
+    """Return the names of two fields' message types, or the reason why there is no migration between them.
+
+    ``old`` and ``new`` are pairs: the field's type, and the type of its message.
+    """
     old_base, new_base = _parsed(old[0]).base, _parsed(new[0]).base
     pair = clean_name(old_base, old[1]), clean_name(new_base, new[1])
     old_name, new_name = qualified_name(old_base, old[1]), qualified_name(new_base, new[1])
@@ -409,7 +412,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Return the classes of a full text, and the first one; nothing if a rule is for half a migration."""
+    """Return the classes of a full definition, and the first of them; ({}, None) without a type, or for a bad definition."""
     from minirospy.core.idl.load import classes_from_text
 
     if not type_:

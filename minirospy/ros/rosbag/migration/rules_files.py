@@ -1,7 +1,7 @@
-"""Migration of stored messages to the types that are installed: a path of rules from each old type to its newest one.
+"""Migration of stored messages to the installed types: a path of rules from each old type to its newest version.
 
-Explicit rules come from .bmr files, ordered by type; what connects them, and what is not renamed, is made from the two
-types. Source: http://wiki.ros.org/rosbag/migration.
+Explicit rules come from .bmr files, ordered by type. The rules between them, and those for types that keep their name, are
+generated from the two types. Source: http://wiki.ros.org/rosbag/migration.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = [
 
 
 class RuleChain:
-    """The explicit rules of one type: updates by their order, then perhaps a change of its name."""
+    """The explicit rules of one type: its updates by ``order``, then the rule that renames it, if there is one."""
 
     def __init__(self) -> None:
         self.chain: list[MessageUpdateRule] = []
@@ -48,12 +48,12 @@ class RuleChain:
         self.rename: MessageUpdateRule | None = None
 
     def rules(self) -> list[MessageUpdateRule]:
-        """Return all rules in their order."""
+        """Return all rules in order."""
         return [*self.chain, *([self.rename] if self.rename else [])]
 
 
 class ScaffoldNode:
-    """A step of a path: from one class to another by a rule; ``next`` is the step that follows."""
+    """A step of a path: converts one class to another by a rule; ``next`` is the following step."""
 
     def __init__(
         self, old_class: MessageClass, new_class: MessageClass, rule: MessageUpdateRule | None
@@ -74,19 +74,19 @@ class ScaffoldNode:
         self._rule = rule
 
     def has_rule(self) -> bool:
-        """Return whether the rule has been made."""
+        """Return whether this step has a rule yet."""
         return self._rule is not None
 
 
 class Migration(NamedTuple):
-    """A type that is to be migrated: its path, and the rules of it that are missing."""
+    """A type that needs migration: the path, and the rules on it that are missing."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
 
 
 class MessageMigrator:
-    """Migrates messages by the rules of files, and of packages that export rules (``plugins``).
+    """Migrates messages by the rules of .bmr files, and of packages that export rules (``plugins``).
 
     Raise BagMigrationException if a rule is marked as not valid.
     """
@@ -116,17 +116,17 @@ class MessageMigrator:
         }
 
     def lookup_type(self, key: Key) -> MessageClass:
-        """Return the class with a type and md5sum that the rules know, or None."""
+        """Return the class with this type and md5sum from the rules' definitions, or None."""
         return self.class_dict.get(key)
 
     def add_update_rule(self, r: MessageUpdateRule) -> None:
-        """Add an explicit rule; what does not suit the others is reported and ignored."""
+        """Add an explicit rule; report and ignore a rule that conflicts with others."""
         if not r.valid:
             print(f"ERROR: Update rule [{r.location}] has valid set to False.", file=sys.stderr)
             self.false_rule_loaded = True
             return
         if r.old_class is None or r.new_class is None:
-            return  # its definitions are not valid, which has been reported
+            return  # its definitions are invalid, which has been reported
         why = self._why_renaming_fails(r) if r.rename_rule else self._why_updating_fails(r)
         if why:
             print(f"WARNING: {why}", file=sys.stderr)
@@ -150,21 +150,21 @@ class MessageMigrator:
         return self.filter_rules_unique(rules)
 
     def filter_rules_unique(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
-        """Return the rules without repetitions."""
+        """Return the rules without duplicates."""
         found: dict[tuple[Key | None, Key | None], MessageUpdateRule] = {}
         for rule in rules:
             found.setdefault(get_path_key(rule.old_class, rule.new_class), rule)
         return list(found.values())
 
     def expand_rules(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
-        """Return the rules and those that they need, without repetitions."""
+        """Return the rules and the rules that they depend on, without duplicates."""
         expanded = []
         for rule in self.filter_rules_unique(rules):
             expanded += [rule, *self.expand_rules(rule.sub_rules)]
         return self.filter_rules_unique(expanded)
 
     def scaffold_range(self, old_type: str, new_type: str) -> list[ScaffoldNode]:
-        """Return the steps from the first rule of a type as far as the last one of ``new_type``."""
+        """Return the steps from the first rule of ``old_type`` to the last rule that yields ``new_type``."""
         node = self.first_type.get(old_type)
         if node is None:
             return []
@@ -180,7 +180,7 @@ class MessageMigrator:
         return found
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
-        """Return the installed class that messages of a class become, or None."""
+        """Return the installed class to which messages of this class are migrated, or None."""
         from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
@@ -195,7 +195,7 @@ class MessageMigrator:
         return self.found_targets[key]
 
     def find_path(self, old_class: MessageClass, new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from one class to another; rules that are missing are made, and not valid."""
+        """Return the steps from one class to another; a missing rule is generated, and may be invalid."""
         key = get_path_key(old_class, new_class)
         if key not in self.found_paths:
             if new_class is None:
@@ -212,7 +212,7 @@ class MessageMigrator:
         msg_from: tuple[str, bytes, str, object, MessageClass],
         msg_to: tuple[str, object, str, object, MessageClass],
     ) -> tuple[str, bytes, str, object, MessageClass]:
-        """Return a raw message (type, bytes, md5sum, position, class) as the new type. Raise BagMigrationException."""
+        """Return a raw message (type, bytes, md5sum, position, class) converted to the new type. Raise BagMigrationException."""
         path = self._valid_path(msg_from[4], msg_to[4], msg_from[0], msg_to[0])
         body = msg_from[1]
         if path and msg_from[2] != msg_to[2]:
@@ -234,28 +234,28 @@ class MessageMigrator:
         copy_message(self._apply(path, message), msg_to)
 
     def migrate_array(self, msg_from_array: Sequence[Message], msg_to_array: Sequence[Message]) -> None:
-        """Fill messages of a new type from as many of an old type. Raise BagMigrationException."""
+        """Fill messages of a new type from the same number of messages of an old type. Raise BagMigrationException."""
         if len(msg_from_array) != len(msg_to_array):
             raise BagMigrationException("Migrate array called on on arrays of unequal length.")
         for old, new in zip(msg_from_array, msg_to_array, strict=True):
             self.migrate(old, new)
 
     def make_update_rule(self, old_class: MessageClass, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return the rule that copies the fields of one name."""
+        """Return a rule that copies the fields of equal name."""
         return make_update_rule(self, old_class, new_class)
 
     def make_old_half_rule(self, old_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return the invalid rule of a type that has moved to an unknown place."""
+        """Return an invalid rule from a type whose new type is unknown."""
         return make_old_half_rule(old_class)
 
     def make_new_half_rule(self, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return the invalid rule of a type that has come from an unknown place."""
+        """Return an invalid rule to a type whose old type is unknown."""
         return make_new_half_rule(new_class)
 
     # -- loading
 
     def _load(self, path: Path, name: str) -> None:
-        """Execute a rule file, which is Python, and add its rules."""
+        """Execute a rule file, which is Python code, and add its rules."""
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)
@@ -311,7 +311,7 @@ class MessageMigrator:
     # -- the scaffold
 
     def _build(self) -> None:
-        """Connect the explicit rules of each type, and its end to the next name or to the installed class."""
+        """Link the explicit rules of each type, and the last of them to the next type name or the installed class."""
         ends = []
         for type_, chain in list(self.rulechains.items()):
             self.rename_map[type_] = self._names_of(type_)
@@ -346,7 +346,7 @@ class MessageMigrator:
         return names
 
     def _connect(self, end: ScaffoldNode) -> None:
-        """Connect the last rule of a type to what follows it."""
+        """Link the last rule of a type to the step that follows."""
         from minirospy.core.idl.load import get_message_class
 
         installed = get_message_class(end.new_class._type)
@@ -364,7 +364,7 @@ class MessageMigrator:
                 if get_message_key(node.old_class) == get_message_key(end.new_class):
                     end.next = node
                     return
-            # As late in the chain as a rule can be made, so that nothing is converted twice.
+            # Join the chain at its latest possible step, so that no message is converted twice.
             for node in reversed(following if end.next is None else []):
                 rule = self._made(end.new_class, node.old_class)
                 if rule.valid:
@@ -377,7 +377,7 @@ class MessageMigrator:
             end.next = self._node(end.new_class, None, rule)
 
     def _path_to_nowhere(self, old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the path of a type that is not installed: its end is a rule to be written."""
+        """Return the path of a type that is not installed; it ends with a rule for the user to write."""
         steps = self.scaffold_range(old_class._type, "")
         steps = self._from_start(steps, old_class) or steps
         last = steps[-1].new_class if steps else old_class
@@ -402,7 +402,7 @@ class MessageMigrator:
         return [self._extra(old_class, first, self._made_whole(old_class, first)), *steps]
 
     def _to_end(self, steps: list[ScaffoldNode], new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps as far as the new class, with one that is made where none leads there."""
+        """Return the steps up to the new class, adding a generated step if none leads to it."""
         candidates = []
         for number, node in reversed(list(enumerate(steps))):
             if node.new_class is None or node.new_class._type != new_class._type:
@@ -426,7 +426,7 @@ class MessageMigrator:
         return []
 
     def _from_start(self, steps: list[ScaffoldNode], old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from the old class, with one that is made where none starts there; [] if none can be."""
+        """Return the steps from the old class, adding a generated step if none starts there; [] if no valid one exists."""
         if exact := self._exact_start(steps, old_class):
             return exact
         for number, node in reversed(list(enumerate(steps))):

@@ -1,4 +1,4 @@
-"""One file of a recording: written as ``NAME.active`` by the disk's thread, renamed when it is complete."""
+"""One file of a recording: written as ``NAME.active`` by the disk thread, renamed when complete."""
 
 from __future__ import annotations
 
@@ -20,42 +20,42 @@ __all__ = ["BagFile", "FileWriter"]
 _UNLIMITED = 2**31
 _KNOWN_HEADERS = 10_000
 _DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
-"""What a bag needs, and third-party publishers may leave out of their connection headers."""
+"""Fields that a bag requires, and that third-party publishers may omit from their connection headers."""
 
 
 class FileWriter(Protocol):
-    """The common part of the writers of bags and of MCAP files."""
+    """The common interface of the writers of bags and of MCAP files."""
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far."""
+        """Size of the file in bytes so far."""
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory that the stream has not been given."""
+        """Bytes in memory that have not been passed to the stream yet."""
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
-        """Return the number of a new connection."""
+        """Add a connection and return its number."""
 
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
         """Write a message."""
 
     def write_ready(self) -> None:
-        """Write the complete chunks whose compression has ended."""
+        """Write the complete chunks whose compression has finished."""
 
     def close(self) -> None:
-        """Complete the file."""
+        """Write the end of the file."""
 
     def salvage(self, written: int | None = None) -> int:
-        """Complete a file whose stream has failed; return how many messages are lost."""
+        """Complete a file whose stream has failed; return the number of lost messages."""
 
 
 class BagFile:
-    """A bag that is being recorded. Methods are called under ``lock``.
+    """A bag that is being recorded. Call its methods with ``lock`` held.
 
-    ``on_error(file, error, lost)`` is called in the disk's thread when the disk, or a compression, has failed; by then the
-    file is readable, has its final name, and lacks ``lost`` messages (-1: it could not be completed). Raise OSError if it
-    cannot be created.
+    ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then the file is
+    readable and has its final name, but lacks ``lost`` messages (-1: the file could not be completed). Raise OSError if the
+    file cannot be created.
     """
 
     def __init__(
@@ -82,24 +82,24 @@ class BagFile:
 
     @property
     def active_name(self) -> str:
-        """The name while it is written."""
+        """The file's name while it is being written."""
         return str(self._active)
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far."""
+        """Size of the file in bytes so far."""
         return self._writer.size
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory besides those that the disk's thread has queued."""
+        """Bytes in memory, not counting those in the disk thread's queue."""
         return self._writer.gathered
 
     def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
-        """Write a message that came with this connection header. Raise BagFormatError."""
+        """Write a message that arrived with this connection header. Raise BagFormatError."""
         if self._is_closed:
             return
-        # All messages of a link come with the same object.
+        # All messages of a connection share the same header object.
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
         try:
@@ -110,7 +110,7 @@ class BagFile:
             self._give_up(error)
 
     def write_ready(self) -> None:
-        """Write what has been compressed since the last message."""
+        """Write chunks whose compression has finished since the last message."""
         if not self._is_closed:
             try:
                 self._writer.write_ready()
@@ -118,11 +118,11 @@ class BagFile:
                 self._give_up(error)
 
     def close(self) -> None:
-        """Complete the file in the disk's thread, behind what is queued."""
+        """Complete the file in the disk thread, after its queued writes."""
         self._disk.submit(self._finish)
 
     def _connection(self, topic: str, header: Mapping[str, str]) -> int:
-        # A publisher that has connected again is the same connection.
+        # A publisher that reconnects keeps its connection number.
         key = topic, frozenset(header.items())
         number = self._by_content.get(key)
         if number is None:
@@ -146,7 +146,7 @@ class BagFile:
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:
-        """End the file behind what is queued, as a chunk could not be compressed."""
+        """Complete the file after its queued writes, because a chunk could not be compressed."""
         self._is_closed = True
         self._disk.submit(lambda: self._salvage(error))
 
@@ -154,7 +154,7 @@ class BagFile:
         with self._lock:
             if self._is_closed:
                 return
-            # No message is written from now on.
+            # This stops further writes.
             self._is_closed = True
         self._salvage(error)
 
@@ -180,6 +180,6 @@ def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | 
         compression=options.compression,
         chunk_threshold=options.chunk_size,
         executor=executor,
-        # The recorder limits what waits, in bytes.
+        # the recorder itself limits the queued bytes
         most_waiting=_UNLIMITED,
     )

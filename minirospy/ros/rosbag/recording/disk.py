@@ -1,6 +1,6 @@
-"""Files that are written by a thread: the caller does not wait for the disk.
+"""Files that are written by a thread, so that the caller does not wait for the disk.
 
-What is queued counts in :attr:`DiskThread.pending`; the caller decides what to do when that becomes too much.
+:attr:`DiskThread.pending` counts the queued bytes; the caller decides how to limit them.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ Buffer = bytes | bytearray | memoryview
 
 
 class DiskThread:
-    """Does what is queued, in order, in a thread that starts with it. ``close`` waits for the queue's end.
+    """Runs queued calls in order, in a thread that it starts. ``close`` waits until the queue is empty.
 
-    ``on_error(error)`` is called in that thread with what a call raises; the next call follows.
+    If a call raises an exception, ``on_error(error)`` is called in that thread, and the next call follows.
     """
 
     def __init__(self, on_error: Callable[[Exception], object]) -> None:
         self._on_error = on_error
         self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
-        # Two counters, each changed by one side only: no lock.
+        # Each counter is written by one side only, so no lock is needed.
         self._queued = self._done = 0
         self._thread = threading.Thread(target=self._run, name="rosbag-disk")
         self._thread.start()
 
     @property
     def pending(self) -> int:
-        """Bytes that are queued and not written yet."""
+        """Bytes that are queued and not yet written."""
         return self._queued - self._done
 
     @property
@@ -43,12 +43,12 @@ class DiskThread:
         return threading.current_thread() is self._thread
 
     def submit(self, function: Callable[[], object], size: int = 0) -> None:
-        """Queue a call, which writes ``size`` bytes. Of several threads one at a time."""
+        """Queue a call, which writes ``size`` bytes. Not thread-safe: callers must serialize their calls."""
         self._queued += size
         self._queue.put((function, size))
 
     def close(self) -> None:
-        """Wait until all is done, and end."""
+        """Wait until all queued calls are done, and stop the thread."""
         self._queue.put(None)
         self._thread.join()
 
@@ -63,11 +63,11 @@ class DiskThread:
 
 
 class QueuedFile:
-    """A new file for a bag's writer, which is a stream as far as that needs one.
+    """A new file with the stream methods that a bag's writer needs.
 
-    Calls are queued, and done immediately if the disk's thread itself makes them.
+    Calls are queued; a call from the disk thread itself runs immediately.
 
-    ``on_error(error)`` is called in that thread at the first error; what is still queued for the file is dropped then.
+    ``on_error(error)`` is called in that thread at the first error; the file's other queued calls are then dropped.
     Raise OSError if the file cannot be created.
     """
 
@@ -77,19 +77,19 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # Its name may be guessed, by the time: a link that waits there is not followed.
+        # The name contains the time, so it can be guessed: open_file does not follow a symbolic link placed there.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
     def write(self, data: Buffer) -> int:
-        """Write all of ``data``, which must not change any more."""
+        """Write all of ``data``, which must not change afterwards."""
         size = len(data)
         self._position += size
         self._do(lambda: self._write_all(data), size)
         return size
 
     def read(self, size: int = -1) -> bytes:
-        """Return the bytes at the current position. In the disk's thread."""
+        """Return the bytes at the current position. Call only in the disk thread."""
         data = self._file.read(size) or b""
         self._position += len(data)
         return data
@@ -97,31 +97,31 @@ class QueuedFile:
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek from the start, or to the end."""
         if whence == os.SEEK_END:
-            # The writer seeks back to the header only, and then to the end, where nothing follows.
+            # The writer seeks only to the header and then back to the end, without writing after that.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))
         return offset
 
     def truncate(self, size: int | None = None) -> int:
-        """Cut the file off at the current position."""
+        """Truncate the file at the current position, or at ``size``."""
         position = self._position if size is None else size
         self._do(lambda: self._file.truncate(position))
         return position
 
     def tell(self) -> int:
-        """Return the position where the next write goes."""
+        """Return the position of the next write."""
         return self._position
 
     def flush(self) -> None:
-        """Do nothing: the operating system has what is written."""
+        """Do nothing: the file is unbuffered."""
 
     def written(self) -> int:
-        """Return how many bytes the file has. In the disk's thread."""
+        """Return the size of the file in bytes. Call only in the disk thread."""
         return os.fstat(self._file.fileno()).st_size
 
     def close_file(self) -> None:
-        """Close the file behind what is queued."""
+        """Close the file after its queued writes."""
         self._do(self._file.close)
 
     def _do(self, call: Callable[[], object], size: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""Message classes whose messages are the bytes as they came, for recording and playing."""
+"""Message classes that carry serialized bytes unchanged, for recording and playing."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ __all__ = ["ReceivedFrame", "frame_class", "parts_of"]
 
 
 class ReceivedFrame(AnyMsg):
-    """A message of any type as it came: ``frame`` is valid during the callback only, unless it is ``bytes``."""
+    """A received message of any type: ``frame`` has its bytes, valid only during the callback unless it is ``bytes``."""
 
     __slots__ = ["frame"]
     frame: Buffer
 
     def deserialize(self, str: Buffer) -> ReceivedFrame:
-        """Take the bytes, without a copy."""
+        """Store the bytes without a copy."""
         self.frame = str
         return self
 
 
 def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
-    """Return the bytes of a frame in two parts; the second is that of a large message which came in two, else empty."""
+    """Return a frame's bytes in two parts; the second is empty unless a large message was received in two parts."""
     if isinstance(frame, SplitFrame):
-        # A view of it sees the first part alone.
+        # A memoryview of it contains the first part only.
         return memoryview(frame), frame.tail
     return frame, b""
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a class of messages of this type that are published from their bytes, ``_buff``."""
+    """Return a message class of this type that is published from its serialized bytes, ``_buff``."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

@@ -1,4 +1,4 @@
-"""Single keys of the terminal, or characters of a pipe, while a program runs on."""
+"""Single keys from the terminal, or characters from a pipe, while a program runs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _POLL_SECONDS = 0.05
 
 @contextlib.contextmanager
 def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
-    """Call ``on_key`` with each key that is typed while the block runs, in a thread. Ctrl-C remains a signal.
+    """Call ``on_key`` from a thread with each key typed while the block runs. Ctrl-C remains a signal.
 
-    Without a standard input nothing is read; in the background a terminal is left alone.
+    Read nothing if there is no standard input; do not touch the terminal while the process is in the background.
     """
     stop = threading.Event()
     reader: Callable[[Callable[[str], object], threading.Event], None] | None = None
@@ -33,7 +33,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
     finally:
         stop.set()
         if thread:
-            # It restores the terminal.
+            # The thread restores the terminal before it exits.
             thread.join(10.0)
 
 
@@ -61,14 +61,14 @@ def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
 
 
 class _Terminal:
-    """A terminal whose keys come without Enter and without an echo, while this process is in its foreground."""
+    """A terminal in raw mode: keys arrive without Enter and without echo while this process is in the foreground."""
 
     def __init__(self, number: int) -> None:
         self._number = number
         self._before: list[object] | None = None
 
     def set_up(self) -> bool:
-        """Have the terminal pass each key; return False in the background, where a read would stop the process."""
+        """Switch the terminal to single keys; return False in the background, where a read would stop the process."""
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False
@@ -82,7 +82,7 @@ class _Terminal:
         return True
 
     def restore(self) -> None:
-        """Restore the settings that the terminal had."""
+        """Restore the terminal's settings."""
         if self._before is not None and os.tcgetpgrp(self._number) == os.getpgrp():
             import termios
 

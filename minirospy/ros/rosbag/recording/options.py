@@ -1,4 +1,4 @@
-"""The options of `rosbag record`, and the parsing of its words: sizes, durations, topics.
+"""The options of `rosbag record`, and the parsers of their values: sizes, durations, topics.
 
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
@@ -30,8 +30,7 @@ class RecordOptions(NamedTuple):
     regex: bool = False
     exclude: str = ""
     node: str = ""
-    prefix: str = ""
-    """The file's name without ``.bag``, or what is in front of the date."""
+    prefix: str = ""  # file name without .bag, or its part before the date
     append_date: bool = True
     split: bool = False
     max_splits: int = 0
@@ -39,8 +38,7 @@ class RecordOptions(NamedTuple):
     max_duration: int = 0
     buffer_size: int = 256 * MEGABYTE
     chunk_size: int = 768 * KILOBYTE
-    limit: int = 0
-    """Messages of each topic."""
+    limit: int = 0  # messages per topic
     min_space: int = 2**30
     min_space_text: str = "1G"
     compression: str = "none"
@@ -51,17 +49,17 @@ class RecordOptions(NamedTuple):
 
     @property
     def follows_master(self) -> bool:
-        """Return whether topics may be added while it runs: the master is queried every second."""
+        """Return whether topics may be added during the recording: the master is then queried every second."""
         return self.all_topics or self.regex or bool(self.node)
 
     @property
     def extension(self) -> str:
-        """The end of the files' names."""
+        """The extension of the files."""
         return ".mcap" if self.mcap else ".bag"
 
 
 def parse_duration(text: str) -> int:
-    """Return the nanoseconds of ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError."""
+    """Return the nanoseconds of a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError."""
     number = _NUMBER.match(text)
     if not number:
         raise UsageError("Duration must start with a floating point number.")
@@ -75,7 +73,7 @@ def parse_duration(text: str) -> int:
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes of ``1G``, ``500M``, ``20k`` or ``1000``: powers of 1024. Raise UsageError."""
+    """Return the bytes of a size such as ``1G``, ``500M``, ``20k`` or ``1000``; units are powers of 1024. Raise UsageError."""
     number = re.match(r"\s*\d+", text)
     multiplier = _MULTIPLIERS.get(text[number.end() :].lower()) if number else None
     if not number or not multiplier:
@@ -84,9 +82,9 @@ def parse_size(text: str) -> int:
 
 
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
-    """Return a function of a topic's global name: whether it is to be recorded. Raise UsageError on a bad expression.
+    """Return a predicate for global topic names: whether to record the topic. Raise UsageError on a bad expression.
 
-    ``subscribed_by_node``: for the topics that ``--node`` has brought, which need no further match. Expressions match whole
+    ``subscribed_by_node``: for topics found by ``--node``, which need not match the expressions. Expressions match whole
     names.
     """
     exclude = _compiled(options.exclude) if options.exclude else None

@@ -1,4 +1,4 @@
-"""What a player publishes into: this process's node, for `rosbag play`; another one for a player that is a part of a program."""
+"""The output of a player: this process's node for `rosbag play`; another one for a player inside a program."""
 
 from __future__ import annotations
 
@@ -24,69 +24,65 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-_SWITCH_SECONDS = 0.00005
-"""How long the thread that reads ahead may keep the GIL when a message is due."""
+_SWITCH_SECONDS = 0.00005  # GIL switch interval: the reading thread may delay a due message by this
 
-_STAMP = struct.Struct("<4xII")
-"""A message that starts with a Header: its sequence number, then the stamp."""
+_STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the stamp
 
-CLOCK = struct.Struct("<II")
-"""A message of rosgraph_msgs/Clock."""
+CLOCK = struct.Struct("<II")  # a serialized rosgraph_msgs/Clock: secs, nsecs
 
 
 class Controls(Protocol):
-    """What an output does with its player. From any thread."""
+    """The player's methods that an output uses. Thread-safe."""
 
     def end(self) -> None:
-        """End the playing."""
+        """Stop playing."""
 
     def set_paused(self, paused: bool) -> bool:
-        """Pause, or go on; return whether that changed anything."""
+        """Pause or resume; return whether that changed the state."""
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message of the topic that controls the rate."""
+        """Store the stamp of the last message on the rate control topic."""
 
 
 class Output(Protocol):
-    """The graph of a player. Called in the player's thread."""
+    """The destination of a player's messages. Its methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Have the player end with the graph. Called first."""
+        """Stop the player when the graph connection shuts down. Called first."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise what will be played: the connections, each with the number of its bag."""
+        """Advertise the topics to be played: the connections, each with the number of its bag."""
 
     def offer(self, player: Controls) -> None:
-        """Offer what controls the player."""
+        """Offer the means to control the player, such as a service."""
 
     def has_all_subscribers(self) -> bool:
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return the context that the playing runs in; ``on_key`` gets the keys that are typed meanwhile."""
+        """Return the context in which messages are played; meanwhile ``on_key`` is called with each typed key."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
-        """Publish a message of the bag of this number."""
+        """Publish a message from the bag with this number."""
 
     def publish_clock(self, time: int) -> None:
-        """Publish the bag's time."""
+        """Publish the bag time on /clock."""
 
     def waiting_bytes(self) -> int:
-        """Return how many bytes subscribers have not taken yet."""
+        """Return how many bytes are queued for subscribers."""
 
     def print(self, text: str, end: str = "\n") -> None:
-        """Print a line for a person."""
+        """Print a line for the user."""
 
 
 class _Outlet:
-    """The messages of one publisher of the bag on a topic: the publisher of that topic sends them."""
+    """One recorded publisher of a topic: its messages are sent by the publisher that all of them share."""
 
     def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
         self.publisher = publisher
         self.message = publisher.data_class()
         self.is_latched = is_latched
-        self.last: bytes | None = None
-        """The last message, if latched."""
+        self.last: bytes | None = None  # the last message, if latched
 
     def publish(self, body: bytes) -> None:
         self.message._buff = body
@@ -96,7 +92,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Gives a late subscriber the last message of each latched publisher of the bag: a topic itself keeps one only."""
+    """Sends the last message of each latched recorded publisher to late subscribers: a topic itself stores only one."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []
@@ -114,7 +110,7 @@ class _LateSubscribers(client.SubscribeListener):
 
 
 class NodeOutput:
-    """This process's node, which init_node has made, and the terminal."""
+    """An output that publishes by this process's node (init_node has been called) and prints to the terminal."""
 
     def __init__(self, options: PlayOptions) -> None:
         self._options = options
@@ -134,7 +130,7 @@ class NodeOutput:
             self._advertise(number, connection)
 
     def offer(self, player: Controls) -> None:
-        """Offer ~pause_playback, and follow the topic that controls the rate."""
+        """Offer the service ~pause_playback, and subscribe to the rate control topic."""
         from std_srvs.srv import SetBool, SetBoolResponse
 
         def pause(request: SetBoolRequest) -> SetBoolResponse:
@@ -156,10 +152,10 @@ class NodeOutput:
 
     @contextlib.contextmanager
     def running(self, on_key: Callable[[str], object]) -> Iterator[None]:
-        """Have this process's threads switch soon, and read keys, for as long as that lasts."""
+        """Shorten the GIL switch interval, and read keys, while the block runs."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
-        # A collection that visits all that was imported takes milliseconds.
+        # A garbage collection that visits all imported modules takes milliseconds.
         gc.freeze()
         try:
             with read_keys(on_key):
@@ -189,7 +185,7 @@ class NodeOutput:
         """See :meth:`Output.print`."""
         with contextlib.suppress(OSError, ValueError):
             if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
-                # The status line, written again and again in its place.
+                # The status line, which is rewritten in place.
                 sys.stdout.write_own(text)
                 text = ""
             print(text, end=end, flush=True)

@@ -1,4 +1,4 @@
-"""The node that plays bags: `rosbag play`. Messages are published as they were stored, never deserialized.
+"""The node that plays bags: `rosbag play`. Messages are published as stored, without deserializing.
 
 Source: http://wiki.ros.org/rosbag/Commandline#play.
 """
@@ -21,18 +21,15 @@ from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
 __all__ = ["Player", "PlayerState"]
 
 _SECOND = 10**9
-_TICK = _SECOND // 10
-"""The status line is printed so often, and a shutdown noticed."""
+_TICK = _SECOND // 10  # ns; interval of the status line and of shutdown checks
 
-_STALLED_SECONDS = 5.0
-"""A subscriber that takes nothing for so long at the end is not waited for."""
+_STALLED_SECONDS = 5.0  # at the end, give up on a subscriber that has read nothing for this long
 
-_LEAD = _SECOND // 500
-"""The first message is due so much later: the threads that start meanwhile do not delay it."""
+_LEAD = _SECOND // 500  # ns; delay of the first message, so that starting threads do not make it late
 
 
 class PlayerState(NamedTuple):
-    """The state of a player: the bag's time in nanoseconds, and how fast that runs."""
+    """The state of a player: the bag time in nanoseconds, and the rate at which it advances."""
 
     time: int
     rate: float
@@ -41,7 +38,7 @@ class PlayerState(NamedTuple):
 
 
 class Player:
-    """Plays bags: as this process's node, which init_node has made, unless there is another ``output``."""
+    """Plays bags on this process's node (init_node has been called), or on another ``output``."""
 
     def __init__(
         self,
@@ -50,12 +47,16 @@ class Player:
         on_ready: Callable[[int, int], object] | None = None,
         output: Output | None = None,
     ) -> None:
-        """``on_ready(first, last)`` gets the times of what is to be played, before that starts.
+        """``on_ready(first, last)`` is called before playing starts, with the times of the first and last message.
 
-        Its caller controls the player from then on by :meth:`control`: so the player stays at the end of the bags.
+        From then on the player can be controlled with :meth:`control`, so it waits at the end of the bags instead of
+        returning.
         """
         self.on_change: Callable[[], object] = lambda: None
-        """Called in the player's thread when :meth:`state` has changed by itself: a message was published, the end reached."""
+        """Called in the player's thread when :meth:`state` changes during playing:
+
+        a message was published, or the end was reached.
+        """
         self._output = output or NodeOutput(options)
         self._bags = bags
         self._options = options
@@ -93,10 +94,10 @@ class Player:
         latched = self._bags.last_latched(selection) if options.start else []
         self._span = first[1].time, last
         if self._on_ready:
-            # Its clock does not advance until the playing starts.
+            # A paused schedule: its clock must not advance until playing starts.
             self._schedule = Schedule(options._replace(paused=True), *self._span, time.perf_counter_ns())
             self._on_ready(*self._span)
-        # From here on the files are its thread's.
+        # From here on only the reading thread uses the files.
         messages = ReadAhead(self._bags.messages(selection))
         with contextlib.closing(messages):
             self._wait_before(latched)
@@ -105,7 +106,7 @@ class Player:
         return 0
 
     def state(self) -> PlayerState:
-        """Return where the player is. From any thread."""
+        """Return the state of the player. Thread-safe."""
         with self._lock:
             schedule = self._schedule
             if schedule is None:
@@ -123,9 +124,9 @@ class Player:
         is_looping: bool | None = None,
         has_clock: bool | None = None,
     ) -> None:
-        """Pause or go on, change the rate, go on at another time of the bag, start again at its end, show the clock.
+        """Pause or resume, set the rate, seek to a time in the bag, loop, or publish /clock. None leaves a setting as it is.
 
-        From any thread.
+        Thread-safe.
         """
         now = time.perf_counter_ns()
         with self._lock:
@@ -141,7 +142,7 @@ class Player:
             if seek is not None:
                 self._seek_to = min(max(seek, self._span[0]), self._span[1])
                 self._is_fresh = True
-                # What is shown until the files have been read from there.
+                # state() reports this time until the files have been read from there.
                 schedule.seek(self._seek_to, now)
             if is_paused is not None and not self._is_started:
                 self._starts_paused = is_paused
@@ -154,7 +155,7 @@ class Player:
         self._wait.wake()
 
     def step(self, count: int = 1) -> None:
-        """Publish the next messages, if paused. From any thread."""
+        """Publish the next ``count`` messages, if paused. Thread-safe."""
         with self._lock:
             for _ in range(count if self._schedule else 0):
                 assert self._schedule
@@ -168,11 +169,11 @@ class Player:
 
     @property
     def is_looping(self) -> bool:
-        """Return whether it starts again at the end."""
+        """Return whether playing restarts at the end."""
         return self._options.loop
 
     def set_paused(self, paused: bool) -> bool:
-        """Pause, or go on; return whether that changed anything. From any thread."""
+        """Pause or resume; return whether that changed the state. Thread-safe."""
         with self._lock:
             if self._schedule and self._is_started:
                 changed = self._schedule.set_paused(paused, time.perf_counter_ns())
@@ -183,19 +184,19 @@ class Player:
         return changed
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message of the topic that controls the rate. From any thread."""
+        """Store the stamp of the last message on the rate control topic. Thread-safe."""
         with self._lock:
             if self._schedule:
                 self._schedule.control_rate(stamp)
         self._wait.wake()
 
     def end(self) -> None:
-        """Have :meth:`run` return. From any thread, and from the handler of a signal."""
+        """Make :meth:`run` return. Safe in any thread and in signal handlers."""
         self._ended = True
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
-        """Wait for subscribers, as the options demand; publish what was latched before the start."""
+        """Wait for the delay and for subscribers, as the options require; publish messages latched before the start."""
         options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)
@@ -208,16 +209,16 @@ class Player:
             self._wait_for_subscribers()
 
     def _play_precisely(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
-        """Play in the output's context."""
+        """Play all messages in the output's context."""
         messages.wait()
-        # Before the keys are read: the first ones count.
+        # Start the schedule before the keys are read, so that the first keys have an effect.
         with self._lock:
             self._start(span)
         with self._output.running(self._on_key):
             self._play_all(messages, selection, span)
 
     def _start(self, span: tuple[int, int]) -> None:
-        """Start the clock, with what was requested since the schedule was made."""
+        """Start the clock, applying the requests made since the schedule was created."""
         now = time.perf_counter_ns()
         schedule, self._is_started = self._schedule, True
         if schedule is None:
@@ -243,7 +244,7 @@ class Player:
                         break
                     self._publish(number, message)
             if self._schedule and not self._ended and not self._options.quiet:
-                # All of it has been played, however long ago the last line was.
+                # Show the final state, even if the last status line was printed a moment ago.
                 self._show_status(self._schedule, time.perf_counter_ns())
             if self._on_ready and not self._options.loop:
                 self._wait_at_end()
@@ -263,14 +264,14 @@ class Player:
             messages.wait()
             with self._lock:
                 if self._schedule and self._on_ready:
-                    # With the rate that was set meanwhile.
+                    # Keep the schedule: its rate may have been changed.
                     self._schedule.seek(span[0], time.perf_counter_ns())
                 else:
                     self._schedule = Schedule(self._options, *span, time.perf_counter_ns() + _LEAD)
             self.on_change()
 
     def _wait_for_slow_subscribers(self) -> None:
-        """Wait while subscribers take what is left: it ends with this process."""
+        """Wait while subscribers read the queued messages, which are lost when this process exits."""
         left, end = 0, 0.0
         while not self._ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()
@@ -281,7 +282,7 @@ class Player:
             self._sleep(_TICK // 10)
 
     def _wait_at_end(self) -> None:
-        """Wait for a seek; the keys and the clock work as ever."""
+        """Wait at the end for a seek or looping; keys and /clock keep working."""
         schedule = self._schedule
         assert schedule
         self._is_at_end = self._seek_to is None
@@ -298,7 +299,7 @@ class Player:
         return start
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Return the messages from a time on, after publishing what was latched before."""
+        """Return the messages from ``start`` on; first publish those that were latched before it."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):
@@ -307,13 +308,13 @@ class Player:
         found.wait()
         with self._lock:
             if self._schedule and self._seek_to is None:
-                # Steps that were requested meanwhile count.
+                # Keep the steps that were requested meanwhile.
                 self._schedule.seek(start, time.perf_counter_ns(), keeps_steps=True)
         self.on_change()
         return found
 
     def _play(self, message: StoredMessage) -> bool:
-        """Wait until a message is due; return False at a shutdown, and where another time is wanted."""
+        """Wait until a message is due and return True; return False at shutdown or if a seek is requested."""
         schedule = self._schedule
         assert schedule
         now = time.perf_counter_ns()
@@ -328,10 +329,10 @@ class Player:
                     return False
                 wait = schedule.poll(now)
                 if wait is None:
-                    # A client that sees the new time counts its steps from there.
+                    # Set together with the new time: a client that sees this time counts its steps from here.
                     self._is_fresh = False
             if wait is None:
-                # At a step the clock shows the message's time first.
+                # When stepping, /clock shows the message's time before the message is published.
                 self._tick(schedule, now)
                 return True
             now = self._wait.until(min(wait, self._next_line) if not self._options.quiet else wait)
@@ -352,7 +353,7 @@ class Player:
         self.on_change()
 
     def _tick(self, schedule: Schedule, now: int) -> None:
-        """Publish the clock and print the status line, where it is time for that."""
+        """Publish /clock and print the status line if they are due."""
         if self._options.clock:
             with self._lock:
                 shown = schedule.tick(now)

@@ -1,4 +1,4 @@
-"""Waiting until a point in time, to some microseconds, and ending the wait early."""
+"""Waiting until a point in time with a precision of microseconds; the wait can be interrupted."""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-_EVENT_NS = 5_000_000
-"""Longer waits are waits for the event, which are less precise; the last of these nanoseconds are slept."""
+_EVENT_NS = 5_000_000  # wait on the event, which is imprecise, until this close to the deadline, then sleep
 
-_TIMER_SLACK = 29
-"""PR_SET_TIMERSLACK of Linux's prctl: how late the kernel may wake a thread. 50 us unless it is set."""
+_TIMER_SLACK = 29  # Linux's PR_SET_TIMERSLACK: how late the kernel may wake a thread; 50 us by default
 
 
 class PreciseWait:
     """Waits on ``time.perf_counter_ns()``, which is precise on every OS.
 
-    For one thread, which makes it; any other, and a signal's handler, may call ``wake``.
+    Only the thread that creates it may wait; any thread, and a signal handler, may call ``wake``.
     """
 
     def __init__(self) -> None:
-        # A signal's handler wakes the thread that it interrupts.
+        # A signal handler may set it in the thread that waits on it.
         self._event = SignalSafeEvent()
         self._spin_ns = 150_000
         if sys.platform.startswith("linux"):
@@ -35,11 +33,11 @@ class PreciseWait:
                     self._spin_ns = 40_000
 
     def wake(self) -> None:
-        """End the current wait, or the next one, if it is a long one."""
+        """Interrupt the current wait, or the next one, if it is longer than 5 ms."""
         self._event.set()
 
     def until(self, wall: int) -> int:
-        """Wait until ``wall``, or until :meth:`wake` is called; return the time."""
+        """Wait until time ``wall``, or until :meth:`wake` is called; return the current time."""
         while True:
             now = time.perf_counter_ns()
             rest = wall - now
@@ -52,5 +50,5 @@ class PreciseWait:
             elif rest > self._spin_ns:
                 time.sleep((rest - self._spin_ns) / 1e9)
             else:
-                # Busy-poll, but let the threads that send have the GIL.
+                # Busy-poll, but release the GIL for the threads that send.
                 time.sleep(0)

@@ -1,7 +1,7 @@
-"""The node that records topics: `rosbag record`. Messages are written as they came, never deserialized.
+"""The node that records topics: `rosbag record`. Messages are written as received, without deserializing.
 
-The workers that receive messages write them into the current chunk; a complete chunk is queued for the disk's thread. So
-nothing but the disk itself limits what is recorded, and what it cannot take is dropped and counted, topic by topic.
+The workers that receive messages write them into the current chunk; complete chunks are queued for the disk thread. So only
+the disk limits the recording. If it is too slow, messages are dropped and counted per topic.
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
 
@@ -41,7 +41,7 @@ _PATIENCE_SECONDS = 2.0
 
 
 class _Topic:
-    """A topic that is recorded: its subscriber, and how many messages it still takes (-1: any number)."""
+    """A recorded topic: its subscriber, and how many more messages to record (-1: no limit)."""
 
     def __init__(self, name: str, left: int) -> None:
         self.name = name
@@ -50,17 +50,15 @@ class _Topic:
 
 
 class Recorder:
-    """Records topics from :meth:`run` on, as this process's node, which init_node has made.
+    """Records topics in :meth:`run`, on this process's node (init_node has been called).
 
-    Raise UsageError if an expression in ``options`` is wrong.
+    Raise UsageError if an expression in ``options`` is invalid.
     """
 
     def __init__(self, options: RecordOptions) -> None:
         self.options = options
-        self.status = 0
-        """The exit status: 1 once the disk has failed."""
-        self.dropped: Counter[str] = Counter()
-        """Messages of each topic that the disk was too slow for."""
+        self.status = 0  # exit status: 1 after a failure, such as a disk error
+        self.dropped: Counter[str] = Counter()  # messages dropped per topic because the disk was too slow
         self._matches = topic_filter(options)
         self._matches_node = topic_filter(options, subscribed_by_node=True)
         self._topics: dict[str, _Topic] = {}
@@ -76,11 +74,11 @@ class Recorder:
         self._announcement: client.Publisher[Message] | None = None
 
     def stop(self) -> None:
-        """Have :meth:`run` complete the file and return. From any thread."""
+        """Make :meth:`run` complete the file and return. Thread-safe."""
         self._stop.set()
 
     def run(self) -> int:
-        """Record until the node shuts down, or a limit of the options is reached; return the exit status."""
+        """Record until the node shuts down or a limit of the options is reached; return the exit status."""
         client.on_shutdown(self.stop)
         if self.options.publish:
             from std_msgs.msg import String
@@ -95,7 +93,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # In a thread, which no Ctrl-C interrupts, and which the process waits for in any case.
+        # In a thread: Ctrl-C does not interrupt it, and the process waits for it before it exits.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -105,7 +103,7 @@ class Recorder:
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            # A second Ctrl-C, or a registration was ended by the shutdown.
+            # A second Ctrl-C, or the shutdown interrupted a registration.
             is_interrupted = True
         finally:
             self._stop.set()
@@ -115,7 +113,7 @@ class Recorder:
     # --- the main thread
 
     def _wait_for_time(self) -> bool:
-        """Wait until there is a time; return False at a shutdown."""
+        """Wait until ROS time is valid; return False at shutdown."""
         if not client.is_wallclock():
             self._clock = lambda: client.get_rostime().to_nsec()
             is_reported = False
@@ -169,7 +167,7 @@ class Recorder:
         )
 
     def _follow_master(self) -> None:
-        """Subscribe to the topics that have appeared."""
+        """Subscribe to topics that have appeared on the master."""
         master = current_session().master
         try:
             state = master.get_system_state()
@@ -186,7 +184,7 @@ class Recorder:
                     self._subscribe(name)
 
     def _check_space(self) -> bool:
-        """Warn when the disk becomes full, and stop before it is; return whether there is room."""
+        """Warn when the disk is nearly full, and stop recording before it is full; return whether there is room."""
         file, least, text = self._file, self.options.min_space, self.options.min_space_text
         if not file:
             return False
@@ -210,7 +208,7 @@ class Recorder:
         return True
 
     def _report_drops(self) -> None:
-        """Log what has been dropped since the last report."""
+        """Log the messages dropped since the last report."""
         with self._lock:
             new = self.dropped - self._reported
             self._reported = self.dropped.copy()
@@ -218,7 +216,7 @@ class Recorder:
             client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
 
     def _end_finished(self) -> None:
-        """Unsubscribe from topics that have their number of messages; stop when all have."""
+        """Unsubscribe from topics that have reached their message limit; stop when all have."""
         for topic in self._topics.values():
             if not topic.left and topic.subscriber:
                 topic.subscriber.unregister()
@@ -227,15 +225,16 @@ class Recorder:
             self._stop.set()
 
     def _wait_until_complete(self, is_interrupted: bool) -> None:
-        """Wait until the file is complete; further Ctrl-C do not end that, until the third ends the process.
+        """Wait until the file is complete. A second Ctrl-C does not interrupt this; a third terminates the process.
 
-        Report at each of them, and once where it takes long, how much is still to be written.
+        At each Ctrl-C, and once if it takes long, log how much is still to be written.
         """
         patience = time.monotonic() + _PATIENCE_SECONDS
-        # Not for the thread: to Python 3.10 and 3.11 it has ended when join() is interrupted.
+        # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks it as finished.
         while not self._finished.is_set():
             try:
-                # What this thread does is its clean-up: a shutdown need not interrupt it.
+                # This wait is the thread's clean-up after the shutdown: is_shutdown() keeps it from being
+                # interrupted.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -247,7 +246,7 @@ class Recorder:
     # --- the finisher's thread
 
     def _finish(self) -> None:
-        """Complete the file when the recording ends."""
+        """Wait for the recording to stop, and complete the file."""
         try:
             self._stop.wait()
             self._complete()
@@ -284,14 +283,14 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # With the time of the message that is the first of this file: they come before it.
+        # Stamp latched messages with the time of this file's first message, because they are written before it.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
             self._announcement.publish(self._announcement.data_class(name))
 
     def _waiting(self, file: BagFile) -> int:
-        """Return how many bytes wait for the disk."""
+        """Return how many bytes are not yet on disk."""
         return self._disk.pending + file.gathered
 
     def _close(self) -> None:
@@ -301,7 +300,7 @@ class Recorder:
             file.close()
 
     def _split(self, now: int) -> None:
-        """Go on in the next file where the time has come."""
+        """Continue in the next file if a limit is reached."""
         while self._file:
             action = self._splits.check(self._file.size, now)
             if action is Next.CONTINUE:
@@ -336,7 +335,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Chunks that have been compressed wait for the next message.
+                # Free memory: compressed chunks are otherwise written at the next message.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1
@@ -373,7 +372,7 @@ class Recorder:
 
 
 def _reason(error: Exception) -> str:
-    """Return why a file could not be written, in one line."""
+    """Return the reason for a write failure, in one line."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 

@@ -1,6 +1,6 @@
-"""When `rosbag play` publishes which message, and what its clock shows. Pure: the times of the wall are given.
+"""The timing of `rosbag play`: when to publish each message, and which time /clock shows. Pure: wall times are arguments.
 
-All times are integers of nanoseconds: of the bag, or of the wall, which may be any clock that runs on steadily.
+All times are integers in nanoseconds: either bag time, or the wall time of any monotonic clock.
 Source: http://wiki.ros.org/rosbag/Commandline#play.
 """
 
@@ -16,7 +16,7 @@ _SECOND = 10**9
 
 
 class PlayOptions(NamedTuple):
-    """The options of playing. Times in nanoseconds, of the bag where it matters."""
+    """The options of `rosbag play`. Times are in nanoseconds, of bag time if they refer to the bag."""
 
     prefix: str = ""
     immediate: bool = False
@@ -27,13 +27,11 @@ class PlayOptions(NamedTuple):
     delay: int = _SECOND // 5
     rate: float = 1.0
     start: int = 0
-    duration: int = 0
-    """0: all."""
+    duration: int = 0  # 0: all
     skip_empty: int | None = None
     loop: bool = False
     keep_alive: bool = False
-    topics: frozenset[str] = frozenset()
-    """Empty: all."""
+    topics: frozenset[str] = frozenset()  # empty: all
     pause_topics: frozenset[str] = frozenset()
     wait_for_subscribers: bool = False
     rate_control_topic: str = ""
@@ -46,36 +44,32 @@ class State(enum.Enum):
 
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
-    DELAYED = "DELAYED"
-    """Waiting for the topic that controls the rate."""
+    DELAYED = "DELAYED"  # waiting for the rate control topic
 
 
 class Status(NamedTuple):
-    """The contents of the status line: the bag's clock, and how far that is of the whole length."""
+    """The contents of the status line: the bag time, and how much of the total length has been played."""
 
     state: State
     time: int
     played: int
     length: int
-    delay: int
-    """How far the rate control topic is behind, while DELAYED."""
+    delay: int  # delay of the rate control topic, used if DELAYED
 
 
 class Schedule:
-    """Decides for one message after the other. ``offer`` the next one, and ``poll`` until that returns None: publish it."""
+    """Decides when to publish each message: ``offer`` it, then ``poll`` until that returns None, then publish it."""
 
     def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
-        """``first`` and ``last``: the bag's times of its messages; ``wall``: when the first one is due."""
+        """``first`` and ``last`` are the bag times of its messages; ``wall`` is the wall time at which the first is due."""
         self._options = options
         self._first = first
         self._last = last
-        self._origin = wall
-        """The wall's time of ``first``; each pause shifts it."""
+        self._origin = wall  # wall time of bag time ``first``; shifted by each pause
         self._message = first
         self._is_due = False
         self._clock = first
-        self._since = wall
-        """Since when it has been paused or delayed."""
+        self._since = wall  # wall time at which the current pause or delay started
         self._paused = options.paused
         self._steps = 0
         self._delayed = False
@@ -92,22 +86,22 @@ class Schedule:
 
     @property
     def rate(self) -> float:
-        """Return how fast the bag's clock runs, compared with the wall's."""
+        """Return the rate of bag time relative to wall time."""
         return self._rate
 
     def set_rate(self, rate: float, wall: int) -> None:
-        """Go on at another rate, from where the clock is."""
+        """Change the rate, keeping the current bag time."""
         self._advance(wall)
         self._rate = rate
         self._start_from(self._clock, wall)
 
     def set_clock(self, hz: float, wall: int) -> None:
-        """Have the clock tick so often from now on; 0: never."""
+        """Set the rate of /clock messages in Hz; 0 disables them."""
         self._period = max(1, int(_SECOND / hz)) if hz else 0
         self._next_tick = wall
 
     def seek(self, time: int, wall: int, *, keeps_steps: bool = False) -> None:
-        """Go on at another time of the bag; the next message is to be offered. Steps are forgotten, unless kept."""
+        """Continue at another bag time; offer the next message again. Pending steps are dropped unless ``keeps_steps``."""
         self._clock = self._message = time
         self._is_due = False
         self._delayed = False
@@ -116,7 +110,7 @@ class Schedule:
         self._start_from(time, wall)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
-        """Take the next message: its time, its topic, and the time now."""
+        """Schedule the next message, given its bag time, its topic, and the current wall time."""
         self._advance(wall)
         self._message = time
         options = self._options
@@ -136,9 +130,9 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is to be published now, else until when to wait before the next poll, at most.
+        """Return None if the message is due now, else the wall time until which to wait before the next poll.
 
-        A call of another method may change that earlier.
+        Poll earlier if another method is called meanwhile.
         """
         if self._is_due:
             self._clock = self._message
@@ -162,7 +156,7 @@ class Schedule:
         return min(wait, self._next_tick) if self._period else wait
 
     def set_paused(self, paused: bool, wall: int) -> bool:
-        """Pause, or go on; return whether that changed anything."""
+        """Pause or resume; return whether that changed the state."""
         if paused == self._paused:
             return False
         self._advance(wall)
@@ -175,43 +169,43 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """Have the message published now, or the next one that is offered, if paused."""
+        """If paused, make the current message due now, or the next one offered."""
         if self._paused:
             self._steps += 1
 
     def toggle_pause_topics(self) -> None:
-        """Ignore the topics to pause at, or heed them again."""
+        """Ignore the topics to pause at, or respect them again."""
         self._pauses_at = () if self._pauses_at else self._options.pause_topics
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message of the topic that controls the rate."""
+        """Store the stamp of the last message on the rate control topic."""
         self._controlled = stamp
 
     def tick(self, wall: int) -> int | None:
-        """Return the time to publish on /clock, if it is time for that."""
+        """Return the time to publish on /clock, or None if no message is due."""
         if not self._period or wall < self._next_tick:
             return None
         self._advance(wall)
-        # No burst after a pause of the whole process.
+        # Publish no burst after the whole process was suspended.
         self._next_tick = max(self._next_tick + self._period, wall)
         return self._clock
 
     def status(self, wall: int) -> Status:
-        """Return what the status line shows."""
+        """Return the contents of the status line."""
         self._advance(wall)
         state = State.PAUSED if self._paused else State.DELAYED if self._delayed else State.RUNNING
         behind = max(0, self._clock - self._controlled)
         return Status(state, self._clock, self._clock - self._first, self._last - self._first, behind)
 
     def run_on(self, wall: int) -> int:
-        """Let the clock run past the last message, for ``--keep-alive``; return until when to wait at most."""
+        """Advance the clock past the last message, for ``--keep-alive``; return the wall time until which to wait."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, self._bag_time(wall))
         wait = wall + _SECOND // 10
         return min(wait, self._next_tick) if self._period else wait
 
     def _due(self) -> int:
-        """Return the wall's time of the message."""
+        """Return the wall time at which the message is due."""
         return self._origin + self._scaled(self._message - self._first, 1 / self._rate)
 
     def _bag_time(self, wall: int) -> int:
@@ -221,12 +215,12 @@ class Schedule:
         return span if self._rate == 1.0 else round(span * factor)
 
     def _start_from(self, time: int, wall: int) -> None:
-        """Let the clock show ``time`` at ``wall``."""
+        """Set the origin so that bag time is ``time`` at wall time ``wall``."""
         self._origin = wall - self._scaled(time - self._first, 1 / self._rate)
         self._since = wall
 
     def _advance(self, wall: int) -> None:
-        """Move the clock on, at most to the message that is next."""
+        """Advance bag time, at most to the time of the current message."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, min(self._message, self._bag_time(wall)))
 
@@ -239,7 +233,7 @@ class Schedule:
         self._since = wall
 
     def _tick_now(self, wall: int) -> None:
-        """Show the message's time on the clock at the next tick, which is now."""
+        """Set bag time to the message's time, and make a /clock message due now."""
         self._clock = self._message
         self._next_tick = wall
 

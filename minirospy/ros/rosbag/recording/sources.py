@@ -1,4 +1,4 @@
-"""The messages of several bags in the order of time, read ahead by a thread.
+"""The messages of several bags in time order, read ahead by a thread.
 
 So neither reading nor decompressing delays a message that is due.
 """
@@ -27,7 +27,7 @@ _BATCHES = 8
 
 
 class Selection(NamedTuple):
-    """Which messages: of these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
+    """The messages to play: of these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
 
     topics: Collection[str] = ()
     start: int | None = None
@@ -37,7 +37,7 @@ class Selection(NamedTuple):
 class Bags:
     """Several bags, opened for reading; a context manager.
 
-    Raise NotFoundError for a file that does not exist, BagError with its name for one that cannot be read.
+    Raise NotFoundError if a file does not exist, BagError with the file's name if one cannot be read.
     """
 
     def __init__(self, paths: Iterable[str]) -> None:
@@ -71,23 +71,23 @@ class Bags:
         ]
 
     def times(self) -> tuple[int, int] | None:
-        """Return the times of the first and the last message of all bags; None without messages."""
+        """Return the times of the first and the last message of all bags; None if there are no messages."""
         spans = [span for reader in self.readers if (span := _span(reader))]
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
     def last_time(self, selection: Selection) -> int:
-        """Return the time of the last message of a selection that is not empty. Few chunks are read for that."""
+        """Return the time of the last message of a non-empty selection. This reads only a few chunks."""
         return max(_last_time(reader, selection) for reader in self.readers)
 
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield the messages in the order of time, each with the number of its bag. Raise BagFormatError."""
+        """Yield the messages in time order, each with the number of its bag. Raise BagFormatError."""
         return heapq.merge(
             *(_numbered(number, reader, selection) for number, reader in enumerate(self.readers)),
             key=_time,
         )
 
     def last_latched(self, selection: Selection) -> list[tuple[int, StoredMessage]]:
-        """Return the last message of each latched connection before the selection's start."""
+        """Return the last message of each latched connection before the start of the selection."""
         found: list[tuple[int, StoredMessage]] = []
         for number, connection in self.connections(selection):
             if not connection.latching or not selection.start:
@@ -99,7 +99,7 @@ class Bags:
 
 
 def open_reader(path: Path, opened: ExitStack) -> BagReader:
-    """Return a reader of a bag or an MCAP file, which ``opened`` closes. Raise OSError, BagError."""
+    """Return a reader of a bag or an MCAP file, and register its closing with ``opened``. Raise OSError, BagError."""
     stream = opened.enter_context(path.open("rb"))
     reader = open_bag_or_mcap(stream)
     opened.callback(reader.close)
@@ -108,7 +108,7 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
 
 
 class ReadAhead:
-    """The messages of an iterator, which a thread runs ahead by some thousand from now on; iterate once, and close."""
+    """Iterates over messages that a thread reads some thousands ahead. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
@@ -127,15 +127,15 @@ class ReadAhead:
             yield from item
 
     def wait(self) -> None:
-        """Wait until the first messages have been read, or none has."""
+        """Wait until the first messages have been read, or the end was reached."""
         self._first.wait()
 
     def close(self) -> None:
-        """Have the thread end."""
+        """Request the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:
-        """Wait until the thread has ended, after :meth:`close`: then the files are the caller's again."""
+        """Wait until the thread has stopped, after :meth:`close`: from then on the caller may use the files again."""
         self._thread.join()
 
     def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
@@ -179,11 +179,11 @@ def _span(reader: BagReader) -> tuple[int, int] | None:
 
 
 def _last_time(reader: BagReader, selection: Selection) -> int:
-    """Return the time of the last message of a selection; 0 if there is none."""
+    """Return the time of the last message in a selection; 0 if there is none."""
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
-    # Of a bag without chunks all are read.
+    # In a bag without chunks, read all messages.
     starts: list[int | None] = [*sorted(found, reverse=True)] or [selection.start]
     for start in starts:
         newest = deque(reader.messages(wanted, start, end), maxlen=1) if wanted else ()
@@ -194,7 +194,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
 
 
 def _wanted(reader: BagReader, selection: Selection) -> list[int]:
-    """Return the connections of the topics that are selected."""
+    """Return the IDs of the connections of the selected topics."""
     return [
         connection.id
         for connection in reader.connections.values()

@@ -1,4 +1,4 @@
-"""When a recording goes on in the next file, what the files are called, and which are removed. Pure."""
+"""Splitting a recording: when the next file starts, the names of the files, and which of them to delete. Pure."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100
-"""Files without a message that a silence may leave, as in ROS."""
+_MAX_EMPTY = 100  # at most this many files without messages after a long silence, as in ROS
 
 
 class Next(enum.Enum):
-    """The step before a message is recorded."""
+    """The action to take before a message is recorded."""
 
     CONTINUE = enum.auto()
-    SPLIT = enum.auto()
-    """Close the file, and go on in the next."""
+    SPLIT = enum.auto()  # close the file, and continue in the next
     END = enum.auto()
 
 
@@ -30,29 +28,31 @@ class Splits:
         self._options = options
         self._start = start
         self._kept: list[str] = []
-        self.count = 0
-        """How many files have been closed."""
+        self.count = 0  # number of files closed
 
     def check(self, size: int, now: int) -> Next:
-        """Return what to do with a file of ``size`` bytes. At SPLIT call it again: a long silence may end several."""
+        """Return the action for a file of ``size`` bytes.
+
+        After SPLIT, call it again: several splits may be due after a silence.
+        """
         options = self._options
         if options.max_size and size > options.max_size:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
             if now - self._start > _MAX_EMPTY * options.max_duration:
-                # The clock has jumped: a simulator's, or a machine's that was set.
+                # The clock has jumped: a simulator was restarted, or the system time was set.
                 self._start = now - options.max_duration
             self._start += options.max_duration
             return self._full()
         return Next.CONTINUE
 
     def closed(self, name: str) -> list[str]:
-        """Count a file that has been closed; return the names of those to be removed now, for ``--max-splits``."""
+        """Count a closed file; return the names of the files to delete now, according to ``--max-splits``."""
         self.count += 1
         if not self._options.max_splits:
             return []
         self._kept.append(name)
-        # One more is being written.
+        # The file being written is not among them.
         surplus = len(self._kept) - self._options.max_splits
         removed, self._kept = self._kept[: max(0, surplus)], self._kept[max(0, surplus) :]
         return removed
@@ -62,7 +62,7 @@ class Splits:
 
 
 def file_name(options: RecordOptions, count: int, now: float) -> str:
-    """Return the name of file number ``count``, which is opened at ``now`` (seconds since 1970, local time is shown)."""
+    """Return the name of file number ``count``, opened at ``now``: seconds since 1970, formatted as local time."""
     parts = [options.prefix.removesuffix(options.extension)] if options.prefix else []
     if options.append_date:
         parts.append(time.strftime("%Y-%m-%d-%H-%M-%S", time.localtime(now)))

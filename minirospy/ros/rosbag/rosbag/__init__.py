@@ -1,4 +1,4 @@
-"""rosbag: bags, read and written, and migrated to newer message types. Source: http://wiki.ros.org/rosbag/Code%20API."""
+"""rosbag: read, write and migrate bags. Source: http://wiki.ros.org/rosbag/Code%20API."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __getattr__ = on_first_use("rosbag", "bag", "migration", "rosbag_main")
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> int:
-    """Run the command rosbag with ``argv``, whose first word is the program's name; return its exit status."""
+    """Run the command rosbag with ``argv``, whose first item is the program's name; return its exit status."""
     from minirospy.ros.rosbag.commands import rosbag
 
     return rosbag.main((sys.argv if argv is None else argv)[1:])

@@ -1,7 +1,7 @@
-"""rosbag.bag: bags that programs read and write. Source: http://wiki.ros.org/rosbag/Code%20API.
+"""rosbag.bag: read and write bags. Source: http://wiki.ros.org/rosbag/Code%20API.
 
-Compared with the real module: opening a bag reads its chunk infos only, the index is kept in 16 bytes a message, and
-messages come in the order of time whatever the order in the file. Two types on one topic get two connections.
+Compared with the real module: opening a bag reads only its chunk infos, the index takes 16 bytes per message, and messages
+are read in time order regardless of their order in the file. Two types on one topic get two connections.
 """
 
 from __future__ import annotations
@@ -56,12 +56,11 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True
-"""That LZ4 can be read and written, for programs that look."""
+found_lz4 = True  # whether LZ4 is available, for programs that check it
 
 
 class Compression:
-    """The compression of the chunks of a bag."""
+    """The chunk compressions of bags."""
 
     NONE = compressions.NONE
     BZ2 = compressions.BZ2
@@ -74,14 +73,14 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """The buffer that a message's ``serialize`` writes to."""
+    """The buffer to which a message's ``serialize`` writes."""
 
     __slots__ = ()
     write = list.append
 
 
 class Options(TypedDict, total=False):
-    """The options of the next chunks."""
+    """The compression and size of the chunks written next."""
 
     compression: str
     chunk_threshold: int
@@ -90,8 +89,8 @@ class Options(TypedDict, total=False):
 class Bag(OpenedBag):
     """A bag that is read, written or appended to.
 
-    ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` in bytes.
-    ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may hold compression
+    ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` is in bytes.
+    ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may contain compression
     and chunk_threshold. ``skip_index``: the info text shows no rates. Raise ValueError, ROSBagException, OSError.
     """
 
@@ -112,8 +111,9 @@ class Bag(OpenedBag):
             chunk_threshold = options.get("chunk_threshold", chunk_threshold)
         super().__init__(mode, _checked_compression(compression), _checked_threshold(chunk_threshold))
         self._skip_index = skip_index
-        self._written: dict[tuple[str, str], int] = {}
-        """The connections of this program's messages, by topic and md5sum."""
+        self._written: dict[
+            tuple[str, str], int
+        ] = {}  # connection numbers of the written messages, by topic and md5sum
         self._pieces = _Pieces()
 
         if not f:
@@ -125,7 +125,8 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # Ours reads the index when it is needed; a reader of the program's own may show its progress now.
+            # minirospy's reader reads the index when needed; a program's subclass may read it now, to show its
+            # progress.
             if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not skip_index
@@ -152,12 +153,12 @@ class Bag(OpenedBag):
 
     @property
     def filename(self) -> str | os.PathLike[str] | None:
-        """The path that was given, None for a file object."""
+        """The path that was given, or None for a file object."""
         return self._filename
 
     @property
     def version(self) -> int | None:
-        """The version: 200 for 2.0."""
+        """The version of the bag format: 200 for 2.0."""
         return self._version
 
     @property
@@ -189,7 +190,7 @@ class Bag(OpenedBag):
 
     @property
     def chunk_threshold(self) -> int:
-        """Bytes after which a chunk is complete, before compression. Raise ValueError."""
+        """Size in bytes, before compression, at which a chunk is complete. Raise ValueError."""
         return self._chunk_threshold
 
     @chunk_threshold.setter
@@ -209,12 +210,12 @@ class Bag(OpenedBag):
         raw: bool = False,
         return_connection_header: bool = False,
     ) -> Iterator[Any]:
-        """Yield BagMessage(topic, message, timestamp) in the order of time.
+        """Yield BagMessage(topic, message, timestamp) in time order.
 
-        ``topics``: one or several, none or an empty list for all; ``start_time`` and ``end_time`` are included;
+        ``topics``: one or several; None or an empty list for all. ``start_time`` and ``end_time`` are inclusive;
         ``connection_filter(topic, type, md5sum, definition, header)`` selects connections. ``raw``: messages are tuples
-        of type, bytes, md5sum, position and class. ``return_connection_header``: as BagMessageWithConnectionHeader.
-        Raise ValueError if the bag is closed, ROSBagException where it is damaged.
+        of type, bytes, md5sum, position and class. ``return_connection_header``: yield BagMessageWithConnectionHeader.
+        Raise ValueError if the bag is closed, ROSBagException if it is damaged.
         """
         self.flush()
         self._current().prepare()
@@ -238,7 +239,7 @@ class Bag(OpenedBag):
         raw: bool = False,
         connection_header: Mapping[str, str | bytes] | None = None,
     ) -> None:
-        """Write a message that came at ``t``, by default now.
+        """Write a message received at ``t``, by default now.
 
         ``raw``: the message is a tuple of type, bytes, md5sum, (position,) and class. ``connection_header`` is stored
         with the first message of a topic and type. Raise ValueError, ROSBagException, OSError.
@@ -267,7 +268,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # A body that is not bytes must fail before a part of it is in the chunk.
+            # Fail for an unsuitable body before part of it is in the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -279,16 +280,16 @@ class Bag(OpenedBag):
                 number = writer.add_connection(topic, header)
                 self._written[topic, md5sum] = number
             if self._is_read:
-                # A read in between has moved the position.
+                # A read since the last write has moved the position.
                 self._file.seek(0, os.SEEK_END)
             writer.write(number, nanoseconds, body)
         except BagError as error:
             raise_as_ros(error)
 
     def reindex(self) -> Iterator[int]:
-        """Make the index again; yield the positions that are read, to show the progress.
+        """Rebuild the index; yield the positions as they are read, to show the progress.
 
-        What cannot be recovered is cut off where the bag was opened to append.
+        If the bag was opened to append, the data that cannot be recovered is cut off.
         """
         if self._version and self._version < 200:
             reader = self._source
@@ -320,7 +321,7 @@ class Bag(OpenedBag):
             self._close_file()
 
     def get_compression_info(self) -> CompressionTuple:
-        """Return the most frequent compression, and the sizes of all chunks: compression, uncompressed, compressed."""
+        """Return the most frequent compression, and the total size of the chunks: compression, uncompressed, compressed."""
         with as_ros_errors():
             stored = info.compression_of(self._current())
         name = stored[0].compression if stored else self.compression
@@ -329,7 +330,7 @@ class Bag(OpenedBag):
         )
 
     def get_message_count(self, topic_filters: str | list[str] | None = None) -> int:
-        """Return the number of messages, on all or on these topics."""
+        """Return the number of messages, on all topics or on the given ones."""
         if topic_filters is not None:
             topics = self.get_type_and_topic_info(topic_filters).topics.values()
             return sum(topic.message_count for topic in topics)
@@ -373,7 +374,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None if it does not exist."""
+        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None if there is no such key."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text
@@ -384,10 +385,10 @@ class Bag(OpenedBag):
             return None
 
     def _create_reader(self) -> None:
-        """Make ``_reader``, by which programs reach into the bag; a derived class may put another one there."""
+        """Create ``_reader``, which programs use to access the bag's internals; a subclass may set another one."""
         self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
-    # -- inside ---------------------------------------------------------------------------------------------------
+    # -- internal -------------------------------------------------------------------------------------------------
 
     def _read(
         self,
@@ -411,7 +412,7 @@ class Bag(OpenedBag):
                     kind = kinds[rank]
                     if kind is None:
                         kind = kinds[rank] = _get_message_type(connection)
-                    # The steps of a constructor are not called a million times: deserialize sets every field.
+                    # Create the message without its constructor, which is slow: deserialize sets every field.
                     if raw:
                         position = at if chunk is None else (chunk, at)
                         message = connection.datatype, data[body:after], connection.md5sum, position, kind
@@ -430,7 +431,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module still has it in memory when the bag is closed.
+        # The real module still has the data in memory after close(); here the bag is opened again.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

@@ -1,4 +1,4 @@
-"""rosbag's exceptions, and the errors of the pure room as those."""
+"""rosbag's exceptions, and the conversion of minirospy's bag errors to them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 
 
 class ROSBagException(Exception):
-    """The root of rosbag's errors; ``value`` is the text."""
+    """The base class of rosbag's errors; ``value`` is the message."""
 
     def __init__(self, value: str | None = None) -> None:
         super().__init__(value)
@@ -31,7 +31,7 @@ class ROSBagException(Exception):
 
 
 class ROSBagFormatException(ROSBagException):
-    """A bag's bytes are not what the format prescribes."""
+    """The bytes of a bag violate the format."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -45,7 +45,7 @@ class ROSBagUnindexedException(ROSBagException):
 
 
 class ROSBagEncryptNotSupportedException(ROSBagException):
-    """A bag is encrypted, or should be: that is not supported."""
+    """A bag is encrypted, or encryption was requested: this is not supported."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -60,7 +60,7 @@ class ROSBagEncryptException(ROSBagException):
 
 @contextmanager
 def as_ros_errors() -> Iterator[None]:
-    """Raise our errors as those that programs catch."""
+    """Convert minirospy's bag errors to rosbag's exceptions, which programs catch."""
     try:
         yield
     except BagError as error:
@@ -68,7 +68,7 @@ def as_ros_errors() -> Iterator[None]:
 
 
 def raise_as_ros(error: BagError) -> NoReturn:
-    """Raise the exception of rosbag for one of ours."""
+    """Raise the rosbag exception that corresponds to a minirospy error."""
     if isinstance(error, BagUnindexedError):
         raise ROSBagUnindexedException from error
     if isinstance(error, BagEncryptedError):

@@ -1,4 +1,4 @@
-"""The private parts of rosbag.bag: records as objects, which rqt_bag and programs read through private names."""
+"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs read by private names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Header = dict[str, bytes] | dict[str, str]
 
 
 def make_time() -> Callable[[int], Time]:
-    """Return a function that makes rospy.Time of nanoseconds, faster than its constructor."""
+    """Return a function that creates a rospy.Time from nanoseconds, faster than its constructor."""
     from minirospy.client.time import Time
 
     new = Time.__new__
@@ -37,7 +37,7 @@ def make_time() -> Callable[[int], Time]:
 
 
 class _ConnectionInfo:
-    """A connection: ``id``, ``topic``, and the fields of its header, ``header`` itself too."""
+    """A connection: ``id``, ``topic``, the fields of its header, and ``header`` itself."""
 
     def __init__(self, id: int, topic: str, header: Header) -> None:
         fields = {
@@ -56,7 +56,7 @@ class _ConnectionInfo:
 
     @classmethod
     def of(cls, connection: Connection) -> _ConnectionInfo:
-        """Return a connection of our reader's."""
+        """Convert a connection from minirospy's reader."""
         return cls(connection.id, connection.topic, connection.header)
 
     def __str__(self) -> str:
@@ -64,7 +64,7 @@ class _ConnectionInfo:
 
 
 class _ChunkInfo:
-    """A chunk: its position ``pos``, times, and messages of each connection."""
+    """A chunk: its position ``pos``, start and end time, and message counts by connection."""
 
     def __init__(self, pos: int, start_time: Time, end_time: Time) -> None:
         self.pos = pos
@@ -74,7 +74,7 @@ class _ChunkInfo:
 
     @classmethod
     def of(cls, chunk: ChunkInfo) -> _ChunkInfo:
-        """Return a chunk of our reader's."""
+        """Convert a chunk from minirospy's reader."""
         make = make_time()
         info = cls(chunk.position, make(chunk.start_time), make(chunk.end_time))
         info.connection_counts = chunk.counts
@@ -92,7 +92,7 @@ class _ChunkInfo:
 
 
 class _ChunkHeader:
-    """A chunk's header, and where its data is."""
+    """The header of a chunk, and the position of its data."""
 
     def __init__(
         self, compression: str, compressed_size: int, uncompressed_size: int, data_pos: int = 0
@@ -104,7 +104,7 @@ class _ChunkHeader:
 
     @classmethod
     def of(cls, stored: StoredChunk) -> _ChunkHeader:
-        """Return a header of our reader's."""
+        """Convert a chunk header from minirospy's reader."""
         return cls(
             stored.chunk.compression, stored.chunk.compressed_size, stored.chunk.size, stored.data_position
         )
@@ -117,7 +117,7 @@ class _ChunkHeader:
 
 
 class _IndexEntry:
-    """When a message came, and where it is; compares by time. ``chunk_pos`` is None in bags of version 1.2."""
+    """The time and position of a message; compares by time. ``chunk_pos`` is None in bags of version 1.2."""
 
     __slots__ = ["chunk_pos", "offset", "time"]
 
@@ -128,7 +128,7 @@ class _IndexEntry:
 
     @property
     def position(self) -> int | tuple[int, int]:
-        """Return the argument of Bag._read_message."""
+        """Return the position in the form that Bag._read_message expects."""
         return self.offset if self.chunk_pos is None else (self.chunk_pos, self.offset)
 
     def __eq__(self, other: object) -> bool:
@@ -155,7 +155,7 @@ class _IndexEntry:
 
 
 class _Index(Sequence[_IndexEntry]):
-    """The entries of a connection as objects, which are made when they are looked at."""
+    """The index entries of a connection as objects, which are created on access."""
 
     def __init__(self, index: ConnectionIndex) -> None:
         self.source = index
@@ -172,16 +172,16 @@ class _Index(Sequence[_IndexEntry]):
         return self.entry(self.source[at % len(self)])
 
     def entry(self, entry: Entry) -> _IndexEntry:
-        """Return an entry of our reader's as an object."""
+        """Convert an index entry from minirospy's reader."""
         return _IndexEntry(self._make_time(entry.time), entry.chunk, entry.offset)
 
 
 _message_types: dict[str, type[Message]] = {}
-"""A class for each md5sum, as rosbag has it."""
+"""Message classes by md5sum; rosbag has a dict of this name."""
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:
-    """Return the class of a connection's messages, made of the definition in the bag. Raise ROSBagException."""
+    """Return the class of a connection's messages, built from the definition in the bag. Raise ROSBagException."""
     found = _message_types.get(info.md5sum)
     if found is None:
         found = _message_types[info.md5sum] = _make_message_type(info)

@@ -1,4 +1,4 @@
-"""rosbag.migration: messages of types that have changed. Source: http://wiki.ros.org/rosbag/migration."""
+"""rosbag.migration: migrate messages whose types have changed. Source: http://wiki.ros.org/rosbag/migration."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ __all__ = [
 
 
 def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
-    """Return the path of each type that is to be migrated, and the rules of it that are missing. Raise ROSBagException."""
+    """Return the path of each type in a bag that needs migration, and its missing rules. Raise ROSBagException."""
     with as_ros_errors():
         return check_bag(migrator, inbag, _warn)
 
 
 def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
-    """Return the same for message classes."""
+    """Return the path of each message class that needs migration, and its missing rules."""
     return check_classes(migrator, messages)
 
 
 def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
-    """Write a bag again with its messages migrated; return whether all could be. Raise ROSBagException."""
+    """Write a bag with its messages migrated; return whether all could be. Raise ROSBagException."""
     return not fixbag2(migrator, inbag, outbag)
 
 
 def fixbag2(migrator: MessageMigrator, inbag: str, outbag: str, force: bool = False) -> list[Migration]:
-    """Write a bag again with its messages migrated; return the migrations that have no rule. Raise ROSBagException."""
+    """Write a bag with its messages migrated; return the migrations without a rule. Raise ROSBagException."""
     with as_ros_errors():
         return fix_bag(migrator, inbag, outbag, _warn, force=force)
 

@@ -1,4 +1,4 @@
-"""The file of a rosbag.Bag: opened to read, write or append, and who reads or writes it."""
+"""The file of a rosbag.Bag, opened to read, write or append, and its reader and writer."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from minirospy.ros.rosbag.rosbag.private import PrivateBag
 __all__ = ["CLOSED", "FileArgument", "OpenedBag"]
 
 FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
-"""What a bag is read from or written to: a path or an open file."""
+"""The source or target of a bag: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
 
 
 class OpenedBag(PrivateBag):
-    """The state of a bag: its file, and the reader or writer of it."""
+    """The state of a bag: its file, and its reader or writer."""
 
     def __init__(self, mode: str, compression: str, chunk_threshold: int) -> None:
         self._compression = compression
@@ -35,13 +35,12 @@ class OpenedBag(PrivateBag):
         self._version: int | None = None
         self._mode = mode
         self._source: BagReader | None = None
-        """What reads the file; ``_reader`` is the real module's name for what a program may replace."""
+        """The reader of the file. Not ``_reader``: programs may replace that attribute, which the real module has."""
         self._writer: BagWriter | None = None
-        self._is_read = False
-        """Whether the file's position may be another than the writer left."""
+        self._is_read = False  # whether a read may have moved the file's position since the last write
 
     def _current(self) -> BagReader:
-        """Return the reader, which also knows what has been written so far."""
+        """Return the reader, which also has the connections and chunks written so far."""
         stream = self._open_file()
         reader = self._source
         if reader is None:
@@ -104,7 +103,7 @@ class OpenedBag(PrivateBag):
         self._source = None
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
-        """Return the open file, or open a path."""
+        """Return ``f`` if it is an open file, else open it as a path."""
         if not isinstance(f, io.IOBase):
             self._filename = f
             return cast("BinaryIO", open(f, mode))

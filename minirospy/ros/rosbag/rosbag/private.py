@@ -1,4 +1,4 @@
-"""The names of rosbag.Bag that are private in the real module, and used by rqt_bag and programs."""
+"""The names of rosbag.Bag that are private in the real module but used by rqt_bag and other programs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ConnectionFilter = Callable[[str, str, str, str, Header], object]
 
 
 class BagMessage(NamedTuple):
-    """A message; with ``raw`` its type, bytes, md5sum, place and class."""
+    """A message; with ``raw``, a tuple of its type, bytes, md5sum, position and class."""
 
     topic: str
     message: object
@@ -41,7 +41,7 @@ class BagMessage(NamedTuple):
 
 
 class BagMessageWithConnectionHeader(NamedTuple):
-    """A message, and the connection header of its publisher."""
+    """A message, and its publisher's connection header."""
 
     topic: str
     message: object
@@ -52,14 +52,13 @@ class BagMessageWithConnectionHeader(NamedTuple):
 class PrivateBag(ABC):
     """The private names of rosbag.Bag."""
 
-    _connection_indexes_read = False
-    """Whether the index has been read, or is read when it is needed."""
+    _connection_indexes_read = False  # whether the index has been read, or is read when needed
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """What a program has put in the place of the list of chunks."""
+    """The program's replacement for the list of chunks, if any."""
 
     @abstractmethod
     def _current(self) -> BagReader:
-        """Return the reader, which also knows what has been written so far."""
+        """Return the reader, which also has the connections and chunks written so far."""
 
     @abstractmethod
     def flush(self) -> None:
@@ -107,7 +106,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position, as index entries and raw messages have it."""
+        """Return the message at a position, given as in index entries and raw messages."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)
@@ -129,7 +128,7 @@ class PrivateBag(ABC):
         topics: str | Iterable[str] | None = None,
         connection_filter: ConnectionFilter | None = None,
     ) -> Iterator[_ConnectionInfo]:
-        """Yield the connections on these topics that the filter selects."""
+        """Yield the connections on these topics that the filter accepts."""
         wanted = {topics} - {""} if isinstance(topics, str) else set(topics or ())
         canonical = {canonicalize(topic) for topic in wanted if topic}
         for each in self._connections.values():
@@ -147,7 +146,7 @@ class PrivateBag(ABC):
         start_time: Time | None = None,
         end_time: Time | None = None,
     ) -> Iterator[_IndexEntry]:
-        """Yield the index entries of these connections in the order of time."""
+        """Yield the index entries of these connections in time order."""
         return self._merged(connections, start_time, end_time, backwards=False)
 
     def _get_entries_reverse(
@@ -156,11 +155,11 @@ class PrivateBag(ABC):
         start_time: Time | None = None,
         end_time: Time | None = None,
     ) -> Iterator[_IndexEntry]:
-        """Yield the index entries of these connections, the latest first."""
+        """Yield the index entries of these connections in reverse time order."""
         return self._merged(connections, start_time, end_time, backwards=True)
 
     def _get_entry(self, t: Time, connections: Iterable[_ConnectionInfo] | None = None) -> _IndexEntry | None:
-        """Return the last entry at or before a time."""
+        """Return the last index entry at or before a time."""
         indexes = self._get_indexes(connections)
         found = [each.entry(last) for each in indexes if (last := each.source.last_until(t.to_nsec()))]
         return max(found, default=None)
@@ -168,7 +167,7 @@ class PrivateBag(ABC):
     def _get_entry_after(
         self, t: Time, connections: Iterable[_ConnectionInfo] | None = None
     ) -> _IndexEntry | None:
-        """Return the first entry after a time."""
+        """Return the first index entry after a time."""
         indexes = self._get_indexes(connections)
         found = [each.entry(first) for each in indexes if (first := each.source.first_after(t.to_nsec()))]
         return min(found, default=None)
@@ -198,7 +197,7 @@ class PrivateBag(ABC):
 
 
 def nanoseconds_of(stamp: Time | None) -> int | None:
-    """Return a limit of time; time 0 is none, as in the real module. Raise TypeError if it is not a rospy.Time."""
+    """Return a time limit in nanoseconds; None for time 0, as in the real module. Raise TypeError if it is not a rospy.Time."""
     if not stamp:
         return None
     if not isinstance(stamp, Time):

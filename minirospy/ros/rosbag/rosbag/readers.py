@@ -1,4 +1,4 @@
-"""What the real rosbag.Bag has as ``_reader``: programs read single messages by it, or show the progress of reading the index."""
+"""The classes of rosbag.Bag's ``_reader``: programs use it to read single messages, or to show the progress of indexing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__: list[str] = []
 
 
 class _BagReader:
-    """A reader of the bag ``bag``, of any version."""
+    """The reader of ``bag``, for any version of the format."""
 
     def __init__(self, bag: Bag) -> None:
         self.bag = bag
@@ -39,23 +39,23 @@ class _BagReader:
         raw: bool,
         return_connection_header: bool = False,
     ) -> Iterator[Any]:
-        """Yield messages, as Bag.read_messages."""
+        """Yield messages like Bag.read_messages."""
         return self.bag.read_messages(
             topics, start_time, end_time, connection_filter, raw, return_connection_header
         )
 
 
 class _BagReader200(_BagReader):
-    """A reader of a bag of version 2.0."""
+    """The reader of a bag of version 2.0."""
 
     def prepare(self) -> None:
-        """Read the index now where a derived class does it in its own way."""
+        """Read the index now if a subclass overrides how it is read."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 
     def _read_connection_index_records(self) -> None:
-        """Read the index. A derived class may put an iterable that counts in the place of the bag's ``_chunks``."""
+        """Read the index. A subclass may replace the bag's ``_chunks`` by an iterable that counts."""
         for _ in self.bag._chunks:
-            # The first one reads all of it, in one pass over the file.
+            # The first iteration reads the whole index, in one pass over the file.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None

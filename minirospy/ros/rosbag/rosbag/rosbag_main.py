@@ -1,4 +1,4 @@
-"""rosbag.rosbag_main: the verbs of `rosbag` as functions of their command line, whose first word is the program's name."""
+"""rosbag.rosbag_main: the verbs of `rosbag` as functions of a command line, whose first item is the program's name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit where it fails."""
+    """Run the command, and exit if it fails."""
     _run(list(sys.argv if argv is None else argv)[1:])
 
 

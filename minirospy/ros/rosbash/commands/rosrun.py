@@ -1,4 +1,4 @@
-"""`rosrun`: run a package's program by its name. Source: http://wiki.ros.org/rosbash#rosrun."""
+"""`rosrun`: run a program of a package. Source: http://wiki.ros.org/rosbash#rosrun."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ _NO_EXECUTABLE = 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the program's exit status, or as in minirospy.command.command where it cannot be run."""
+    """Run the command; return the program's exit status, or if it cannot be run, one of minirospy.command.command."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # The program decides which signals it ignores.
+    # The program decides how it handles signals.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
     prefix: list[str] = []
     debug = False
-    # By hand: the words after EXECUTABLE belong to it, even if they look like options of ours.
+    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like options of rosrun.
     while words and words[0].startswith("-"):
         option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
@@ -80,7 +80,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raise NotFoundError if neither is known."""
+    """Return a hint for a missing program or package. Raise NotFoundError if nothing matches."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -95,7 +95,7 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
 
 
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
-    """Return the commands that run a program. Raise WordedError, with the exit status of ROS's rosrun."""
+    """Return the commands that run a program. Raise WordedError with the exit status of ROS's rosrun."""
     try:
         folder = packages.find(package)
     except NotFoundError as error:
@@ -121,7 +121,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Prompt for one of several programs of the same name, and return it. Raise UsageError at the input's end."""
+    """Prompt for one of several programs of the same name, and return it. Raise UsageError at end of input."""
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):
@@ -137,9 +137,9 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Become the program: its signals, its exit status and its end are this process's."""
+    """Replace this process by the program, which gets its signals and determines its exit status."""
     if sys.platform == "win32":
-        # Windows has no exec that keeps the console: wait, and let Ctrl-C be the program's.
+        # On Windows, exec detaches the program from the console: wait for it instead, and leave Ctrl-C to it.
         try:
             with guard_children(), subprocess.Popen(command) as popen:
                 while True:
@@ -154,7 +154,7 @@ def become(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # A script without a `#!` line: shells run it themselves.
+            # For a script without a `#!` line; shells do the same.
             os.execv("/bin/sh", ["/bin/sh", *command])
 
         why = error.strerror or str(error)

@@ -1,7 +1,7 @@
-"""rosclean: how much the log files take, and removing them.
+"""rosclean: show the disk usage of log files, and remove them.
 
-Source: http://wiki.ros.org/rosclean. What is printed is what ROS prints; sizes are those of the files' blocks, as du
-counts them. Where nobody answers (no terminal, an empty pipe) nothing is removed.
+Source: http://wiki.ros.org/rosclean. The output is that of ROS; sizes are counted in disk blocks, as by du. Without an
+answer to the prompt (no terminal, an empty pipe) nothing is removed.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _purge_oldest(logs: _Logs, megabytes: int, *, yes: bool) -> None:
 
 
 def _places() -> list[_Logs]:
-    """Return the folders of logs that there are."""
+    """Return the log folders that exist."""
     from minirospy.workspace.folders import log_dir, ros_home
 
     places = (
@@ -90,7 +90,7 @@ def _places() -> list[_Logs]:
 
 
 def _agreed(command: str) -> bool:
-    """Prompt for a yes to ``command``, until y or n is typed; return whether it was yes."""
+    """Ask for confirmation of ``command`` until y or n is typed; return whether it was y."""
     question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\n{command}\n(y/n)?"
     while True:
         print(question, flush=True)
@@ -103,7 +103,7 @@ def _agreed(command: str) -> bool:
 
 
 def _remove_oldest(folder: Path, excess: int) -> None:
-    """Remove what was changed first in a folder until ``excess`` bytes have gone."""
+    """Remove entries of a folder, oldest modification first, until ``excess`` bytes have been removed."""
     entries = [path for path in folder.iterdir() if not path.is_symlink()]
     for path in sorted(entries, key=lambda path: path.stat().st_mtime):
         if excess <= 0:
@@ -111,7 +111,7 @@ def _remove_oldest(folder: Path, excess: int) -> None:
         excess -= _size(path)
         _remove(path)
     for link in folder.iterdir():
-        # `latest`, where what it points to has gone.
+        # Remove the link `latest` if its target has been removed.
         if link.is_symlink() and not link.exists():
             link.unlink()
 
@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Yield the status of all files and folders at and below a path; skip those that disappear meanwhile."""
+    """Yield the stat result of a path and of everything below it; skip entries that disappear meanwhile."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()
@@ -140,7 +140,7 @@ def _size(path: Path) -> int:
 
 
 def disk_usage(folder: Path) -> int:
-    """Return the bytes of whole blocks; on Windows, which reports none, of blocks of the usual size."""
+    """Return the size of a folder in disk blocks, as bytes; on Windows, with an assumed block size."""
     return sum(
         status.st_blocks * 512
         if hasattr(status, "st_blocks")
@@ -150,7 +150,7 @@ def disk_usage(folder: Path) -> int:
 
 
 def human_size(size: float) -> str:
-    """Return a size as `du -h` prints it: 4.0K, 11M; rounded up."""
+    """Return a size as printed by `du -h`: 4.0K, 11M; rounded up."""
     if size < 1024:
         return f"{size:.0f}"
     for unit in "KMGT":

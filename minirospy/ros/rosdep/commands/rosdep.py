@@ -1,8 +1,8 @@
-"""rosdep: the dependencies of packages that are not packages here, and how to install them.
+"""rosdep: list the dependencies of packages that are not available here, and how to install them.
 
-Tutorials say `rosdep install --from-paths src --ignore-src -r -y`. rosdep queries a database on the network and calls the
-system's package manager. Here nothing is fetched and nothing is installed: what ROS itself brings along is minirospy's,
-and of the rest it is said what is missing, and what to type for it.
+Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. rosdep queries a database on the network and runs the
+system's package manager. This one downloads and installs nothing: minirospy provides the packages of ROS; for any other
+missing dependency it prints the command that installs it.
 Source: http://docs.ros.org/en/independent/api/rosdep/html/commands.html.
 """
 
@@ -40,7 +40,7 @@ _PYTHON_PACKAGES: dict[str, tuple[str, str]] = {
     "yaml": ("yaml", "PyYAML"),
     "zmq": ("zmq", "pyzmq"),
 }
-"""Name in a key of rosdep -> (module, name on PyPI), where both are not that name."""
+"""Name in a rosdep key -> (module, name on PyPI), if they differ from the name in the key."""
 _TOOLS = frozenset(
     """
     cmake python python3 python-catkin-pkg python3-catkin-pkg python3-catkin-pkg-modules python-catkin-tools
@@ -48,11 +48,11 @@ _TOOLS = frozenset(
     python3-rosdep python-rospkg python3-rospkg python3-rospkg-modules python-setuptools python3-setuptools
     """.split()  # noqa: SIM905
 )
-"""What builds and tests with catkin ask for, and minirospy does itself."""
+"""Keys needed to build and test with catkin, which minirospy replaces."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status, 1 where something is missing."""
+    """Run the command; return its exit status: 1 if a dependency is missing."""
     return FAMILY.main(argv)
 
 
@@ -98,7 +98,7 @@ def _parser(verb: str, description: str) -> Parser:
 def _missing(
     packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], *, everything: bool
 ) -> dict[str, list[str]]:
-    """Return the missing keys, each with the packages that need it.
+    """Return the missing keys, each with the packages that depend on it.
 
     Raise NotFoundError, ManifestError, UsageError.
     """
@@ -129,7 +129,7 @@ def _missing(
 
 
 def _module(key: str) -> tuple[str, str] | None:
-    """Return the module and the name on PyPI that a key represents; None if it is not a key of Python."""
+    """Return the module and the PyPI name for a rosdep key; None if it is not the key of a Python package."""
     match = _PYTHON_KEY.match(key)
     if match is None:
         return None
@@ -146,7 +146,7 @@ def _is_installed(key: str) -> bool:
 
 
 def _says(keys: dict[str, list[str]]) -> Iterator[str]:
-    """Yield a line for each key: the packages that need it, and how to install it."""
+    """Yield a line for each key: the packages that depend on it, and how to install it."""
     for key, packages in keys.items():
         module = _module(key)
         how = install_command(module[1]) if module else "no package of Python or of ROS here"
@@ -225,7 +225,7 @@ def _resolve(keys: Sequence[str]) -> int:
 
 
 class _IgnoringParser(Parser):
-    """Takes any words, and ignores them."""
+    """Accepts and ignores any arguments."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Ignore the words; return no arguments."""

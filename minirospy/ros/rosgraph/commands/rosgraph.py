@@ -1,7 +1,7 @@
-"""rosgraph: who sends to whom, and which services there are; printed again each second until Ctrl-C.
+"""rosgraph: print which nodes publish to which, and the services; repeated every second until Ctrl-C.
 
-Source: http://wiki.ros.org/rosgraph. What is printed is what ROS prints, with names sorted; it comes from the master
-alone, so that a node that hangs holds nothing up.
+Source: http://wiki.ros.org/rosgraph. The output is that of ROS, with sorted names; all data comes from the master, so a
+node that hangs causes no delay.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help, also of a usage error, as ROS does."""
+    """Prints ROS's help before its own, and also on a usage error, as ROS does."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Raise the CommandLineError of ``message``; ROS's help is on standard output."""
+        """Print ROS's help to stdout, and raise the CommandLineError for ``message``."""
         sys.stdout.write(_ROS_HELP)
         super().error(message, ros)
 

@@ -12,5 +12,5 @@ __getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without remappings and private parameters, as `rospy.myargv` gives it."""
+    """Return the command line without remappings and private parameters, like `rospy.myargv`."""
     return parse_arguments(sys.argv if argv is None else argv).plain

@@ -1,4 +1,4 @@
-"""The Master API for Python code: blocking calls, results as ROS's lists. Source: http://wiki.ros.org/ROS/Master_API."""
+"""The Master API for Python code: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ __all__ = [
 
 
 class MasterException(Exception):
-    """The master cannot be reached, or answers with an error."""
+    """The master is unreachable or returned an error."""
 
 
-ROSMasterException = MasterException
-"""An older name of it."""
+ROSMasterException = MasterException  # older name
 
 
 class MasterFailure(MasterException):
@@ -48,7 +47,7 @@ Error, Failure = MasterError, MasterFailure
 
 
 class Master:
-    """The master at ``master_uri`` (default: that of the environment), called as the node ``caller_id``."""
+    """The master at ``master_uri``, by default that of the environment, called as node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
         uri = master_uri or get_master_uri()
@@ -57,10 +56,10 @@ class Master:
             parse_http_host_and_port(uri)
         except ValueError as error:
             raise ValueError(f"invalid master URI: {uri}") from error
-        # As in rosgraph, without the trailing slash.
+        # Without a trailing slash, as in ROS's rosgraph.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._proxy = MasterProxy(uri, self.caller_id)
-        # ROS's Master has no close(): its connections are closed with the object.
+        # ROS's Master has no close(): the connections are closed when the object is deleted.
         weakref.finalize(self, self._proxy.close)
 
     def _call(self, method: str, *args: object) -> Any:
@@ -70,14 +69,14 @@ class Master:
         except RpcRefused as error:
             raise (MasterError if error.code == -1 else MasterFailure)(error.text) from error
         except MasterUnreachableError as error:
-            # Code that polls for a master expects an error of sockets.
+            # Programs that poll for a master expect a socket error.
             raise ConnectionRefusedError(str(error)) from error
         except RpcError as error:
             raise MasterException(str(error)) from error
 
     @cached_property
     def handle(self) -> ServerProxy:
-        """The master as Python's own `xmlrpc.client.ServerProxy`; answers are (code, text, value)."""
+        """The master as Python's `xmlrpc.client.ServerProxy`; its methods return (code, text, value)."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.master_uri)
@@ -86,7 +85,7 @@ class Master:
         return list(self._call(method, *args))
 
     def is_online(self) -> bool:
-        """Return whether the master answers."""
+        """Return whether the master responds."""
         try:
             self.getPid()
         except (OSError, MasterException):
@@ -94,7 +93,7 @@ class Master:
         return True
 
     def getPid(self) -> int:
-        """Return the master's process id."""
+        """Return the master's process ID."""
         return int(self._call("getPid"))
 
     def getUri(self) -> str:
@@ -111,7 +110,7 @@ class Master:
         return [list(pair) for pair in self._call("getPublishedTopics", subgraph)]
 
     def getTopicTypes(self) -> list[list[str]]:
-        """Return [[topic, type]] of all topics that the master knows."""
+        """Return [[topic, type]] of all topics known to the master."""
         return [list(pair) for pair in self._call("getTopicTypes")]
 
     def lookupNode(self, node_name: str) -> str:
@@ -139,7 +138,7 @@ class Master:
         return int(self._call("deleteParam", key))
 
     def searchParam(self, key: str) -> str:
-        """Return the nearest parameter of this name."""
+        """Return the name of the closest parameter called ``key``, searching upwards from the caller's namespace."""
         return str(self._call("searchParam", key))
 
     def getParamNames(self) -> list[str]:
@@ -147,11 +146,11 @@ class Master:
         return self._list("getParamNames")
 
     def subscribeParam(self, caller_api: str, key: str) -> object:
-        """Subscribe to a parameter's changes; return its value."""
+        """Subscribe to changes of a parameter; return its value."""
         return as_xmlrpc_client(self._call("subscribeParam", caller_api, key))
 
     def unsubscribeParam(self, caller_api: str, key: str) -> int:
-        """Unsubscribe from a parameter's changes."""
+        """Unsubscribe from changes of a parameter."""
         return int(self._call("unsubscribeParam", caller_api, key))
 
     def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> list[str]:
@@ -180,5 +179,5 @@ class Master:
 
 
 def is_online(master_uri: str | None = None) -> bool:
-    """Return whether a master answers at ``master_uri`` (default: that of the environment)."""
+    """Return whether a master responds at ``master_uri``, by default that of the environment."""
     return Master("/rosgraph", master_uri).is_online()

@@ -1,4 +1,4 @@
-"""Names, with rosgraph's function names. Source: http://wiki.ros.org/Names."""
+"""Functions for graph names, as in ROS's rosgraph.names. Source: http://wiki.ros.org/Names."""
 
 from __future__ import annotations
 
@@ -41,41 +41,41 @@ REMAP_PATTERN = re.compile(r"^([\~\/A-Za-z]|_|__)[\w\/]*:=.*")
 
 
 def is_legal_remap(arg: str | None) -> bool:
-    """Return whether an argument of a command line is a remapping."""
+    """Return whether a command-line argument is a remapping."""
     return arg is not None and REMAP_PATTERN.match(arg) is not None
 
 
 def is_legal_name(name: str | None) -> bool:
-    """Return whether a name may be one of the graph."""
+    """Return whether a string is a legal graph name."""
     return name is not None and _names.is_legal_name(name)
 
 
 def is_legal_base_name(name: str | None) -> bool:
-    """Return whether a name may be one of the graph, without namespaces."""
+    """Return whether a string is a legal graph name without namespaces."""
     return name is not None and _names.is_legal_base_name(name)
 
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global name of ``name`` as the node ``namespace_`` sees it, remapped."""
+    """Return the global name of ``name`` in the node ``namespace_``, remapped."""
     name = canonicalize_name(name)
     if not is_global(name) and not is_private(name):
-        # Refuses what is not a name.
+        # This raises ValueError if ``namespace_`` is not a name.
         namespace(namespace_)
     return _names.resolve(name, namespace_, remappings)
 
 
 def anonymous_name(id: str) -> str:
-    """Return a name that no other node has."""
+    """Return a unique name that starts with ``id``."""
     return _names.anonymous_name(id)
 
 
 def make_caller_id(name: str) -> str:
-    """Return a global name in the namespace of the environment, with a trailing slash."""
+    """Return a global name in the environment's namespace, with a trailing slash."""
     return make_global_ns(ns_join(get_ros_namespace(), name))
 
 
 def script_resolve_name(script_name: str, name: str) -> str:
-    """Return the global name of a name that the command ``script_name`` was given."""
+    """Return the global name of an argument given to the command ``script_name``."""
     if not name:
         return get_ros_namespace()
     if is_global(name):

@@ -1,4 +1,4 @@
-"""The addresses of this machine, and connection headers, with rosgraph's function names.
+"""The addresses of this machine, and connection headers, as in ROS's rosgraph.network.
 
 Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
 """
@@ -39,23 +39,23 @@ __all__ = [
 
 
 class ROSHandshakeException(Exception):
-    """A connection header that cannot be parsed."""
+    """A connection header is incomplete or cannot be parsed."""
 
 
 def get_address_override() -> str | None:
-    """Return ROS_HOSTNAME, or else ROS_IP; None if neither is set. With MINIROSPY_LOCAL=1 it is localhost."""
+    """Return ROS_HOSTNAME, else ROS_IP, else None. With MINIROSPY_LOCAL=1 return localhost."""
     if is_local(os.environ):
         return "localhost"
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
 
 
 def get_host_name() -> str:
-    """Return the name that other nodes reach this machine by."""
+    """Return the host name at which other nodes reach this machine."""
     return Environment.read().host
 
 
 def get_local_address() -> str:
-    """Return the address that other nodes reach this machine by."""
+    """Return the address at which other nodes reach this machine."""
     host = get_address_override()
     if host:
         return host
@@ -63,7 +63,7 @@ def get_local_address() -> str:
 
 
 def get_local_addresses() -> list[str]:
-    """Return the addresses of this machine, IPv6 ones where ROS_IPV6 is on."""
+    """Return the addresses of this machine, including IPv6 addresses if ROS_IPV6 is on."""
     import psutil
 
     families = {socket.AF_INET, socket.AF_INET6} if use_ipv6() else {socket.AF_INET}
@@ -74,7 +74,7 @@ def get_local_addresses() -> list[str]:
 
 
 def is_local_address(hostname: str) -> bool:
-    """Return whether a host is this machine."""
+    """Return whether a host name refers to this machine."""
     try:
         found = {str(info[4][0]) for info in socket.getaddrinfo(hostname, 0, 0, 0, socket.SOL_TCP)}
     except OSError:
@@ -90,17 +90,17 @@ def use_ipv6() -> bool:
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """Return the address that servers listen on."""
+    """Return the address to which servers bind."""
     return (Environment.read(host=address) if address else Environment.read()).bind_host
 
 
 def create_local_xmlrpc_uri(port: int) -> str:
-    """Return the URI of a server on this machine."""
+    """Return the XML-RPC URI of a server on this machine."""
     return f"http://{Environment.read().uri_host}:{port}/"
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
-    """Return (host, port) of a URL; port 80 where it has none. Raise ValueError."""
+    """Return (host, port) of a URL; the port defaults to 80. Raise ValueError."""
     from urllib.parse import urlsplit
 
     if not url:
@@ -112,7 +112,7 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
-    """Return a connection header's bytes, its length in front, fields sorted; names and values are str or bytes.
+    """Return a serialized connection header with its length prefix, fields sorted; names and values are str or bytes.
 
     Raise TypeError.
     """
@@ -131,7 +131,7 @@ def _as_bytes(text: object) -> bytes:
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """Return the fields of a connection header, its length in front. Raise ROSHandshakeException, struct.error."""
+    """Return the fields of a connection header with a length prefix. Raise ROSHandshakeException, struct.error."""
     (size,) = struct.unpack("<I", header_str[:LENGTH_BYTES])
     body = header_str[LENGTH_BYTES : LENGTH_BYTES + size]
     if len(body) < size:
@@ -145,9 +145,9 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 
 
 def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
-    """Return the connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
+    """Read a connection header from a socket; bytes received after it remain in the buffer ``b``.
 
-    Raise ROSHandshakeException if the peer ends before.
+    Raise ROSHandshakeException if the peer closes the connection before the end of the header.
     """
     data = b.getvalue()
     while len(data) < LENGTH_BYTES or len(data) < LENGTH_BYTES + parse_length(data):
@@ -167,7 +167,7 @@ def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -
 
 
 def write_ros_handshake_header(sock: socket.socket, header: Mapping[str, object]) -> int:
-    """Send a connection header; return the number of its bytes."""
+    """Send a connection header; return its size in bytes."""
     data = encode_ros_handshake_header(header)
     sock.sendall(data)
     return len(data)

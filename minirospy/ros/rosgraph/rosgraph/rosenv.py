@@ -1,4 +1,4 @@
-"""The environment's settings, under rosgraph's names."""
+"""The settings of the environment, as in ROS's rosgraph.rosenv."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the URI of the master that the command line (the first ``__master:=``) or else the environment names.
+    """Return the master URI from the first ``__master:=`` on the command line, else from the environment.
 
-    Raise ValueError for one that is empty, or has another ``:=`` in it.
+    Raise ValueError if the argument is empty or contains another ``:=``.
     """
     for argument in sys.argv if argv is None else argv:
         if argument.startswith("__master:="):

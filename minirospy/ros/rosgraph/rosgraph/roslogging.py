@@ -1,4 +1,4 @@
-"""rosgraph.roslogging: the handler that logging configuration files name and programs derive from."""
+"""rosgraph.roslogging: the names used by logging configuration files and by programs with subclasses."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ __all__ = ["LoggingException", "RospyLogger", "configure_logging"]
 
 
 class LoggingException(Exception):
-    """Logging cannot be set up."""
+    """Logging cannot be configured."""
 
 
 class RospyLogger(logging.Logger):
-    """A logger of rospy's. Ours finds its caller without help; programs that mend this class find it."""
+    """The logger class of rospy. minirospy does not need it to find a call's line; it exists for programs that patch it."""
 
 
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder; return its path, which is also in ROS_LOG_FILENAME."""
+    """Log to a file in the log folder; return its path, and set ROS_LOG_FILENAME to it."""
     from pathlib import Path
 
     from minirospy.ros.rospkg.rospkg.environment import get_log_dir
@@ -38,7 +38,7 @@ def configure_logging(
     return str(path)
 
 
-# Of ROS's private names those that programs read and change.
+# Private names of ROS's module that programs read and change.
 _color_reset = "\033[0m"
 _logging_to_rospy_names = {
     "DEBUG": ("DEBUG", "\033[32m"),

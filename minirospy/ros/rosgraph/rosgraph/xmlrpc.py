@@ -1,6 +1,6 @@
-"""rosgraph.xmlrpc: an XML-RPC server in a thread, for tools that are nodes by hand.
+"""rosgraph.xmlrpc: an XML-RPC server in a thread, for programs that implement a node themselves.
 
-Our own nodes do not use it; it is based on Python's xmlrpc.
+minirospy's own nodes do not use it; it is based on Python's xmlrpc.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ _log = logging.getLogger("xmlrpc")
 
 
 class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
-    """A request of HTTP 1.1, logged only if the server wants it."""
+    """Handles HTTP/1.1 requests, and logs them only if the server has ``logRequests``."""
 
     protocol_version = "HTTP/1.1"
     rpc_paths = ()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Log a request."""
+        """Log a request if the server logs requests."""
         if getattr(self.server, "logRequests", False):
             super().log_message(format, *args)
 
 
 class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
-    """Answers each connection in a separate thread."""
+    """Handles each connection in a separate thread."""
 
     daemon_threads = True
     allow_reuse_address = True
@@ -40,24 +40,24 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Ignore peers that disconnect; log everything else."""
+        """Log an error, such as a disconnected peer, at debug level only."""
         _log.debug("connection from %s", client_address, exc_info=True)
 
 
 class XmlRpcHandler:
-    """The root of what an :class:`XmlRpcNode` serves; names that start with an underscore are not served."""
+    """The base class of the methods served by an :class:`XmlRpcNode`; names with a leading underscore are not served."""
 
     def _ready(self, uri: str) -> None:
-        """Handle the start of the server, which listens at ``uri``."""
+        """Handle the start of the server at ``uri``; subclasses override it."""
 
     def _shutdown(self, reason: str) -> None:
-        """Handle the shutdown of the server."""
+        """Handle the shutdown of the server; subclasses override it."""
 
 
 class XmlRpcNode:
-    """Serves the methods of ``rpc_handler`` from a thread, once :meth:`start` was called; ``uri`` says where.
+    """Serves the methods of ``rpc_handler`` in a thread after :meth:`start`; ``uri`` is its address.
 
-    ``on_run_error`` is called with what the server's thread ends by.
+    If the server's thread fails, ``on_run_error`` is called with the exception.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class XmlRpcNode:
         self.on_run_error = on_run_error
 
     def shutdown(self, reason: str) -> None:
-        """End the server. Idempotent."""
+        """Stop the server. Idempotent."""
         if self.is_shutdown:
             return
         self.is_shutdown = True
@@ -85,15 +85,15 @@ class XmlRpcNode:
             self.handler._shutdown(reason)
 
     def start(self) -> None:
-        """Serve from a thread."""
+        """Start a thread that serves."""
         threading.Thread(target=self.run, daemon=True).start()
 
     def set_uri(self, uri: str) -> None:
-        """Say where the server is, instead of what the environment gives."""
+        """Set the URI, replacing the one derived from the environment."""
         self.uri = uri
 
     def run(self) -> None:
-        """Serve in this thread until :meth:`shutdown`."""
+        """Serve in the calling thread until :meth:`shutdown`."""
         try:
             self.server = ThreadingXMLRPCServer((get_bind_address(), int(self.port or 0)), log_requests=False)
             self.port = self.server.server_address[1]
@@ -103,7 +103,7 @@ class XmlRpcNode:
             if isinstance(self.handler, XmlRpcHandler):
                 self.handler._ready(str(self.uri))
             self.server.serve_forever(poll_interval=0.1)
-        except Exception as error:  # the thread's edge: reported to the owner of the node
+        except Exception as error:  # reported to the node's owner
             if self.on_run_error is None:
                 raise
             self.on_run_error(error)

@@ -1,4 +1,4 @@
-"""Actions for asyncio programs: the twins of SimpleActionClient and SimpleActionServer, on a `minirospy.Node`.
+"""Actions for asyncio programs: the counterparts of SimpleActionClient and SimpleActionServer, on a `minirospy.Node`.
 
 ::
 
@@ -19,7 +19,7 @@
     async with ActionServer(node, "run_led", runningLedAction, execute):
         await node.spin()
 
-On the wire they are actionlib's. Which state follows which is in `minirospy.core.graph.goals`. Source:
+On the wire they are compatible with actionlib. The state transitions are in `minirospy.core.graph.goals`. Source:
 http://wiki.ros.org/actionlib/DetailedDescription. Examples: docs/actions.md.
 """
 

@@ -1,4 +1,4 @@
-"""ActionClient of asyncio programs, and the goals that it sends."""
+"""ActionClient for asyncio programs, and the goals that it sends."""
 
 from __future__ import annotations
 
@@ -28,19 +28,17 @@ _M = TypeVar("_M", bound=Message)
 
 
 class ClientGoal(Generic[_R, _F]):
-    """A goal on its way; made by :meth:`ActionClient.send`.
+    """A goal that was sent; created by :meth:`ActionClient.send`.
 
-    ``async for`` over it gives the feedback until the goal has ended. ``await goal`` gives its result; it raises
-    GoalError where the goal was not reached, ROSInterruptException where the client or node ended before.
-    ``async with goal:`` cancels it where the block is left before its end.
+    ``async for`` over it yields the feedback until the goal reaches a terminal state. ``await goal`` returns its result; it
+    raises GoalError if the goal was not reached, ROSInterruptException if the client or node was closed before.
+    ``async with goal:`` cancels it if the block is left earlier.
     """
 
     def __init__(self, id: str, cancel: Callable[[ClientGoal[_R, _F]], None]) -> None:
         self.id = id
-        self.state = GoalState.PENDING
-        """The last status that the server published."""
-        self.text = ""
-        """The server's text on that."""
+        self.state = GoalState.PENDING  # the last status published by the server
+        self.text = ""  # the server's text for this status
         self._cancel = cancel
         self._feedback: deque[_F] = deque(maxlen=WAITING)
         self._news = asyncio.Event()
@@ -50,11 +48,11 @@ class ClientGoal(Generic[_R, _F]):
 
     @property
     def done(self) -> bool:
-        """Return whether the goal has ended."""
+        """Return whether the goal has reached a terminal state."""
         return self._ended.done()
 
     def cancel(self) -> None:
-        """Ask the server to cancel the goal; how it ends is up to the server. Of no effect once it has ended."""
+        """Request the server to cancel the goal; the server decides its final state. Do nothing if the goal is done."""
         if not self.done:
             self._cancel(self)
 
@@ -90,12 +88,12 @@ class ClientGoal(Generic[_R, _F]):
         self._news.set()
 
     def _take_status(self, status: GoalStatus | None) -> None:
-        """Take the server's list, which names the goal or does not."""
+        """Process the goal's status in a list from the server; None if the list does not contain the goal."""
         if status is not None:
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
         elif self._is_known and self.state not in TERMINAL:
-            # The server has forgotten it: it was started again.
+            # The server no longer lists the goal: it was restarted.
             self._end(GoalState.LOST, "the server does not know the goal any more", None)
 
     def _end(self, state: GoalState, text: str, result: _R | None) -> None:
@@ -107,7 +105,7 @@ class ClientGoal(Generic[_R, _F]):
     def _interrupt(self) -> None:
         if not self.done:
             self._ended.set_exception(ROSInterruptException("rospy shutdown"))
-            # Whoever awaits the goal gets it; nobody has to.
+            # Mark the exception as retrieved: asyncio would log it if nobody awaits the goal.
             self._ended.exception()
             self._news.set()
 
@@ -115,7 +113,8 @@ class ClientGoal(Generic[_R, _F]):
 class ActionClient(ActionEnd, Generic[_G, _R, _F]):
     """A client of the action ``name`` of the class ``action``, such as ``runningLedAction``.
 
-    ``async with`` it, or ``await client.close()`` in the end. Raise ActionException on a class that is not an action.
+    Use it with ``async with``, or call ``await client.close()`` when done. Raise ActionException if ``action`` is not an
+    action class.
     """
 
     _numbers = itertools.count(1)
@@ -138,14 +137,14 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._registration = asyncio.ensure_future(self._register())
 
     async def wait_for_server(self, timeout: float | None = None) -> None:
-        """Wait until a server is connected by all five topics. Raise TimeoutError after ``timeout`` seconds."""
+        """Wait until a server is connected on all five topics. Raise TimeoutError after ``timeout`` seconds."""
         try:
             await asyncio.wait_for(self._wait_for_server(), timeout)
         except asyncio.TimeoutError:
             raise TimeoutError(f"timeout exceeded while waiting for the action server {self.name}") from None
 
     def send(self, goal: _G) -> ClientGoal[_R, _F]:
-        """Send a goal, as soon as a server is connected. Raise ROSException once the client is closed."""
+        """Send a goal as soon as a server is connected. Raise ROSException if the client is closed."""
         if self._is_closed or self._node.is_shutdown:
             raise ROSException(f"send() of a closed action client of {self.name}")
         now = self._node.now()
@@ -158,11 +157,11 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return sent
 
     def cancel_all(self) -> None:
-        """Ask the server to cancel all its goals, other clients' too."""
+        """Request the server to cancel all its goals, including those of other clients."""
         self._start(self._cancel.publish(GoalID()))
 
     async def close(self) -> None:
-        """Leave the action's topics; goals go on, without any further notification. Idempotent."""
+        """Unregister from the action's topics. Running goals continue on the server without notifications. Idempotent."""
         self._is_closed = True
         for goal in list(self._goals.values()):
             goal._interrupt()
@@ -194,7 +193,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
             self._start(self._send_cancel(goal))
 
     async def _send_cancel(self, goal: ClientGoal[_R, _F]) -> None:
-        # Who only looks at the goals, as `rostopic echo`, is connected, too.
+        # A connection does not prove that a server exists: `rostopic echo` of the goal topic also connects.
         if goal._is_sent and self._goal.num_connections:
             await self._cancel.publish(GoalID(id=goal.id))
         else:
@@ -217,7 +216,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
-            # Feedback has a separate connection: what has arrived by now is read first.
+            # Feedback has a separate connection: first process the feedback that has arrived by now.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

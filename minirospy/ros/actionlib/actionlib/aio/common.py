@@ -1,4 +1,4 @@
-"""The common part of both ends of an action in asyncio programs: the action's class, its topics and tasks."""
+"""The common part of asyncio action clients and servers: the action's class, its topics and tasks."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ _G_co = TypeVar("_G_co", covariant=True)
 _R_co = TypeVar("_R_co", covariant=True)
 _F_co = TypeVar("_F_co", covariant=True)
 
-WAITING = 1000
-"""Messages that may wait for this program, of each topic of an action; and feedback of a goal that nobody reads."""
+WAITING = 1000  # queue length in messages, of each topic of an action and of a goal's unread feedback
 
 
 class _WithGoal(Protocol[_G_co]):
@@ -39,7 +38,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """The members of an action's class, as ``runningLedAction``: the classes of its goal, result and feedback."""
+    """The attributes of an action class such as ``runningLedAction``: the classes of its goal, result and feedback."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
@@ -52,9 +51,9 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 
 
 class GoalError(MinirospyError):
-    """A goal that was not reached: the server's ``text``, the ``result`` that came all the same, how it ended.
+    """A goal that was not reached: the server's ``text``, its ``result``, if any, and the final ``state``.
 
-    A server's ``execute`` raises it to abort the goal with a text and a result, in any form that it may return.
+    A server's ``execute`` raises it to abort the goal with a text and a result, in any form that it may also return.
     """
 
     def __init__(self, text: str = "", result: object = None, state: GoalState = GoalState.ABORTED) -> None:
@@ -65,7 +64,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """The common part of both ends: their topics, and tasks that read them."""
+    """The common base of client and server: their topics, and the tasks that read them."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)
@@ -75,7 +74,7 @@ class ActionEnd(Handle):
         self._is_closed = False
 
     def _topic(self, name: str) -> str:
-        # Each topic may be remapped by itself.
+        # Each topic can be remapped separately.
         return self._node.resolve(f"{self.name}/{name}")
 
     def _start(self, work: Coroutine[object, None, None]) -> asyncio.Task[None]:

@@ -1,4 +1,4 @@
-"""ActionServer of asyncio programs, and the goals that it gets."""
+"""ActionServer for asyncio programs, and the goals that it receives."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
 
+# Pause after a list of statuses, per goal in it: publishing them must not use all the server's time.
 _SECONDS_A_STATUS = 1e-4
-"""A list of statuses is published after a pause that grows with it: a busy server has better things to do."""
 
 _EVENTS = {
     GoalState.PREEMPTED: GoalEvent.CANCEL,
@@ -37,15 +37,12 @@ _EVENTS = {
 
 
 class ServerGoal(Generic[_G, _F]):
-    """A goal that a server got; what ``execute`` works on."""
+    """A goal received by a server; the argument of ``execute``."""
 
     def __init__(self, server: ActionServer[_G, Any, _F], message: ActionGoal) -> None:
-        self.request = cast("_G", message.goal)
-        """What is requested: the goal's message."""
-        self.is_cancel_requested = False
-        """Whether the goal is to make way: a client has cancelled it, or a newer one has come."""
-        self.text = ""
-        """The text that is sent with the goal's end."""
+        self.request = cast("_G", message.goal)  # the goal message
+        self.is_cancel_requested = False  # set if a client has cancelled the goal, or a newer one has arrived
+        self.text = ""  # sent with the goal's final status
         self._server = server
         self._status = GoalStatus(goal_id=cast("GoalID", message.goal_id))
         self._task: asyncio.Task[None] | None = None
@@ -54,16 +51,16 @@ class ServerGoal(Generic[_G, _F]):
 
     @property
     def id(self) -> str:
-        """The goal's id."""
+        """The goal's ID."""
         return self._status.goal_id.id
 
     @property
     def state(self) -> GoalState:
-        """Return the progress of the goal."""
+        """Return the status of the goal."""
         return GoalState(self._status.status)
 
     async def publish_feedback(self, *args: object, **kwds: object) -> None:
-        """Send feedback to the goal's client: the feedback's message, or its fields."""
+        """Send feedback to the goal's client: pass the feedback message, or its fields."""
         await self._server._publish_feedback(self, args, kwds)
 
     def _step(self, event: GoalEvent, text: str = "") -> None:
@@ -72,10 +69,10 @@ class ServerGoal(Generic[_G, _F]):
             self._status.status, self._status.text = int(state), text
 
     def _make_way(self) -> None:
-        """Cancel what works on it; once."""
+        """Cancel the task that executes the goal. Repeated calls have no effect."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # A task that has not started would end silently.
+            # Cancelling a task before it starts would end it without a result for the client.
             if self._has_begun:
                 self._task.cancel()
 
@@ -86,16 +83,17 @@ Execute = Callable[[ServerGoal[_G, _F]], Awaitable[object]]
 class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     """The server of the action ``name``: runs ``await execute(goal)`` for each goal.
 
-    What ``execute`` returns is the result (a result, a dictionary of fields, all values, the value of the only
-    field, None for an empty one), and the goal has succeeded. GoalError aborts it, with a text and a result; so does
-    any other exception, which is logged.
-    Where a client cancels the goal, ``execute`` is cancelled: CancelledError is raised where it waits, and the
-    goal is preempted, with the result that it returns all the same.
+    If ``execute`` returns, the goal has succeeded, and the return value is its result: a result message, a dictionary of
+    fields, all values, the value of the only field, or None for an empty result. GoalError aborts the goal, with a text and
+    a result; any other exception also aborts it, and is logged.
+    If a client cancels the goal, ``execute`` is cancelled: CancelledError is raised at its current ``await``. The goal is
+    then preempted, with the result that ``execute`` may still return.
 
-    One goal runs at a time, and a newer one takes its place, as in SimpleActionServer; with ``concurrent`` each
-    runs beside the others. ``accepts(goal)`` may refuse a goal by returning False.
+    One goal runs at a time, and a newer one preempts it, as in SimpleActionServer; with ``concurrent``, goals run
+    concurrently. ``accepts(goal)`` may reject a goal by returning False.
 
-    ``async with`` it, or ``await server.close()`` in the end. Raise ActionException on a class that is not an action.
+    Use it with ``async with``, or call ``await server.close()`` when done. Raise ActionException if ``action`` is not an
+    action class.
     """
 
     def __init__(
@@ -133,7 +131,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._registration = self._start(self._register())
 
     async def close(self) -> None:
-        """Leave the action's topics; goals that run are aborted. Idempotent."""
+        """Unregister from the action's topics, and abort running goals. Idempotent."""
         self._is_closed = True
         await self._end_tasks()
         for end in (*self._subscriptions, self._result, self._feedback, self._status):
@@ -164,7 +162,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     ) -> None:
         async for message in subscription:
             await take(message)
-        # The node ends: what runs is to end with it.
+        # The node is shutting down: stop the running goals.
         for goal in self._running():
             if goal._task:
                 goal._task.cancel()
@@ -217,13 +215,13 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
         if cancel.id and cancel.id not in self._goals:
-            # The goal may be on its way.
+            # The goal may still arrive.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
         self._changed.set()
 
     async def _run(self, goal: ServerGoal[_G, _F], before: list[asyncio.Task[None]]) -> None:
-        """Work on a goal, when those before it have made way."""
+        """Execute a goal, after the goals that it preempts have finished."""
         event, result, returned = GoalEvent.SUCCEED, None, None
         goal._has_begun = True
 
@@ -267,7 +265,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         message = self._types.action_result(status=goal._status, result=result or self._types.result())
         message.header.stamp = now
         self._changed.set()
-        # A node that ends says no more.
+        # Publishing fails if the node is shutting down.
         with contextlib.suppress(ROSException):
             await self._result.publish(message)
 
@@ -282,7 +280,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         await self._feedback.publish(message)
 
     async def _publish_regularly(self, period: float) -> None:
-        """Publish the statuses of all goals: on a change, and regularly."""
+        """Publish the statuses of all goals: periodically, and after each change."""
         while not self._node.is_shutdown:
             self._changed.clear()
             now = self._node.now()

@@ -1,1 +1,1 @@
-"""cv_bridge.boost: what cv_bridge has in C++, here in Python."""
+"""cv_bridge.boost: the functions that ROS implements in C++, here in Python."""

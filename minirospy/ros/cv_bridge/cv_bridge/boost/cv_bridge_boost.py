@@ -1,4 +1,4 @@
-"""cv_bridge.boost.cv_bridge_boost: types of encodings and conversions of colors, without CvBridge around them."""
+"""cv_bridge.boost.cv_bridge_boost: encoding types and color conversions, independent of CvBridge."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ __all__ = ["CV_MAT_CNWrap", "CV_MAT_DEPTHWrap", "cvtColor2", "getCvType"]
 
 
 def CV_MAT_CNWrap(i: int) -> int:
-    """Return the number of channels of OpenCV's number of a type."""
+    """Return the number of channels in an OpenCV type number."""
     return i // 8 + 1
 
 
 def CV_MAT_DEPTHWrap(i: int) -> int:
-    """Return the depth of OpenCV's number of a type: 0 for 8U, 5 for 32F."""
+    """Return the depth in an OpenCV type number: 0 for 8U, 5 for 32F."""
     return i % 8
 
 
 def cvtColor2(obj_in: Pixels, encoding_in: str, encoding_out: str) -> Pixels:
-    """Return an image in another encoding. Raise RuntimeError if there is no such conversion."""
+    """Convert an image to another encoding. Raise RuntimeError if there is no such conversion."""
     try:
         return _converted(obj_in, encoding_in, encoding_out)
     except CvBridgeError as error:

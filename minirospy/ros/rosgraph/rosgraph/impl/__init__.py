@@ -1,1 +1,1 @@
-"""rosgraph.impl: the graph as it is polled."""
+"""rosgraph.impl: polling the graph."""

@@ -1,6 +1,6 @@
 """rosgraph.impl.graph: the graph as edges between nodes and topics.
 
-All of it comes from the master, so that ``update()`` waits for no node; so none is ever in ``bad_nodes``.
+All data comes from the master, so ``update()`` waits for no node, and ``bad_nodes`` is always empty.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """Return a topic's node in the graph: its name after a space."""
+    """Return the name of a topic's node in the graph: the topic after a space."""
     return " " + topic
 
 
 def node_topic(node: str) -> str:
-    """Return the topic of a name made by :func:`topic_node`."""
+    """Return the topic of a name returned by :func:`topic_node`."""
     return node[1:]
 
 
 class BadNode:
-    """A node that does not answer as it should."""
+    """A node that does not respond correctly."""
 
     DEAD = 0
     WONKY = 1
@@ -39,7 +39,7 @@ class BadNode:
 
 
 class Edge:
-    """A line from ``start`` to ``end``, for the topic ``label``."""
+    """A directed edge from ``start`` to ``end``, for the topic ``label``."""
 
     __slots__ = ["end", "key", "label", "rkey", "start"]
 
@@ -65,7 +65,7 @@ class Edge:
 
 
 class EdgeList:
-    """Edges, each once, in the order in which they came."""
+    """A set of edges in insertion order."""
 
     def __init__(self, edges: Iterable[Edge] = ()) -> None:
         self._edges = dict.fromkeys(edges)
@@ -85,40 +85,40 @@ class EdgeList:
     __hash__ = None  # type: ignore[assignment]
 
     def has(self, edge: Edge) -> bool:
-        """Return whether an edge is there."""
+        """Return whether the list contains an edge."""
         return edge in self._edges
 
     def add(self, edge: Edge) -> bool:
-        """Add an edge; False if it is there."""
+        """Add an edge; return False if it already exists."""
         if edge in self._edges:
             return False
         self._edges[edge] = None
         return True
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
-        """Add the edge of a row of getBusInfo, both for the direction ``b``; return whether one is new."""
+        """Add the edges for a row of getBusInfo, see :func:`edge_args`; return whether one of them is new."""
         added = [self.add(Edge(*each)) for each in edge_args(start, dest, direction, label)]
         return any(added)
 
     def delete(self, edge: Edge) -> None:
-        """Take an edge out."""
+        """Remove an edge."""
         self._edges.pop(edge, None)
 
     def delete_all(self, node: str) -> None:
-        """Take out every edge that starts or ends at a node."""
+        """Remove every edge that starts or ends at a node."""
         self._edges = {each: None for each in self._edges if node not in (each.start, each.end)}
 
 
 def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
-    """Return [(start, end, label)] of a row of getBusInfo: reversed for the direction ``i``, both for ``b``, none for another."""
+    """Return [(start, end, label)] for a row of getBusInfo: reversed for direction ``i``, both for ``b``, [] if unknown."""
     there, back = (start, dest, label), (dest, start, label)
     return {"o": [there], "i": [back], "b": [there, back]}.get(direction, [])
 
 
 class Graph:
-    """The graph at and below ``node_ns`` and ``topic_ns``, once :meth:`update` was called.
+    """The graph at and below ``node_ns`` and ``topic_ns``; empty until :meth:`update` is called.
 
-    ``nn_nodes``: node names; ``nt_nodes``: topics as :func:`topic_node` names them; ``nn_edges``: from node to node;
+    ``nn_nodes``: node names; ``nt_nodes``: topics, named by :func:`topic_node`; ``nn_edges``: from node to node;
     ``nt_edges``, ``nt_all_edges``: from node to topic and from topic to node; ``srvs``: service names.
     """
 
@@ -137,19 +137,19 @@ class Graph:
         self.last_master_refresh = 0.0
 
     def set_master_stale(self, stale_secs: float) -> None:
-        """Set the seconds between queries of the master."""
+        """Set the minimum number of seconds between queries of the master."""
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
-        """Accept the seconds between queries of a node; has no effect, as nodes are not queried."""
+        """Do nothing: accepted for compatibility, because nodes are not queried."""
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Query the nodes in ``bad_nodes`` again. Return False, as there are none."""
+        """Return False: there are never nodes in ``bad_nodes`` to query again."""
         return False
 
     def update(self) -> bool:
-        """Query the master, unless the last query is recent. Return whether the graph has changed."""
+        """Query the master, unless the last query is too recent; return whether the graph has changed."""
         if time.time() - self.last_master_refresh < self.master_stale:
             return False
 
@@ -183,7 +183,7 @@ class Graph:
         return before != (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
 
     def _side(self, table: list[tuple[str, list[str]]]) -> dict[str, list[str]]:
-        """Return topic -> nodes, of the topics in the namespace."""
+        """Return the topics in the namespace, each with its nodes in the namespace."""
         kept = {
             topic: [node for node in nodes if in_namespace(node, self.node_ns)]
             for topic, nodes in table
