@@ -1,4 +1,4 @@
-"""The asyncio-native API: nodes that live in the program's own event loop, without a thread.
+"""The asyncio-native API: nodes that run in the program's own event loop, without a thread.
 
 ::
 
@@ -6,7 +6,7 @@
         async for scan in node.subscribe("/scan", LaserScan):
             await node.publish("/nearest", Float32(min(scan.ranges)))
 
-A program may hold any number of nodes. Underneath are the objects that the rospy API is built on
+A program may have any number of nodes. They use the same objects as the rospy API
 (``minirospy.runtime``). Examples: docs/asyncio.md.
 """
 

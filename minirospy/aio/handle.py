@@ -1,4 +1,4 @@
-"""The common part of publishers, subscriptions and services: they are registered in the background."""
+"""The common base of publishers, subscriptions and services, which register in the background."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _H = TypeVar("_H", bound="Handle")
 
 
 class Handle:
-    """Something that is registered in the background: ``await handle`` waits until the master knows of it."""
+    """An object that registers in the background: ``await handle`` waits until the master knows it."""
 
     _registration: asyncio.Task[None]
 
@@ -42,14 +42,14 @@ class Handle:
         await self.close()
 
     async def close(self) -> None:
-        """End it."""
+        """Close the handle."""
         raise NotImplementedError
 
 
 async def registered(
     register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
-    """Register; a master that says no is logged, as in rospy, and the program goes on."""
+    """Wait for a registration; as in rospy, a refusal by the master is only logged."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:

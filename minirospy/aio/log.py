@@ -1,4 +1,4 @@
-"""Log lines of a node in an event loop: to the terminal and to /rosout, by Python's ``logging``."""
+"""The log handlers of a node in an event loop, for the terminal and /rosout; they use Python's ``logging``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["RosoutHandler", "TerminalHandler"]
 
 
 class TerminalHandler(logging.Handler):
-    """Lines as rospy prints them: debug and info to stdout, the rest to stderr."""
+    """Prints log lines like rospy: debug and info to stdout, other levels to stderr."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class TerminalHandler(logging.Handler):
 
 
 class RosoutHandler(logging.Handler):
-    """Log records to /rosout."""
+    """Publishes log records to /rosout."""
 
     def __init__(self, node: Node, publisher: Publisher[Log], message_class: type[Log]) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""A node in an event loop: its lifetime, and access to its topics, services, parameters and time."""
+"""A node in an event loop: its lifetime, and its topics, services, parameters and time."""
 
 from __future__ import annotations
 
@@ -50,29 +50,29 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
-MAX_REGISTRATION_FAULTS = 5  # lines in ten seconds: a bridge may have thousands of topics
+MAX_REGISTRATION_FAULTS = 5  # log lines in ten seconds: a bridge may have thousands of topics
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
-"""What the Slave API says when `shutdown` is called."""
+"""The text that the Slave API logs when `shutdown` is called."""
 
 
 class _Unspecified:
-    """The default of ``default``: None is a value that a caller may want back."""
+    """The default of ``default``, since a caller may want None back."""
 
 
 _UNSPECIFIED = _Unspecified()
 
 
 class Node:
-    """A node of the computation graph, alive inside ``async with Node("name") as node:``.
+    """A node of the computation graph, which exists inside ``async with Node("name") as node:``.
 
-    ``name`` is without a namespace; ``anonymous`` adds a number to it. ``argv`` are remappings, private
+    ``name`` is without a namespace; ``anonymous`` appends a number to it. ``argv`` are remappings, private
     parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
-    default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
-    for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
-    ``simulated_time``: whether the node follows /clock where /use_sim_time is set.
+    default none, since a process may have several nodes). ``master_uri``, ``host`` and ``namespace`` replace
+    ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines are published to /rosout.
+    ``simulated_time``: whether the node follows /clock if /use_sim_time is set.
 
-    Entering waits for a master. All methods belong to the event loop that entered, but for :meth:`shutdown`.
+    Entering waits for a master. Call all methods except :meth:`shutdown` in the event loop that entered.
     Source: http://wiki.ros.org/Nodes.
     """
 
@@ -105,12 +105,12 @@ class Node:
         name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
-        """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+        """Python's logger of this node, which writes to the terminal, like rospy, and to /rosout."""
+        # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, MAX_REGISTRATION_FAULTS)
-        """Logs what the master has not registered."""
 
+        # The reason given by another process, such as the master for a new node of the same name
         self.shutdown_request = ""
-        """Why another process has requested that this node ends, such as the master for a new node of its name."""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
         self._rosout = rosout
@@ -140,7 +140,7 @@ class Node:
         await self.close()
 
     async def start(self) -> None:
-        """Open the node's servers and wait for a master; what ``async with`` does first.
+        """Open the node's servers and wait for a master; entering ``async with`` calls this.
 
         Raise ROSInitException if the node cannot listen, or has been started before.
         """
@@ -185,7 +185,7 @@ class Node:
             raise
 
     async def close(self) -> None:
-        """Leave the graph: topics and services end, the node unregisters. Idempotent."""
+        """Leave the graph: close topics and services, unregister the node. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -204,9 +204,9 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Ask the node to end, from any thread: :meth:`spin` and loops over messages end, sleeps are interrupted.
+        """Request the node to shut down, from any thread: :meth:`spin` and loops over messages return, sleeps are interrupted.
 
-        The node leaves the graph when its ``async with`` block ends. `rosnode kill` ends here too.
+        The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
         request = _REQUEST.match(str(reason))
         if request:
@@ -217,7 +217,7 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Return whether the node has found a master, and is in the graph."""
+        """Return whether the node has found a master, and so is in the graph."""
         return self._is_started
 
     @property
@@ -227,7 +227,7 @@ class Node:
 
     @property
     def is_shutdown(self) -> bool:
-        """Return whether the node is about to end, or has ended."""
+        """Return whether the node is shutting down, or has shut down."""
         return self._stopping.is_set()
 
     async def spin(self) -> None:
@@ -248,9 +248,9 @@ class Node:
     def subscribe(self, topic: str, message_class: type[_M], *, queue_size: int = 10) -> Subscription[_M]:
         """Subscribe to ``topic`` and return its messages, for ``async for``.
 
-        While the program is busy, the newest ``queue_size`` messages wait; older ones are dropped and counted
-        (``dropped``). Listening starts immediately, in the background; ``await node.subscribe(...)`` waits until
-        the master knows. It ends by :meth:`Subscription.close`, or when the subscription is garbage-collected.
+        While the program is busy, the newest ``queue_size`` messages are queued; older ones are dropped and counted
+        (``dropped``). The subscription starts immediately, in the background; ``await node.subscribe(...)`` waits until
+        the master knows it. It is closed by :meth:`Subscription.close`, or when it is garbage-collected.
         Raise ValueError on a ``queue_size`` below 1.
         """
         if queue_size < 1:
@@ -269,10 +269,10 @@ class Node:
         type_: InterfaceType | None = None,
         on_change: Callable[[], object] | None = None,
     ) -> RawSubscription:
-        """Subscribe to ``topic``, of any type without ``type_``: ``deliver(bytes, publisher's connection header)``.
+        """Subscribe to ``topic``, of any type unless ``type_`` is given: ``deliver(bytes, publisher's connection header)``.
 
-        It is called on the loop, and has to be quick; so is ``on_change``, when a publisher has connected. The bytes may be
-        kept. ``await node.subscribe_raw(...)`` waits until the master knows.
+        ``deliver`` is called on the loop, and must be quick; the same applies to ``on_change``, called when a publisher has
+        connected. The bytes may be kept. ``await node.subscribe_raw(...)`` waits until the master knows the subscription.
         """
         resolved = self.resolve(topic)
         state = self._subscribed.get(resolved)
@@ -284,7 +284,7 @@ class Node:
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
         """Return the next message of ``topic``.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
         """
         async with self.subscribe(topic, message_class, queue_size=1) as subscription:
             return await subscription.next(timeout)
@@ -302,8 +302,8 @@ class Node:
     ) -> Publisher[_M]:
         """Return a publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
 
-        ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
-        number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets the
+        ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: no
+        limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives the
         last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
         has connected or disconnected. Raise ValueError if this node publishes the topic with another type.
         """
@@ -338,7 +338,7 @@ class Node:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher._wait_for_expected()))
         publisher, expected = kept
-        # Others that publish meanwhile wait, too.
+        # Concurrent publishers of the topic wait, too.
         await asyncio.wait([expected])
         await publisher.publish(message)
 
@@ -349,8 +349,8 @@ class Node:
     ) -> _Response:
         """Call a service, with a request or its fields, and return its response.
 
-        Raise ServiceException if the call fails, TypeError or AttributeError where the arguments do not
-        fit the request, SerializationError where a value does not. Cancelling it hangs up.
+        Raise ServiceException if the call fails, TypeError or AttributeError if the arguments do not
+        match the request, SerializationError if a value does not. Cancelling the call closes its connection.
         """
         return await self.service_proxy(service, service_class)(*args, **kwds)
 
@@ -362,7 +362,7 @@ class Node:
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> ServiceProxy[_Response]:
-        """Return a function for many calls: ``await proxy(...)``; ``persistent`` keeps one connection for all."""
+        """Return a function for repeated calls: ``await proxy(...)``; ``persistent`` keeps one connection for all calls."""
         return ServiceProxy(self, self.resolve(service), service_class, persistent, headers)
 
     def serve(
@@ -375,8 +375,8 @@ class Node:
 
         ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
         their values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
-        other in a worker thread. What it raises goes to the client as the call's error.
-        Raise ServiceException if this node offers the service already.
+        other in a worker thread. An exception from it becomes the error of the client's call.
+        Raise ServiceException if this node already offers the service.
         """
         resolved = self.resolve(service)
         if resolved in self._served:
@@ -386,7 +386,7 @@ class Node:
     async def wait_for_service(self, service: str, timeout: float | None = None) -> None:
         """Wait until a service is registered and answers.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
         """
         name = self.resolve(service)
         try:
@@ -409,7 +409,7 @@ class Node:
             return default
 
     async def set_param(self, name: str, value: object) -> None:
-        """Set a parameter; a dictionary sets a whole namespace. Raise RpcError on a value of no XML-RPC type."""
+        """Set a parameter; a dictionary sets a whole namespace. Raise RpcError on a value that has no XML-RPC type."""
         await self._node.master("setParam", self.resolve(name), value)
 
     async def has_param(self, name: str) -> bool:
@@ -424,7 +424,7 @@ class Node:
             raise KeyError(name) from error
 
     async def search_param(self, name: str) -> str | None:
-        """Return the full name of the parameter nearest to this node's namespace; None if there is none."""
+        """Return the full name of the closest parameter, upwards from this node's namespace; None if there is none."""
         try:
             return str(await self._node.master("searchParam", name))
         except RpcRefused:
@@ -437,14 +437,14 @@ class Node:
     # --- time
 
     def now(self) -> Time:
-        """Return the time: simulated with /use_sim_time (zero until the first /clock), else the machine's."""
+        """Return the time: simulated with /use_sim_time (zero until the first /clock), otherwise the machine's."""
         now = self._simulated.now if self._simulated else time.time_ns()
         return Time(*divmod(now, _BILLION))
 
     async def sleep(self, duration: float | Duration) -> None:
         """Sleep for ``duration`` seconds of the node's time.
 
-        Raise ROSInterruptException if the node ends meanwhile, ROSTimeMovedBackwardsException where
+        Raise ROSInterruptException if the node shuts down meanwhile, ROSTimeMovedBackwardsException if
         simulated time jumps back.
         """
         seconds = duration.to_sec() if isinstance(duration, Duration) else duration
@@ -457,7 +457,7 @@ class Node:
             raise ROSInterruptException("ROS shutdown request")
 
     def rate(self, hz: float) -> Rate:
-        """``async for _ in node.rate(10): ...`` runs ten times a second, until the node ends."""
+        """Return a rate: ``async for _ in node.rate(10): ...`` iterates ten times per second, until the node shuts down."""
         return Rate(self, hz)
 
     # --- within
@@ -483,7 +483,7 @@ class Node:
         return task
 
     def _later(self, work: Callable[[], Coroutine[object, object, None]]) -> None:
-        """Do ``work`` on the loop, from any thread; not at all once the node is closed."""
+        """Run ``work`` on the loop, from any thread; do nothing if the node is closed."""
         if self._loop and not self._is_closed:
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(lambda: None if self._is_closed else self._spawn(work()))
@@ -499,7 +499,7 @@ class Node:
                     is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
-                return  # a master, though one that lacks this call, as that of @foxglove/ros1
+                return  # a master, though one without this call, such as that of @foxglove/ros1
             else:
                 return
 
@@ -525,7 +525,7 @@ class Node:
     def _start_logging(self) -> None:
         if self.log.level == logging.NOTSET:
             self.log.setLevel(logging.INFO)
-        # A program that has set up logging gets the lines in its own way.
+        # A program that has configured logging gets the lines through its own handlers.
         if not self.log.hasHandlers():
             self._add_handler(TerminalHandler(self))
 

@@ -1,4 +1,4 @@
-"""Changes of parameters, of which the master notifies this node."""
+"""Changes of parameters, as reported by the master."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["ParameterWatch"]
 
 
 class ParameterWatch:
-    """The parameters that a node is subscribed to; ``listeners(name, value)`` are called on the loop.
+    """The parameters that a node has subscribed to; ``listeners(name, value)`` are called on the loop.
 
-    A parameter that is deleted has the value ``{}``, as the master sends it. After the master's restart it is
-    subscribed again. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
+    A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master the parameters are
+    subscribed to again. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
     """
 
     def __init__(self, node: Node, loop: asyncio.AbstractEventLoop) -> None:
@@ -28,7 +28,7 @@ class ParameterWatch:
         self._loop = loop
 
     async def add(self, name: str) -> object:
-        """Subscribe to a parameter (global name) and return its value, ``{}`` where it is not set.
+        """Subscribe to a parameter (global name) and return its value, or ``{}`` if it is not set.
 
         Raise MasterUnreachableError, RpcError.
         """
@@ -44,16 +44,16 @@ class ParameterWatch:
         await runtime.master("unsubscribeParam", runtime.uri, name)
 
     def changed_in_worker(self, name: str, value: object) -> None:
-        """Pass on a change, of which the master has notified the node's server."""
+        """Pass on a change that the master has sent to the node's server."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._changed, name, value)
 
     def forgotten_in_worker(self) -> None:
-        """Subscribe again at a master that has restarted."""
+        """Subscribe again after the master has restarted."""
         self._node._later(self._add_again)
 
     def _changed(self, name: str, value: object) -> None:
-        # The master reports names below the one that was subscribed to with a slash at the end.
+        # If the name is below the one subscribed to, the master reports it with a trailing slash.
         for listener in list(self.listeners):
             listener(name.rstrip("/") or "/", value)
 

@@ -1,4 +1,4 @@
-"""Topics and services as bytes, of any type, for programs that pass them on: bridges, relays."""
+"""Topics and services of any type as bytes, for programs that forward them, such as bridges and relays."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PROBE_SECONDS = 5.0
 
 
 class RawSubscription(Handle):
-    """The messages of a topic as they come; made by :meth:`Node.subscribe_raw`, ended by :meth:`close`."""
+    """A topic's messages as bytes, delivered as they arrive; made by :meth:`Node.subscribe_raw`, closed by :meth:`close`."""
 
     def __init__(
         self,
@@ -52,11 +52,11 @@ class RawSubscription(Handle):
 
     @property
     def headers(self) -> list[Header]:
-        """The connection headers of the publishers that are connected: the objects that ``deliver`` gets."""
+        """The connection headers of the connected publishers: the same objects that are passed to ``deliver``."""
         return [link.header for link in self._state.subscription.links]
 
     async def close(self) -> None:
-        """Stop listening. Idempotent."""
+        """Unsubscribe. Idempotent."""
         callback, self._on_change = self._on_change, None
         if callback is not None:
             self._state.subscription.on_connected.remove(callback)
@@ -66,13 +66,13 @@ class RawSubscription(Handle):
         self._deliver(frame, header)
 
     def _end(self) -> None:
-        """There is nothing to end: nobody waits."""
+        """Do nothing: no task waits for messages."""
 
 
 class RawService(Handle):
-    """A service that works on bytes: ``handler(request, client's connection header)`` returns those of the response.
+    """A service that works on bytes: ``handler(request, client's connection header)`` returns the response's bytes.
 
-    What it raises as ServiceException goes to the client as the call's error. ``await`` it until the master knows it.
+    A ServiceException from it becomes the error of the client's call. ``await`` waits until the master knows the service.
     """
 
     def __init__(self, node: Node, name: str, type_: InterfaceType, handler: AsyncHandler) -> None:
@@ -93,14 +93,14 @@ class RawService(Handle):
         )
 
     async def close(self) -> None:
-        """Stop offering the service; calls under way get their answers. Idempotent."""
+        """Stop offering the service; calls in progress get their answers. Idempotent."""
         await asyncio.wait([self._registration])
         with contextlib.suppress(MasterUnreachableError, RpcError):
             await self._node._node.unserve(self._server)
 
 
 def raw_class(type_: InterfaceType) -> type[Message]:
-    """Return a class that gives a topic its type, for ``advertise`` and ``Publisher.publish_raw``: it has no fields."""
+    """Return a message class without fields that gives a topic its type, for ``advertise`` and ``Publisher.publish_raw``."""
     fields = {
         "_type": type_.name,
         "_md5sum": type_.md5sum,
@@ -115,7 +115,7 @@ ANY_CLASS = raw_class(InterfaceType(ANY, ANY))
 
 
 async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> bytes:
-    """Return the bytes that a service answers to those of a request. Raise ServiceException with the reason."""
+    """Return the bytes of a service's response to the bytes of a request. Raise ServiceException with the reason."""
     client = await _connect(node, service, md5sum)
     try:
         return await client.call(request)
@@ -130,7 +130,7 @@ async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> byt
 
 
 async def service_header(node: Node, service: str) -> Header:
-    """Return the connection header that a service answers with, its type among it. Raise ServiceException."""
+    """Return a service's connection header, which includes its type. Raise ServiceException."""
     client = await _connect(node, service, ANY, probe=True)
     client.close()
     return client.header

@@ -37,7 +37,7 @@ _Response_co = TypeVar("_Response_co", bound=Message, covariant=True)
 
 
 class ServiceClass(Protocol[_Request_co, _Response_co]):
-    """The members of a service class, as ``std_srvs.srv.SetBool``: the classes of its request and response."""
+    """The members of a service class, such as ``std_srvs.srv.SetBool``: the classes of its request and response."""
 
     @property
     def _md5sum(self) -> str: ...
@@ -94,16 +94,16 @@ class ServiceProxy(Generic[_Response_co]):
                 keeping = isinstance(error.__cause__, CallFailed)
                 raise
             finally:
-                # Cancelled in the middle, the answer would be taken for that of the next call.
+                # After a cancelled call, the next one would read the cancelled call's answer.
                 if not keeping:
                     self._disconnect()
 
         return response
 
     def close(self) -> None:
-        """Close a persistent connection; a call that another task makes by it fails. Idempotent."""
+        """Close a persistent connection; a call that another task makes on it fails. Idempotent."""
         if self._lock.locked() and self._client:
-            # The call closes it: a socket that is closed meanwhile would leave that waiting.
+            # The call closes the socket; closing it here would leave the call waiting.
             self._client.hang_up()
         else:
             self._disconnect()
@@ -149,7 +149,7 @@ class ServiceProxy(Generic[_Response_co]):
         response = self._service_class._response_class()
         try:
             response.deserialize(body)
-        except Exception as error:  # whatever a foreign message class raises on bad bytes
+        except Exception as error:  # any error of a third-party message class on invalid bytes
             raise ServiceException(f"transport error completing service call: {error}") from error
         response._connection_header = client.header
         return response
@@ -193,7 +193,7 @@ class Service(Handle):
         )
 
     async def close(self) -> None:
-        """Stop offering the service; calls under way get their answers. Idempotent."""
+        """Stop offering the service; calls in progress get their answers. Idempotent."""
         await asyncio.wait([self._registration])
         if self._node._node.services.get(self.name) is self._server:
             self._node._served.discard(self.name)

@@ -1,6 +1,6 @@
-"""Tasks that run for long: an error that nobody foresaw is reported in one line, and the work goes on.
+"""Long-running tasks: an unexpected error is reported in one line, and the work continues.
 
-asyncio reports what a task raised only when the task is collected, which is never for one that its owner keeps.
+asyncio reports a task's exception only when the task is garbage-collected, which never happens if its owner keeps it.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ _MAX_CHARACTERS = 500
 
 
 class ErrorReporter:
-    """Reports the unforeseen errors of a piece of work: one line every ten seconds, with a count of the others."""
+    """Reports unexpected errors of some work: one line every ten seconds, with a count of the others."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
-        """``work``: how the line names it, such as "the watch of the graph"."""
+        """Take ``work``, its name in the log line, such as "the watch of the graph"."""
         self._log = log
         self._lines = RateLimitedLogger(log)
         self._work = work
 
     def report(self, error: BaseException) -> None:
-        """Log what was raised and where; the traceback is logged for who debugs."""
+        """Log the error and its location; the traceback is logged at level debug."""
         last = traceback.extract_tb(error.__traceback__)[-1:]
         where = "".join(f" at {Path(frame.filename).name}:{frame.lineno}" for frame in last)
         text = " ".join(traceback.format_exception_only(type(error), error)[-1].split())
@@ -37,7 +37,7 @@ class ErrorReporter:
         self._log.debug("%s failed", self._work, exc_info=error)
 
     def of_task(self, task: asyncio.Future[None]) -> None:
-        """Report what a task has raised: a callback for ``add_done_callback``."""
+        """Report a task's exception; a callback for ``add_done_callback``."""
         if not task.cancelled() and (error := task.exception()):
             self.report(error)
 
@@ -45,7 +45,7 @@ class ErrorReporter:
 async def keep_running(
     work: Callable[[], Awaitable[object]], reporter: ErrorReporter, *, pause: float = PAUSE_SECONDS
 ) -> None:
-    """Run ``work`` until it returns or is cancelled; where it raises, report that and start it again after ``pause`` seconds."""
+    """Run ``work`` until it returns or is cancelled; if it raises, report the error and restart it after ``pause`` seconds."""
     while True:
         try:
             await work()

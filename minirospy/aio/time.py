@@ -1,4 +1,4 @@
-"""Time of a node in an event loop: simulated time, and rates."""
+"""The time of a node in an event loop: simulated time, and rates."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LOOK_SECONDS = 0.1
 
 
 class Rate:
-    """Keeps a loop at ``hz`` turns a second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
+    """Keeps a loop at ``hz`` iterations per second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
 
     def __init__(self, node: Node, hz: float) -> None:
         """Start the first period. Raise ValueError if ``hz`` is not above 0."""
@@ -33,9 +33,10 @@ class Rate:
         return self._turns()
 
     async def sleep(self) -> None:
-        """Sleep until the turn is over, less what its work took. Raise as :meth:`Node.sleep` does."""
+        """Sleep for the rest of the period. Raise as :meth:`Node.sleep` does."""
         now = self._node.now().to_nsec()
-        # Time jumped back, or the work took several turns: do not wait for ages, nor rush through what was missed.
+        # Time jumped back, or the work took several periods: neither wait very long, nor make up for the missed
+        # periods.
         if not self._last <= now <= self._last + 2 * self._period:
             self._last = now
         self._last += self._period
@@ -53,7 +54,7 @@ class Rate:
 
 
 class SimulatedTime:
-    """The time of the last /clock, in nanoseconds; 0 before the first."""
+    """The time of the last /clock message, in nanoseconds; 0 before the first one."""
 
     def __init__(self, stopping: asyncio.Event) -> None:
         self.now = 0
@@ -66,9 +67,9 @@ class SimulatedTime:
         self._tick = asyncio.Event()
 
     async def sleep(self, nanoseconds: int) -> None:
-        """Wait until the time has moved on so far, or the node ends.
+        """Wait until ``nanoseconds`` have passed, or the node shuts down.
 
-        Raise ROSTimeMovedBackwardsException if it is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException if time is set to before the sleep's start.
         """
         while self.now == 0 and not self._stopping.is_set():
             await self._next_tick()
@@ -79,6 +80,6 @@ class SimulatedTime:
                 raise ROSTimeMovedBackwardsException((start - self.now) / 1e9)
 
     async def _next_tick(self) -> None:
-        # The end of the node does not tick: look again now and then.
+        # A shutdown of the node causes no tick, so check for it now and then.
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._tick.wait(), _LOOK_SECONDS)

@@ -1,4 +1,4 @@
-"""Publishers and subscriptions of a node in an event loop. Messages become bytes, and bytes messages, on the loop."""
+"""The publishers and subscriptions of a node in an event loop. Messages are serialized and deserialized on the loop."""
 
 from __future__ import annotations
 
@@ -34,15 +34,14 @@ _JOIN_SECONDS = 1.0
 class Subscription(Handle, Generic[_M_co]):
     """The messages of a topic, for ``async for``; made by :meth:`Node.subscribe`.
 
-    The iteration ends when the subscription is closed or the node ends.
+    The iteration ends when the subscription is closed or the node shuts down.
     """
 
     def __init__(
         self, node: Node, state: SubscribedTopic, message_class: type[_M_co], queue_size: int
     ) -> None:
         self.topic = state.topic
-        self.dropped = 0
-        """How many messages gave way to newer ones."""
+        self.dropped = 0  # number of messages dropped in favour of newer ones
         self._node = node
         self._message_class = message_class
         self._misfits = RateLimitedLogger(node.log)
@@ -70,7 +69,7 @@ class Subscription(Handle, Generic[_M_co]):
     async def next(self, timeout: float | None = None) -> _M_co:
         """Return the next message.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the subscription is closed.
         """
         try:
             return await asyncio.wait_for(self.__anext__(), timeout)
@@ -86,9 +85,9 @@ class Subscription(Handle, Generic[_M_co]):
         return len(self._state.subscription.links)
 
     async def wait_for_publishers(self, count: int = 1, timeout: float | None = None) -> None:
-        """Wait until so many publishers are connected.
+        """Wait until ``count`` publishers are connected.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the subscription is closed.
         """
         connected = asyncio.Event()
         callbacks = self._state.subscription.on_connected
@@ -102,7 +101,7 @@ class Subscription(Handle, Generic[_M_co]):
             callbacks.remove(connected.set)
 
     async def close(self) -> None:
-        """Stop listening. What has come can still be read. Idempotent."""
+        """Unsubscribe. Messages that have arrived can still be read. Idempotent."""
         self._end()
         await self._state.leave(self)
 
@@ -122,7 +121,7 @@ class Subscription(Handle, Generic[_M_co]):
     def _end(self) -> None:
         self._ended = True
         self._arrived.set()
-        # Who waits for publishers looks again.
+        # Wake the tasks that wait for publishers, so that they check again.
         for callback in self._state.subscription.on_connected:
             callback()
 
@@ -155,7 +154,7 @@ class Publisher(Handle, Generic[_M_co]):
         self._registration = state.join(self)
 
     def publish_raw(self, body: bytes) -> None:
-        """Publish a message that is serialized already. Does not wait. Raise ROSException once it is closed."""
+        """Publish a message that is already serialized. Does not wait. Raise ROSException if the publisher is closed."""
         state = self._state
         if state is None or self._node.is_shutdown:
             raise ROSException("publish() to a closed topic")
@@ -165,10 +164,10 @@ class Publisher(Handle, Generic[_M_co]):
             publication.publish(LargeFrame((body,), len(body)) if large else serialize_frame(body))
 
     async def publish(self, *args: object, **kwds: object) -> None:
-        """Publish a message, or the message that these field values make.
+        """Publish a message, or the message with these field values.
 
-        Does not wait for subscribers, except with ``queue_size=None``. Raise ROSException once it is closed,
-        ROSSerializationException or TypeError on values that do not fit.
+        Does not wait for subscribers, except with ``queue_size=None``. Raise ROSException if the publisher is closed,
+        ROSSerializationException or TypeError on invalid values.
         """
         if not self._registration.done():
             await self
@@ -187,23 +186,23 @@ class Publisher(Handle, Generic[_M_co]):
 
     @property
     def on_change(self) -> list[Callable[[], object]]:
-        """Return what is called on the loop when a subscriber has connected or disconnected."""
+        """Return the functions that are called on the loop when a subscriber has connected or disconnected."""
         return self._state.on_change if self._state else []
 
     @property
     def subscribers(self) -> list[str]:
-        """Return the names of the nodes of the connected subscribers."""
+        """Return the node names of the connected subscribers."""
         return [link.peer for link in self._state.publication.links] if self._state else []
 
     def forget_latched(self) -> None:
-        """Send the last message to no subscriber that comes later."""
+        """Stop sending the last message to new subscribers."""
         if self._state:
             self._state.publication.forget_latched()
 
     async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:
-        """Wait until so many subscribers are connected.
+        """Wait until ``count`` subscribers are connected.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down.
         """
         try:
             await asyncio.wait_for(self._wait_for(count), timeout)
@@ -212,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def close(self) -> None:
-        """Stop publishing; the topic ends with the last publisher of it in this node. Idempotent."""
+        """Stop publishing; the topic is unregistered with its last publisher in this node. Idempotent."""
         state, self._state = self._state, None
         if state:
             await state.leave(self)
@@ -227,13 +226,13 @@ class Publisher(Handle, Generic[_M_co]):
         await self
         state = self._state
         if state is None:
-            return  # closed while it was registered
+            return  # closed while registering
         with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
             await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
 
 
 class SubscribedTopic:
-    """One subscribed topic of a node."""
+    """A topic subscribed to by a node; its subscriptions share this object."""
 
     def __init__(self, node: Node, topic: str, message_class: type[Message]) -> None:
         self.topic = topic
@@ -251,7 +250,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` leaves a subscription behind without a reference.
+        # `async for ... break` drops the subscription without closing it.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
@@ -268,7 +267,7 @@ class SubscribedTopic:
             handle._end()
 
     async def _leave_if_empty(self) -> None:
-        # Meanwhile another may join.
+        # A new subscription may join meanwhile.
         await asyncio.wait([self._registration])
         if self._handles or self._node._subscribed.get(self.topic) is not self:
             return
@@ -284,7 +283,7 @@ class SubscribedTopic:
 
 
 class PublishedTopic:
-    """One published topic of a node."""
+    """A topic published by a node; its publishers share this object."""
 
     def __init__(self, node: Node, publication: Publication, message_class: type[Message]) -> None:
         self.publication = publication
@@ -293,8 +292,8 @@ class PublishedTopic:
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(message_class, "_has_header", False))
         self._changed = asyncio.Event()
+        # Called on the loop when a subscriber has connected or disconnected
         self.on_change: list[Callable[[], object]] = []
-        """Called on the loop when a subscriber has connected or disconnected."""
         self._registration = node._spawn(
             registered(
                 node._node.advertise,
@@ -318,7 +317,7 @@ class PublishedTopic:
             raise
 
     async def _leave_if_empty(self) -> None:
-        # Meanwhile another may join.
+        # A new publisher may join meanwhile.
         await asyncio.wait([self._registration])
         for link in self.publication.links:
             if not self._handles:
@@ -331,7 +330,7 @@ class PublishedTopic:
             await self._node._node.unadvertise(self.publication)
 
     def publish(self, message: Message) -> None:
-        """Send a message to all subscribers; may be called from any thread."""
+        """Send a message to all subscribers; callable from any thread."""
         if self.publication.links or self.publication.latch:
             if self._has_header:
                 assert is_stamped(message)
@@ -345,5 +344,5 @@ class PublishedTopic:
             callback()
 
     async def next_change(self) -> None:
-        """Return when a subscriber has connected or disconnected."""
+        """Wait until a subscriber has connected or disconnected."""
         await self._changed.wait()

@@ -1,1 +1,1 @@
-"""What all rooms share: errors, names, times, clocks, the environment."""
+"""Modules that all other packages share: errors, names, times, clocks, the environment."""

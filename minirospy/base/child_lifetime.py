@@ -1,7 +1,7 @@
-"""Children that do not outlive a process that is ended by force: on Windows by a job object, which the system closes.
+"""Terminate child processes with this process, even if it is killed: on Windows with a job object, which the system closes.
 
-Elsewhere a launcher's guardian process ends them (`ros/roslaunch/launcher/guardian.py`), and nothing is done here.
-Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
+On other systems a launcher's guardian process terminates them (`ros/roslaunch/launcher/guardian.py`), and this module
+does nothing. Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CREATE_BREAKAWAY_FROM_JOB = 0x01000000
 
 
 class JobSystem(Protocol):
-    """The calls of the system. Each raises OSError if it fails."""
+    """The system calls for jobs. Each raises OSError if it fails."""
 
     def create(self) -> int:
         """Create a job; return its handle."""
@@ -33,11 +33,11 @@ class JobSystem(Protocol):
         """Set the limits of a job."""
 
     def add_this_process(self, job: int) -> None:
-        """Put this process into a job: what it starts from now on is in it, too."""
+        """Add this process to a job; processes that it starts from now on belong to the job, too."""
 
 
 class ProcessJob:
-    """The job of this process and of its children. A process cannot leave its job, so there is one for all guards."""
+    """The job of this process and its children. A process cannot leave its job, so all guards share one."""
 
     def __init__(self, system: JobSystem) -> None:
         self._system = system
@@ -46,11 +46,11 @@ class ProcessJob:
         self._guards = 0
 
     def guard(self) -> bool:
-        """Have the children end with this process; return whether the system does it."""
+        """Let the system terminate the children with this process; return whether it will."""
         with self._lock:
             try:
                 if self._job is None:
-                    # Never closed here: the system does it when the process has exited, in whichever way.
+                    # Never closed here: the system closes it when the process has exited, for whatever reason.
                     job = self._system.create()
                     self._system.set_limits(job, _BREAKAWAY_OK)
                     self._system.add_this_process(job)
@@ -74,7 +74,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """Ends the children of this process with it until :meth:`close`; ``is_guarded``: whether the system does it.
+    """Until :meth:`close`, child processes are terminated with this process if ``is_guarded`` is true.
 
     A context manager.
     """
@@ -98,7 +98,7 @@ class ChildLifetime:
 
 
 def guard_children() -> ChildLifetime:
-    """Have all that this process starts end with it, on Windows, until the result is closed."""
+    """On Windows, let every process started from now on terminate with this one, until the result is closed."""
     return ChildLifetime(_process_job())
 
 
@@ -108,9 +108,9 @@ def start_outside_of_job(
     creationflags: int = 0,
     **options: Any,
 ) -> subprocess.Popen[bytes]:
-    """Start a process that may outlive this one, also if the children of this one are guarded.
+    """Start a process that may outlive this one, even if the children of this one are guarded.
 
-    ``options`` as in subprocess.Popen. Raise OSError.
+    ``options`` are those of subprocess.Popen. Raise OSError.
     """
     import subprocess
 
@@ -120,7 +120,8 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # Somebody else's job, which keeps all its processes: an IDE's, a service's.
+            # This process belongs to another program's job, such as an IDE's or a service's, which lets no process
+            # leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 
@@ -157,7 +158,7 @@ if sys.platform == "win32":
         ]
 
     class _Windows:
-        """JobSystem by kernel32."""
+        """The implementation of JobSystem with kernel32."""
 
         def __init__(self) -> None:
             self._kernel = ctypes.WinDLL("kernel32", use_last_error=True)

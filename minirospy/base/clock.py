@@ -1,6 +1,6 @@
-"""Clocks: what time it is, and waiting until a time comes.
+"""Clocks: the current time, and waiting until a given time.
 
-A wall clock, and a simulated one that is set from outside (http://wiki.ros.org/Clock). Times are
+There are a wall clock, and a simulated one that is set by other code (http://wiki.ros.org/Clock). Times are
 nanoseconds since the epoch.
 """
 
@@ -26,8 +26,9 @@ __all__ = [
 
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not interrupt a wait, and
-elsewhere one that arrives just before the wait starts is noticed only after it."""
+"""Seconds. The main thread, which receives signals, waits in slices: on Windows Ctrl-C does not interrupt a wait, and on
+other systems a Ctrl-C just before the start of a wait is noticed only after it.
+"""
 
 _POLL_SECONDS = 0.1
 
@@ -35,36 +36,36 @@ _POLL_SECONDS = 0.1
 class SignalSafeEvent(threading.Event):
     """An event that a signal handler may set or wait for, whichever code it interrupts.
 
-    The thread that it interrupts may be inside wait() or set() of the same event. threading's takes a lock there, which the
-    handler would wait for; and a handler that waits for another thread, which needs that lock, would never get to an end.
-    This event has no lock: the steps on its list are atomic.
+    The interrupted thread may be inside wait() or set() of the same event. threading.Event takes a lock there, so a handler
+    that sets the event, or waits for another thread that needs the lock, would deadlock.
+    This event has no lock: its list operations are atomic.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._is_set = False
         self._waiting: list[threading.Lock] = []
-        """A lock for each thread that waits, which is acquired until the event is set."""
+        """A lock for each waiting thread, acquired until the event is set."""
 
     def is_set(self) -> bool:
-        """Return whether it is set."""
+        """Return whether the event is set."""
         return self._is_set
 
     def set(self) -> None:
-        """Set it, and wake the threads that wait for it."""
-        # First the flag: a thread enters itself in the list, and then looks at the flag.
+        """Set the event, and wake the waiting threads."""
+        # Set the flag first: a thread adds itself to the list, and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
-            # Another thread, or a handler in this one, has released it.
+            # Another thread, or a handler in this one, has already released it.
             with contextlib.suppress(RuntimeError):
                 lock.release()
 
     def clear(self) -> None:
-        """Clear it."""
+        """Clear the event."""
         self._is_set = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Return whether it is set, now or within ``timeout`` seconds."""
+        """Return whether the event is set, or becomes set within ``timeout`` seconds."""
         if self._is_set:
             return True
         lock = threading.Lock()
@@ -92,8 +93,8 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
-    """Return the nanoseconds in a message of /clock, as it came; None if it is of another type than rosgraph_msgs/Clock."""
-    # One time: seconds and nanoseconds. A node may publish something else.
+    """Return the nanoseconds in a serialized message of /clock; None if it is not a rosgraph_msgs/Clock."""
+    # A Clock is one time: seconds and nanoseconds. A node may publish another type.
     if len(body) != _CLOCK.size:
         return None
     seconds, nanoseconds = _CLOCK.unpack(body)
@@ -101,13 +102,13 @@ def time_of_clock_message(body: bytes | memoryview) -> int | None:
 
 
 class Clock(Protocol):
-    """The time, as the sleeping functions need it."""
+    """The interface to the time that the sleeping functions use."""
 
     def now(self) -> int:
         """Return the time in nanoseconds."""
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait for this long; return False if ``stop`` was set meanwhile."""
+        """Wait for ``nanoseconds``; return False if ``stop`` was set meanwhile."""
 
 
 class WallClock:
@@ -117,22 +118,22 @@ class WallClock:
     """Return the nanoseconds since the epoch."""
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait for this long; return False if ``stop`` was set meanwhile."""
+        """Wait for ``nanoseconds``; return False if ``stop`` was set meanwhile."""
         return not wait_for_event(stop, max(0.0, nanoseconds / 1e9))
 
 
 class SimulatedClock:
-    """A clock that is set: by a simulator through /clock, or by a test."""
+    """A clock that is set by a simulator through /clock, or by a test."""
 
     def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
-        """Notify ``changed`` each time that the clock is set."""
+        """Take ``changed``, which is notified each time the clock is set."""
         self._now = now
         self._changed = changed or threading.Condition()
-        # Not the condition: a signal's handler may wait for a thread that sets the clock, or sleeps, too.
+        # Not the condition: a signal handler may wait for a thread that sets the clock or sleeps.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
-        """Return what was set last; 0 until then."""
+        """Return the time set last; 0 before the first one."""
         return self._now
 
     def set(self, now: int) -> None:
@@ -144,7 +145,7 @@ class SimulatedClock:
             sleeper.set()
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
+        """Wait until the clock has advanced by ``nanoseconds``; return False if ``stop`` was set meanwhile.
 
         While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
         Raise ROSTimeMovedBackwardsException if the clock is set to before the sleep's start.
@@ -164,6 +165,6 @@ class SimulatedClock:
 
     @staticmethod
     def _wait(sleeper: SignalSafeEvent) -> None:
-        """Wait until the clock is set. Setting what stops a sleep does not end that: it is polled."""
+        """Wait until the clock is set, or until it is time to poll the stop event, which does not wake this wait."""
         sleeper.wait(_POLL_SECONDS)
         sleeper.clear()

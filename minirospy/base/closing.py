@@ -1,4 +1,4 @@
-"""Close several parts, of which one may fail: the others are closed all the same."""
+"""Close several objects, even if closing one of them fails."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AsyncCloseFunction = Callable[[], Awaitable[object] | object]
 
 
 def close_each(functions: Iterable[CloseFunction]) -> None:
-    """Call each function in order; log an exception and go on with the next."""
+    """Call each function in order; log an exception and continue with the next function."""
     for function in functions:
         try:
             function()
@@ -24,7 +24,7 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 
 
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
-    """Do the same with functions that may be coroutine functions, one after the other. A cancellation ends it."""
+    """Do the same with functions that may be coroutine functions, sequentially. A cancellation stops it."""
     for function in functions:
         try:
             closing = function()

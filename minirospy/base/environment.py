@@ -1,6 +1,6 @@
-"""The environment variables of ROS and of minirospy in, one frozen record out.
+"""Read the environment variables of ROS and of minirospy into one frozen record.
 
-Read once where a process starts (a command's main, init_node) and handed on as an argument.
+It is read once at the start of a process (a command's main, init_node) and passed on as an argument.
 Source: http://wiki.ros.org/ROS/EnvironmentVariables and http://wiki.ros.org/ROS/NetworkSetup.
 """
 
@@ -37,27 +37,27 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution whose behaviour is ours; with a line end, as ROS sets it."""
+"""The value of /rosdistro: the ROS 1 distribution whose behaviour minirospy follows; with a newline, as ROS sets it."""
 
-ROS_VERSION = "1.17.0\n"
-"""The value of /rosversion."""
+ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 
 
 _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
 LOOPBACK = "127.0.0.0/8, ::1"
-"""Whose connections a local process takes. That it listens on loopback alone is not enough: a kernel with
-net.ipv4.route_localnet, as hosts of containers set it, lets neighbours in."""
+"""The networks that may connect to a local process. Listening only on loopback is not enough: a kernel with
+net.ipv4.route_localnet, as container hosts set it, lets neighbouring machines in.
+"""
 
 
 class Environment(NamedTuple):
     """The master's URI, the address of this process, and the folders of its files.
 
-    ``host`` is the name that is advertised to peers; ``bind_host`` the address that servers listen on
-    (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
-    that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
-    the networks whose machines may connect ("": all). ``transport`` "tcp" keeps connections off Unix sockets.
+    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on
+    (loopback if ``host`` is, else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports
+    that a node's servers may use (None: any), such as those that a firewall or a container lets through; ``allow``
+    the networks that may connect ("": all). ``transport`` "tcp" disables Unix sockets.
     ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
     """
 
@@ -78,8 +78,8 @@ class Environment(NamedTuple):
         """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
         Raise UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
-        more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
-        or MINIROSPY_LOCAL, and on a master of another machine with MINIROSPY_LOCAL=1.
+        not just a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
+        or MINIROSPY_LOCAL, and on a master on another machine with MINIROSPY_LOCAL=1.
         """
         from pathlib import Path
 
@@ -116,12 +116,12 @@ class Environment(NamedTuple):
 
     @property
     def same_host(self) -> bool:
-        """Return whether processes of this machine may be reached by Unix sockets."""
+        """Return whether processes on this machine may be connected through Unix sockets."""
         return self.transport != "tcp"
 
     @property
     def uri_host(self) -> str:
-        """Return ``host`` as it is written in a URI: an IPv6 address in brackets."""
+        """Return ``host`` in the form used in a URI: an IPv6 address in brackets."""
         return f"[{self.host}]" if ":" in self.host else self.host
 
     @property
@@ -139,7 +139,7 @@ class Environment(NamedTuple):
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """Return the master's URI and the namespace, all that a tool needs for queries. Raise as Environment.read."""
+    """Return the master's URI and the namespace, which suffice for a tool's queries. Raise as Environment.read."""
     uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
     uri = _checked_uri(uri)
     if is_local(environ):
@@ -148,7 +148,7 @@ def master_and_namespace(
 
 
 def is_local(environ: Mapping[str, str]) -> bool:
-    """Return whether MINIROSPY_LOCAL keeps this process on this machine. Raise UsageError on an unknown value."""
+    """Return whether MINIROSPY_LOCAL restricts this process to this machine. Raise UsageError on an unknown value."""
     text = environ.get("MINIROSPY_LOCAL", "")
     if text.lower() not in _SWITCH:
         raise UsageError(f"MINIROSPY_LOCAL [{text}] is neither 1 nor 0")
@@ -156,9 +156,9 @@ def is_local(environ: Mapping[str, str]) -> bool:
 
 
 def export_local(environ: MutableMapping[str, str]) -> None:
-    """Restrict the programs that are started with ``environ`` to this machine if MINIROSPY_LOCAL is set.
+    """Restrict programs started with ``environ`` to this machine if MINIROSPY_LOCAL is set.
 
-    Those of other ROS clients do not know the variable. Raise UsageError as Environment.read.
+    Programs with other ROS clients do not know that variable. Raise UsageError as Environment.read.
     """
     if is_local(environ):
         environ["ROS_MASTER_URI"], _ = master_and_namespace(environ)
@@ -169,15 +169,15 @@ def export_local(environ: MutableMapping[str, str]) -> None:
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
     """Return the (host, port, path) of ``scheme://host:port/path``. Raise ValueError.
 
-    By hand: importing urllib.parse takes a command a twentieth of its time.
+    It does not use urllib.parse, whose import takes a twentieth of a command's time.
     """
-    # The path goes into the first line of a request, and all of it into lines of logs.
+    # The path is sent in the first line of a request, and the URI is written to log lines.
     if has_controls(uri) or " " in uri:
         raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")
     address, slash, path = rest.partition("/")
     host, _, port = address.rpartition(":")
-    # `http://[hostname]:11311` is how a page writes a placeholder, not an IPv6 address.
+    # `http://[hostname]:11311` is a documentation placeholder, not an IPv6 address.
     if host.startswith("[") and host.endswith("]") and ":" in host:
         host = host[1:-1]
     is_host = host.isprintable() and host[:1] not in ("", "[")
@@ -189,14 +189,14 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
 
 def is_own_host(host: str, own: str = "localhost") -> bool:
-    """Return whether a name or address is this machine's, which is advertised as ``own``."""
+    """Return whether a name or address belongs to this machine, which is advertised as ``own``."""
     if host in {"localhost", "::1", own, socket.gethostname()} or host.startswith("127."):
         return True
     try:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only an address of this machine can be bound; Wine binds any for datagrams.
+        # Only an address of this machine can be bound (but Wine binds any address for datagrams, so use TCP).
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:
@@ -205,9 +205,9 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 
 
 def wrong_address(environment: Environment) -> str:
-    """Return what is wrong with the address in ROS_IP or ROS_HOSTNAME by which others reach this process; else nothing.
+    """Return a description of the fault in ROS_IP or ROS_HOSTNAME, by which peers reach this process; "" if none is found.
 
-    Names are not checked: a name server that is out of reach would delay every program.
+    Names are not checked: an unreachable name server would delay every program.
     """
     host = environment.host
     variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
@@ -221,9 +221,9 @@ def wrong_address(environment: Environment) -> str:
 
 
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
-    """Return the folder of a run's log files; None for a /run_id that cannot be the name of one folder.
+    """Return the folder of a run's log files; None if the /run_id cannot be a single folder's name.
 
-    Every node may set that parameter, also to a path that leads elsewhere.
+    Any node may set that parameter, also to a path that leads elsewhere.
     """
     if not isinstance(run_id, str) or not _RUN_ID.fullmatch(run_id):
         return None
@@ -241,7 +241,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master of this machine as one that listens on loopback alone is reached."""
+    """Return the URI of a master on this machine in the form that reaches one listening only on loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri
@@ -254,7 +254,7 @@ def _local_uri(uri: str) -> str:
 
 
 def _checked_host(host: str, variable: str) -> str:
-    # A colon alone is a port; more of them are an IPv6 address.
+    # A single colon precedes a port; several belong to an IPv6 address.
     if "/" in host or host.count(":") == 1 or host != host.strip() or "[" in host:
         raise UsageError(f"{variable} [{host}] must be a name or an address alone, without http:// and port")
     return host
@@ -280,14 +280,14 @@ def _port_range(text: str) -> range | None:
 
 
 def _advertised_host(environ: Mapping[str, str]) -> str:
-    """Return ROS_HOSTNAME, else ROS_IP, else this machine's name where it resolves, else loopback."""
+    """Return ROS_HOSTNAME, else ROS_IP, else this machine's name if it resolves, else loopback."""
     for variable in ("ROS_HOSTNAME", "ROS_IP"):
         named = environ.get(variable)
         if named:
             return _checked_host(named, variable)
     name = socket.gethostname()
     try:
-        # The look-up of a str would import the IDNA codec.
+        # Looking up a str would import the IDNA codec.
         socket.getaddrinfo(name.encode() if name.isascii() else name, None, socket.AF_INET)
     except OSError:
         return "localhost"

@@ -3,12 +3,12 @@
 ::
 
     Exception
-    +-- MinirospyError                  a fault that we name: one clear line for a person in str()
+    +-- MinirospyError                  an error with a one-line explanation for the user in str()
     |   +-- UsageError                  usage error of a command (exit status 2)
     |   +-- NotFoundError               a package, node, type, topic or file that does not exist (with similar names)
     |   +-- MasterUnreachableError      no master answers at the URI
     |   +-- NodeUnreachableError        a node that the master knows does not answer
-    |   +-- RpcError                    a remote procedure call (XML-RPC) went wrong
+    |   +-- RpcError                    a remote procedure call (XML-RPC) failed
     |   |   +-- RpcFault                the peer answered with an XML-RPC fault
     |   |   +-- RpcRefused              the peer answered with a status code other than 1
     |   |   +-- RpcProtocolError        the peer's bytes are not HTTP or not XML-RPC
@@ -16,23 +16,23 @@
     |   +-- WireError                   bytes that are not TCPROS
     |   |   +-- HandshakeRefused        the peer answered a connection header with ``error=``
     |   |   +-- CallFailed              the service answered a call with an error
-    |   +-- SourceError                 a text that a person wrote (file, line)
-    |   |   +-- DefinitionError         a .msg, .srv or .action text that does not parse
-    |   |   +-- ManifestError           a package.xml that does not read
+    |   +-- SourceError                 a fault in a text written by a person (file, line)
+    |   |   +-- DefinitionError         a .msg, .srv or .action text that cannot be parsed
+    |   |   +-- ManifestError           a package.xml that cannot be read
     |   |   +-- BuildError              a workspace or package that cannot be built
-    |   |   +-- LaunchError             a launch file that does not load
-    |   |   +-- UrdfError               a robot description that does not read
+    |   |   +-- LaunchError             a launch file that cannot be loaded
+    |   |   +-- UrdfError               a robot description that cannot be read
     |   |   +-- RvizFileError           a .rviz file that cannot be read or written
     |   +-- BagError                    a bag that cannot be read or written
-    |   |   +-- BagFormatError          bytes that are not what the bag format prescribes
+    |   |   +-- BagFormatError          bytes that violate the bag format
     |   |   +-- BagVersionError         a version of the format that cannot be read
     |   |   +-- BagUnindexedError       a bag without its index: it was not closed, or its end is missing
-    |   |   |   `-- McapUnindexedError  an MCAP file without its summary, likewise
+    |   |   |   `-- McapUnindexedError  an MCAP file without its summary, for the same reasons
     |   |   +-- BagEncryptedError       the bag is encrypted
-    |   |   +-- BagCompressionError     a compression that is unknown, or whose library is missing
+    |   |   +-- BagCompressionError     an unknown compression, or its library is missing
     |   +-- BoardError                  the virtual board cannot be reached
     |   +-- BridgeError                 the bridge to browsers cannot be started, or refuses a request
-    |   |   +-- BridgeProtocolError     a client's message that is not of its protocol
+    |   |   +-- BridgeProtocolError     a client's message that does not conform to its protocol
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit its target
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
@@ -44,14 +44,14 @@
     |       +-- TransportException
     |           +-- TransportInitError
     |           +-- TransportTerminated
-    +-- ServiceException                a service call failed, here or there
+    +-- ServiceException                a service call failed, at the client or the server
     +-- TransformException              tf2's tree (http://wiki.ros.org/tf2/Errors)
     |   +-- ConnectivityException       the two frames are in different trees
-    |   +-- LookupException             a frame that no transform has named, or a loop
+    |   +-- LookupException             an unknown frame, or a loop of transforms
     |   +-- ExtrapolationException      a time without data
     |   +-- InvalidArgumentException    a frame's name that is empty or starts with a slash
     |   +-- TimeoutException            a buffer server that does not answer
-    +-- MessageException                genpy's tree: values and bytes that do not fit a message
+    +-- MessageException                genpy's tree: values and bytes that do not match a message
         +-- SerializationError
         |   +-- SerializationOverflowError
         +-- DeserializationError
@@ -123,7 +123,7 @@ __all__ = [
 
 
 class MinirospyError(Exception):
-    """The root of our own errors; ``str()`` is one line for a person."""
+    """The root of minirospy's own errors; ``str()`` is one line for the user."""
 
 
 class UsageError(MinirospyError):
@@ -131,10 +131,10 @@ class UsageError(MinirospyError):
 
 
 class NotFoundError(MinirospyError):
-    """Something named does not exist; the text suggests similar names that do.
+    """A named object does not exist; the text suggests similar names that do.
 
-    ``kind`` is what was looked up ("package", "message type"), ``name`` the name that was given,
-    ``known`` every name that exists, ``hint`` what to do.
+    ``kind`` is the kind of object that was looked up ("package", "message type"), ``name`` the given name,
+    ``known`` every name that exists, ``hint`` an instruction for the user.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
@@ -154,7 +154,7 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master answers at ``uri``; ``why``: what keeps this process from calling it; ``cause``: why it does not answer."""
+    """No master answers at ``uri``; ``why``: the reason why this process cannot call it; ``cause``: why it does not answer."""
 
     def __init__(self, uri: str, why: str = "", cause: str = "") -> None:
         super().__init__(uri, why, cause)
@@ -194,11 +194,11 @@ class NodeUnreachableError(MinirospyError):
 SUSPENDED = (
     "it takes connections, so it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 )
-"""What to say of a process that answers nothing."""
+"""The explanation of a process that accepts connections but answers nothing."""
 
 
 class RpcError(MinirospyError):
-    """A remote procedure call went wrong."""
+    """A remote procedure call failed."""
 
 
 class RpcFault(RpcError):
@@ -214,7 +214,7 @@ class RpcFault(RpcError):
 
 
 class RpcRefused(RpcError):
-    """A ROS API call was answered with a status ``code`` other than 1 (0 failure, -1 error)."""
+    """The answer to a ROS API call has a status ``code`` other than 1 (0 failure, -1 error)."""
 
     def __init__(self, method: str, code: int, text: str) -> None:
         super().__init__(method, code, text)
@@ -227,7 +227,7 @@ class RpcRefused(RpcError):
 
 
 class RpcProtocolError(RpcError):
-    """The bytes of a peer are not HTTP, or not XML-RPC; ``status`` is the HTTP status that a server answers with."""
+    """A peer's bytes are not HTTP, or not XML-RPC; ``status`` is the HTTP status with which a server answers."""
 
     def __init__(self, text: str, *, status: int = 400) -> None:
         super().__init__(text)
@@ -247,7 +247,7 @@ class RpcUnreachable(RpcError):
 
 
 class RpcTimeout(RpcUnreachable):
-    """The peer took the connection, and did not answer in time: its process is stopped, or busy."""
+    """The peer accepted the connection but did not answer in time: its process is stopped, or busy."""
 
     def __init__(self, uri: str, seconds: float) -> None:
         super().__init__(uri, f"timed out after {seconds:g} s")
@@ -262,11 +262,11 @@ class WireError(MinirospyError):
 
 
 class HandshakeRefused(WireError):
-    """The peer answered our connection header with ``error=text``."""
+    """The peer answered a connection header with ``error=text``."""
 
 
 class CallFailed(WireError):
-    """The service answered a call with an error; ``text`` as its handler's stack encoded it."""
+    """The service answered a call with an error; ``text`` is encoded as the server sent it."""
 
     def __init__(self, text: bytes) -> None:
         super().__init__(text)
@@ -277,7 +277,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """A text that a person wrote does not do: ``file`` (or what else names it), ``line`` (from 1; 0: the whole)."""
+    """A text written by a person has a fault: ``file`` (or another name for it), ``line`` (from 1; 0: the whole text)."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
@@ -290,11 +290,11 @@ class SourceError(MinirospyError):
 
 
 class DefinitionError(SourceError):
-    """An interface definition does not parse; of one without a file, ``file`` is its type."""
+    """An interface definition cannot be parsed; if it has no file, ``file`` is its type."""
 
 
 class ManifestError(SourceError):
-    """A package.xml does not read."""
+    """A package.xml cannot be read."""
 
 
 class BuildError(SourceError):
@@ -302,7 +302,7 @@ class BuildError(SourceError):
 
 
 class LaunchError(SourceError):
-    """A launch file does not load."""
+    """A launch file cannot be loaded."""
 
 
 class RvizFileError(SourceError):
@@ -310,7 +310,7 @@ class RvizFileError(SourceError):
 
 
 class UrdfError(SourceError):
-    """A robot description does not read. ``context``: in what, as ROS's reader has it, from the inside to the outside."""
+    """A robot description cannot be read. ``context``: the enclosing elements in the words of ROS's parser, innermost first."""
 
     def __init__(self, file: str, line: int, text: str, context: tuple[str, ...] = ()) -> None:
         super().__init__(file, line, ": ".join((text, *context[:1])))
@@ -318,11 +318,11 @@ class UrdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written; ``str()`` does not name the file, which the caller knows."""
+    """A bag cannot be read or written; ``str()`` does not contain the file's name, which the caller knows."""
 
 
 class BagFormatError(BagError):
-    """The bytes at ``position`` are not what the bag format prescribes; None: of the whole file."""
+    """The bytes at ``position`` (None: the whole file) violate the bag format."""
 
     def __init__(self, why: str, position: int | None = None) -> None:
         super().__init__(why, position)
@@ -334,11 +334,11 @@ class BagFormatError(BagError):
 
 
 class NoBagError(BagFormatError):
-    """The file does not start as a bag does."""
+    """The file does not start like a bag."""
 
 
 class BagVersionError(BagError):
-    """The bag has a ``version`` (101 is 1.1) that cannot be read, or not be used for this purpose."""
+    """The bag's ``version`` (101 is 1.1) cannot be read, or not be used for this purpose."""
 
     def __init__(self, version: int, why: str) -> None:
         super().__init__(version, why)
@@ -350,7 +350,7 @@ class BagVersionError(BagError):
 
 
 class BagUnindexedError(BagError):
-    """The bag was not closed, or its index is damaged; ``why`` is the fault that was found, if one was."""
+    """The bag was not closed, or its index is damaged; ``why`` is the fault, if one was found."""
 
     def __init__(self, why: str = "") -> None:
         super().__init__(why)
@@ -403,11 +403,11 @@ class BridgeError(MinirospyError):
 
 
 class BridgeProtocolError(BridgeError):
-    """A client's message that is not of its protocol."""
+    """A client's message does not conform to its protocol."""
 
 
 class ValueTextError(MinirospyError):
-    """A value as a person typed it (``text``, or the name of the file or parameter) cannot be used; ``why``."""
+    """A value typed by a person (``text``, or the name of the file or parameter) cannot be used; ``why`` is the reason."""
 
     def __init__(self, text: str, why: str) -> None:
         super().__init__(text, why)
@@ -424,11 +424,11 @@ class ROSException(Exception):
 
 
 class ROSInitException(ROSException):
-    """A node could not be initialised."""
+    """A node could not be initialized."""
 
 
 class ThreadLimitError(ROSException):
-    """The system lets this process start no more threads; ``limits`` are those that are known."""
+    """The system lets this process start no more threads; ``limits`` are the known limits."""
 
     def __init__(self, threads: int, limits: list[str]) -> None:
         super().__init__(threads, limits)
@@ -444,7 +444,7 @@ class ThreadLimitError(ROSException):
 
 
 class NoThreadsAtEndError(ThreadLimitError):
-    """Python 3.12.0 to 3.12.2 start no more threads once the main thread has ended (CPython issue 113964)."""
+    """Python 3.12.0 to 3.12.2 start no more threads once the main thread has exited (CPython issue 113964)."""
 
     def __init__(self) -> None:
         super().__init__(0, [])
@@ -457,11 +457,11 @@ class NoThreadsAtEndError(ThreadLimitError):
 
 
 class ROSSerializationException(ROSException):
-    """A message could not be serialised or deserialised."""
+    """A message could not be serialized or deserialized."""
 
 
 class ROSInterruptException(ROSException):
-    """A blocking call was ended by the node's shutdown. That of rospy is a subclass: `minirospy.client.lifecycle`."""
+    """The node's shutdown interrupted a blocking call. rospy's exception is a subclass: `minirospy.client.lifecycle`."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
@@ -477,7 +477,7 @@ class ROSInternalException(ROSException):
 
 
 class TransportException(ROSInternalException):
-    """A connection to a peer went wrong."""
+    """A connection to a peer failed."""
 
 
 class TransportInitError(TransportException):
@@ -485,7 +485,7 @@ class TransportInitError(TransportException):
 
 
 class TransportTerminated(TransportException):
-    """A connection to a peer ended."""
+    """A connection to a peer was closed."""
 
 
 class ServiceException(Exception):
@@ -529,16 +529,16 @@ class TimeoutException(TransformException):
 
 
 class MessageException(Exception):
-    """Values that do not fit a message."""
+    """Values that do not match a message's definition."""
 
 
 class SerializationError(MessageException):
-    """A message holds a value that its definition does not allow."""
+    """A message contains a value that its definition does not allow."""
 
 
 class SerializationOverflowError(SerializationError, OverflowError):
-    """A number that a float32 does not hold: to programs for genpy an OverflowError, to ours an error like the others."""
+    """A number exceeds a float32: programs for genpy expect an OverflowError, minirospy's code a SerializationError."""
 
 
 class DeserializationError(MessageException):
-    """Bytes that are not a message of this type."""
+    """Bytes that are not a message of the expected type."""

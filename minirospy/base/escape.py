@@ -1,7 +1,7 @@
-"""Text of strangers made fit to be shown: names, URIs and messages that peers and files choose.
+"""Make untrusted text safe to display: names, URIs and messages chosen by peers and files.
 
-A control character in them could move a terminal's cursor, set its title, forge a line of a log file or a header of
-HTTP. Pure.
+A control character in them could move a terminal's cursor, set its title, forge a line of a log file or an HTTP header.
+Pure.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Marks that turn the direction of what follows: a name would look like another one.
+# Direction marks reverse the following text: a name could look like another one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
 _OWN_SEQUENCE = re.compile(r"\033\[[0-9;]*m|\r?\033\[K|\033\[2J\033\[;H|\033\]2;[^\x00-\x1f\x7f-\x9f]*\007")
-"""What the commands themselves send to a terminal: colours, a cleared line or screen, the title of the window."""
+"""The sequences that the commands themselves send to a terminal: colours, clearing a line or screen, the window title."""
 
 
 def escaped(text: str, keep: str = "") -> str:
@@ -33,14 +33,14 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` holds a control character or a separator of lines: it is not a name or a URI then."""
+    """Return whether ``text`` contains a control character or a line separator, and so is not a name or a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
 def own_output() -> TextIO:
-    """Return the standard output for a picture that moves the cursor, which :class:`SafeTerminal` would write out.
+    """Return the standard output for a picture that moves the cursor; :class:`SafeTerminal` would escape these sequences.
 
-    What is foreign in the picture has to be escaped.
+    The caller must escape untrusted text in the picture.
     """
     if isinstance(sys.stdout, SafeTerminal) and sys.__stdout__ is not None:
         sys.stdout.flush()
@@ -49,19 +49,19 @@ def own_output() -> TextIO:
 
 
 class SafeTerminal(io.TextIOWrapper):
-    """A standard stream that is a terminal: control characters are shown, not obeyed, as `ls` shows those of names.
+    """A standard stream on a terminal that displays control characters instead of executing them, as `ls` does for names.
 
-    What the commands themselves send (:data:`_OWN_SEQUENCE`), line feeds and tabs pass.
+    Sequences from the commands themselves (:data:`_OWN_SEQUENCE`), line feeds and tabs pass unchanged.
     """
 
     @classmethod
     def around(cls, stream: io.TextIOWrapper) -> SafeTerminal:
-        """Return a stream that writes where ``stream`` does."""
+        """Return a stream that writes to the terminal of ``stream``."""
         stream.flush()
         return cls(stream.buffer, stream.encoding, "backslashreplace", line_buffering=True)
 
     def write(self, text: str) -> int:
-        """Write a text."""
+        """Write ``text``, with its control characters escaped."""
         if _CONTROL.search(text):
             end, parts = 0, []
             for own in _OWN_SEQUENCE.finditer(text):
@@ -71,16 +71,16 @@ class SafeTerminal(io.TextIOWrapper):
         return super().write(text)
 
     def write_own(self, text: str) -> int:
-        """Write a text of the command's own, whose control characters the terminal is to obey: a status line."""
+        """Write a command's own text, such as a status line, with its control characters unchanged."""
         return super().write(text)
 
     def close(self) -> None:
-        """Write what waits; the terminal itself stays open for the interpreter's own stream."""
-        # ValueError: it has been closed before.
+        """Write pending output; the terminal itself stays open for the interpreter's own stream."""
+        # ValueError: the stream was closed before.
         with contextlib.suppress(ValueError):
             self.flush()
             self.detach()
 
     def __del__(self) -> None:
-        # TextIOWrapper's would close the buffer that sys.__stdout__ shares.
+        # TextIOWrapper.__del__ would close the buffer, which sys.__stdout__ shares.
         pass

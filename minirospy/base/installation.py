@@ -1,6 +1,6 @@
-"""How libraries are added to the environment that this minirospy runs in: a requirement in, a command line to type out.
+"""Build the command line that adds a library to the environment of this minirospy, for the user to type.
 
-`python -m pip` is not there in an environment that pipx or uv made: their own commands are. Sources: https://pipx.pypa.io and
+Environments made by pipx or uv have no `python -m pip`, but commands of their own. Sources: https://pipx.pypa.io and
 https://docs.astral.sh/uv/concepts/tools.
 """
 
@@ -18,15 +18,15 @@ _PIPX_FILE = "pipx_metadata.json"
 _UV_FILE = "uv-receipt.toml"
 
 _SHELLS_OWN = re.compile(r"[^\w./\\:~+-]")
-"""Characters that one of the shells reads as its own."""
+"""Characters with a special meaning in at least one of the shells."""
 
 
 def install_command(*requirements: str, upgrade: bool = False) -> str:
     """Return the command line that installs requirements (``minirospy[web]``, ``lz4``) next to the running minirospy.
 
-    It can be typed in sh, cmd.exe and PowerShell. ``upgrade``: a version that is too old is replaced.
+    It works in sh, cmd.exe and PowerShell. ``upgrade``: replace a version that is too old.
     """
-    # Only if an error is described: commands that find all their libraries do not wait for these modules.
+    # Imported only to describe an error, so that commands with all their libraries do not load these modules.
     import importlib.util
     import sysconfig
 
@@ -34,7 +34,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     words = " ".join(_quoted(each) for each in requirements)
     option = " --upgrade" if upgrade else ""
     if (prefix / _PIPX_FILE).is_file():
-        # Not `pipx inject`: pipx 1.7 takes minirospy itself for injected already, and does nothing.
+        # Not `pipx inject`: pipx 1.7 treats minirospy itself as already injected, and does nothing.
         return f"pipx runpip {_quoted(prefix.name)} install{option} {words}"
     if (prefix / _UV_FILE).is_file():
         return _uv_tool_command(prefix / _UV_FILE, requirements, option)
@@ -49,7 +49,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command with all that was requested before: uv removes what a new one does not name."""
+    """Return uv's command including all earlier requirements, since uv removes those that a new command does not name."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:
@@ -69,7 +69,7 @@ def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) 
 
 
 def _parts(requirement: str) -> tuple[str, str, str]:
-    """Return the name of a requirement, what is between its brackets, and its range of versions."""
+    """Return a requirement's name, the text between its brackets, and its version range."""
     name, has_extras, rest = requirement.partition("[")
     if not has_extras:
         return name, "", ""
@@ -82,27 +82,27 @@ def _requirement(name: str, extras: dict[str, None]) -> str:
 
 
 def _python() -> str:
-    """Return "python" or "python3" where that is the running interpreter, else the interpreter's path."""
+    """Return "python" or "python3" if that is the running interpreter, else the interpreter's path."""
     import shutil
 
     for name in ("python", "python3"):
         found = shutil.which(name)
-        # Not os.path.samefile: the interpreter of a venv may be a link to that of the system.
+        # Not os.path.samefile: a venv's interpreter may be a link to the system's.
         if found is not None and os.path.normcase(found) == os.path.normcase(sys.executable):
             return name
     return _quoted_path(sys.executable)
 
 
 def _quoted(word: str) -> str:
-    """Return a word without quotes in it for any shell: to cmd.exe single quotes are a part of the word."""
+    """Return a quoted word for any shell: double quotes, since cmd.exe treats single quotes as part of the word."""
     return f'"{word}"' if _SHELLS_OWN.search(word) else word
 
 
 def _quoted_path(path: str) -> str:
     """Return the path of a program for the system's shells.
 
-    On Windows only the parts that need quotes have them: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
-    and PowerShell takes a line that starts with a quote for an expression.
+    On Windows only the parts that need it are quoted: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
+    but PowerShell parses a line that starts with a quote as an expression.
     """
     if not _IS_WINDOWS:
         import shlex

@@ -11,18 +11,17 @@ from typing import ClassVar
 
 __all__ = ["LOOK_SECONDS", "Keys"]
 
-LOOK_SECONDS = 0.05
-"""How long Keys.next waits for a key."""
+LOOK_SECONDS = 0.05  # during which Keys.next waits for a key
 
 
 class Keys:
-    """Single keys from the terminal, without Enter and without echo; none where stdin is not a terminal."""
+    """Single keys from the terminal, without Enter and without echo; no keys if stdin is not a terminal."""
 
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
 
     def __init__(self, *, end: str = "q") -> None:
-        """``end``: the key that the terminal's end counts as."""
+        """Take ``end``, the key to return when the terminal is closed."""
         self._end = end
         self._is_closed = False
         self.is_terminal = sys.stdin is not None and sys.stdin.isatty()
@@ -36,7 +35,7 @@ class Keys:
                 self._before = termios.tcgetattr(sys.stdin)
                 tty.setcbreak(sys.stdin)
             except termios.error:
-                # Its window was closed meanwhile.
+                # The terminal's window was closed meanwhile.
                 self._is_closed = True
         return self
 
@@ -51,7 +50,7 @@ class Keys:
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
-        """Return the key that was typed (an arrow by its name), or "" after a moment."""
+        """Return the typed key (an arrow by its name), or "" after a moment."""
         if not self.is_terminal:
             time.sleep(LOOK_SECONDS)
             return ""
@@ -70,14 +69,15 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
         if not ready:
             return ""
-        # Past Python's buffer: what it holds, select does not see. No byte at all is the terminal's end.
+        # Bypass Python's buffer, whose contents select does not see. Reading no byte means that the terminal is
+        # closed.
         try:
             key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
         except OSError:
             return self._end
         if key != "\x1b":
             return key or self._end
-        # A key that sends several bytes sends them together.
+        # All bytes of a key arrive together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
         return self._ARROWS.get(sequence[-1:], "")

@@ -1,4 +1,4 @@
-"""Log levels: those of rosgraph_msgs/Log next to those of Python's ``logging``, and the levels of this process's loggers.
+"""Log levels: those of rosgraph_msgs/Log and of Python's ``logging``, and the levels of this process's loggers.
 
 Source: http://docs.ros.org/api/rosgraph_msgs/html/msg/Log.html, http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -36,11 +36,11 @@ PYTHON_LEVELS = {
 
 
 SEVERITIES = {python: LEVEL_NAMES[ros] for ros, python in PYTHON_LEVELS.items()}
-"""ROS's names of Python's levels."""
+"""Python's level -> ROS's name of it."""
 
 
 def ros_level(python_level: int) -> int:
-    """Return the nearest of ROS's levels at or below a level of Python's."""
+    """Return the closest ROS level at or below a Python level."""
     return max((ros for ros, python in PYTHON_LEVELS.items() if python <= python_level), default=DEBUG)
 
 
@@ -50,7 +50,7 @@ def logger_levels(names: Iterable[str]) -> dict[str, str]:
 
 
 def set_logger_level(logger: str, level: str) -> None:
-    """Set a logger's level by name, in upper or lower case. Raise ValueError on another name."""
+    """Set a logger's level by name, in upper or lower case. Raise ValueError on an unknown name."""
     levels = {name: ros for ros, name in LEVEL_NAMES.items()}
     if level.upper() not in levels:
         raise ValueError(f"[{level}] is not one of the levels {', '.join(levels).lower()}")

@@ -1,4 +1,4 @@
-"""Patterns of names: which topics, services and parameters may be seen or passed on. Pure."""
+"""Name patterns that select which topics, services and parameters may be shown or forwarded. Pure."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ __all__ = ["NameFilter"]
 
 @dataclass(frozen=True)
 class NameFilter:
-    """Names that clients may see: of those that a pattern of ``allow`` and one of ``whitelist`` matches, not those of ``deny``.
+    """Allows names that match a pattern of ``allow`` and one of ``whitelist``, but none of ``deny``.
 
-    ``allow`` and ``deny`` are globs in which ``*`` matches slashes too; ``whitelist`` are regular expressions for the whole
-    name, as those of foxglove_bridge.
+    ``allow`` and ``deny`` are globs in which ``*`` matches slashes too; ``whitelist`` contains regular expressions for the
+    whole name, like those of foxglove_bridge.
     """
 
     allow: tuple[str, ...] = ("*",)
@@ -28,7 +28,7 @@ class NameFilter:
     def of(
         cls, allow: Iterable[str] = (), deny: Iterable[str] = (), whitelist: Iterable[str] | None = None
     ) -> NameFilter:
-        """Return the filter; no pattern of ``allow`` allows all. Raise BridgeError on a bad expression."""
+        """Return the filter; an empty ``allow`` allows all names. Raise BridgeError on a bad expression."""
         compiled = None
         if whitelist is not None:
             try:

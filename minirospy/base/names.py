@@ -1,4 +1,4 @@
-"""Graph resource names: what a name may look like, and what it resolves to.
+"""Graph resource names: their syntax and their resolution.
 
 Pure. Source: http://wiki.ros.org/Names and http://wiki.ros.org/Remapping%20Arguments.
 """
@@ -42,7 +42,7 @@ def is_legal_base_name(name: str) -> bool:
 
 
 def is_global(name: str) -> bool:
-    """Return whether ``name`` starts at the root."""
+    """Return whether ``name`` is global, that is, starts with ``/``."""
     return name.startswith("/")
 
 
@@ -52,14 +52,14 @@ def is_private(name: str) -> bool:
 
 
 def canonicalize(name: str) -> str:
-    """Return ``name`` without doubled or trailing slashes."""
+    """Return ``name`` without repeated or trailing slashes."""
     if not name or name == "/":
         return name
     return ("/" if name[0] == "/" else "") + "/".join(part for part in name.split("/") if part)
 
 
 def namespace_of(name: str) -> str:
-    """Return the namespace that contains ``name``, with a slash at its end: ``/a/b`` -> ``/a/``."""
+    """Return the namespace that contains ``name``, with a trailing slash: ``/a/b`` -> ``/a/``."""
     if not name:
         return "/"
     stem = name.removesuffix("/")
@@ -78,7 +78,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global name of ``name`` as the node ``node_name`` (global) sees it, remapped."""
+    """Return the global, remapped name of ``name`` as seen by the node ``node_name`` (global)."""
     if not name:
         return namespace_of(node_name)
     name = canonicalize(name)
@@ -92,18 +92,18 @@ def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = No
 
 
 def anonymous_name(base: str) -> str:
-    """Return a name that no other node has, different at each call: base, host, process id and a random number."""
+    """Return a unique name, different at each call: base, host, process id and a random number."""
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
     number = int.from_bytes(os.urandom(8), "big") >> 1
     return f"{base}_{host}_{os.getpid()}_{number}"
 
 
 class Arguments(NamedTuple):
-    """A command line taken apart.
+    """A parsed command line.
 
-    ``plain``: what is left for the program; ``remappings``: names as typed, unresolved;
+    ``plain``: the arguments left for the program; ``remappings``: names as typed, unresolved;
     ``parameters``: private parameters as (name without the underscore, YAML text);
-    ``special``: ``__name``, ``__ns`` and the like; ``wrong``: arguments with more than one ``:=``.
+    ``special``: ``__name``, ``__ns`` and similar; ``wrong``: arguments with more than one ``:=``.
     """
 
     plain: list[str]
@@ -113,12 +113,12 @@ class Arguments(NamedTuple):
     wrong: list[str]
 
     def resolved_remappings(self, node_name: str) -> dict[str, str]:
-        """Return the remappings with both sides as global names."""
+        """Return the remappings with both names resolved to global names."""
         return {resolve(a, node_name): resolve(b, node_name) for a, b in self.remappings.items()}
 
 
 def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
-    """Take ``from:=to``, ``_param:=value`` and ``__special:=value`` out of a command line.
+    """Extract ``from:=to``, ``_param:=value`` and ``__special:=value`` from a command line.
 
     An argument that does not start with a name, such as ``--flag:=x``, is left to the program; one without a value has no
     effect.
@@ -144,9 +144,9 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
 
 
 def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
-    """Return name -> value of the arguments ``name:=value`` of launch files, among other words.
+    """Return name -> value of the launch-file arguments ``name:=value`` among ``words``.
 
-    As in roslaunch, spaces around a value do not count, and one without a value leaves the argument at its default;
+    As in roslaunch, spaces around a value are stripped, and an empty value leaves the argument at its default;
     special names (``__ns``) and private parameters (``_name``) are not arguments.
     """
     pairs = (word.partition(":=") for word in words)

@@ -1,7 +1,7 @@
-"""Files at predictable names, in folders that others may be able to write: opened without following a link.
+"""Open files with predictable names, in folders that other users may write to, without following links.
 
-ROS_HOME is a shared folder on some robots, and TMPDIR is one everywhere. Whoever can create a name there before its
-owner does may make it a symbolic link, or a hard link, to a file of the owner's, and have that overwritten.
+ROS_HOME is a shared folder on some robots, and TMPDIR is shared everywhere. Another user who creates the name first can
+make it a symbolic or hard link to a file of the owner's, and so cause that file to be overwritten.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from typing import IO
 __all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", "replace_file"]
 
 OPEN_ELSEWHERE_PATIENCE = 1.0
-"""Seconds to wait on Windows for a file that another process has open: a reader of ours, or a virus scanner."""
+"""Seconds to wait on Windows for a file that another process, such as a virus scanner, has open."""
 
 _REFUSES_OPEN_FILES = sys.platform == "win32"
 
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
     | getattr(os, "O_NOFOLLOW", 0)
-    # A FIFO at the name would block the process until another one opens its other end.
+    # Opening a FIFO would block until another process opens its other end.
     | getattr(os, "O_NONBLOCK", 0)
 )
 
@@ -33,17 +33,17 @@ _FLAGS = (
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
 
-    Raise OSError, also if the name is that of a link, or of anything but a device or a regular file with one
-    name. With O_TRUNC the file is emptied after these checks.
+    Raise OSError, also if the path is a symbolic link, or anything except a device or a regular file with a single hard
+    link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Windows has no O_NOFOLLOW. Elsewhere this is for the text alone.
+        # Windows has no O_NOFOLLOW. On other systems this only gives a clearer error.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
     try:
         found = os.fstat(file)
-        # Nobody but root makes devices: /dev/null is what a user has named.
+        # Devices are safe: only root creates them, and a user may name /dev/null.
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISCHR(found.st_mode)):
             raise _refusal(path, "it is not a regular file")
         if found.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
@@ -60,33 +60,33 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
 
 
 def open_text(path: Path, mode: str) -> IO[str]:
-    """Open ``path`` to write text in UTF-8, ``mode`` "a" to append or "w" to empty it first. Raise OSError."""
+    """Open ``path`` to write UTF-8 text; ``mode`` is "a" to append or "w" to truncate. Raise OSError."""
     how = {"a": os.O_APPEND, "w": os.O_TRUNC}[mode]
     return os.fdopen(open_file(path, os.O_WRONLY | os.O_CREAT | how), mode, encoding="utf-8")
 
 
 def create_file(path: Path, mode: int = 0o600) -> int:
-    """Create ``path`` for writing, in place of what has that name; return the file descriptor. Raise OSError."""
+    """Create ``path`` for writing, replacing any file of that name; return the file descriptor. Raise OSError."""
     remove_file(path)
     return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
 
 def read_file(path: Path) -> tuple[bytes, float]:
-    """Return the bytes of ``path`` and the time of its last change. Raise OSError."""
+    """Return the bytes of ``path`` and its modification time. Raise OSError."""
     with os.fdopen(open_file(path, os.O_RDONLY), "rb") as stream:
         return stream.read(), os.fstat(stream.fileno()).st_mtime
 
 
 def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
-    """Give ``source`` the name ``target``, in place of what has that name. Raise OSError.
+    """Rename ``source`` to ``target``, replacing any file of that name. Raise OSError.
 
-    Windows refuses it while another process has one of them open: there this waits until it is closed, for a second.
+    Windows refuses this while another process has one of them open, so there it is retried for a second.
     """
     _until_closed(lambda: os.replace(source, target))
 
 
 def remove_file(path: Path) -> None:
-    """Remove ``path``, if it exists; on Windows as soon as no other process has it open. Raise OSError."""
+    """Remove ``path``, if it exists; on Windows, retry while another process has it open. Raise OSError."""
     _until_closed(lambda: path.unlink(missing_ok=True))
 
 
@@ -98,7 +98,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # Elsewhere it is a matter of the folder's permissions, which do not change by waiting.
+            # On other systems the folder's permissions are the cause, and waiting does not change them.
             if not _REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

@@ -1,4 +1,4 @@
-"""Which signals mean Ctrl-C, and the mark of a shutdown hook that runs in the middle of another call, interrupted by one."""
+"""The signals that mean Ctrl-C, and a flag for shutdown hooks that run inside a call interrupted by a signal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _this_thread = threading.local()
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
-    """While a block runs, :func:`is_dispatching_signal` is true in this thread: it handles a signal."""
+    """While a block runs, :func:`is_dispatching_signal` is true in this thread: the block handles a signal."""
     _this_thread.is_dispatching = True
     try:
         yield
@@ -23,7 +23,7 @@ def dispatching_signal() -> Iterator[None]:
 
 
 def is_dispatching_signal() -> bool:
-    """Return whether this thread handles a signal, in the middle of whatever else it does."""
+    """Return whether this thread is handling a signal, inside an interrupted call."""
     return getattr(_this_thread, "is_dispatching", False)
 
 

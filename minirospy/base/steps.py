@@ -1,6 +1,6 @@
-"""Long work in short steps: generators that yield about once a millisecond, so that others have their turn between.
+"""Long work in short steps: generators that yield about once a millisecond, so that other work can run in between.
 
-What runs on an event loop is run by ``runtime/rpc/turns.py``; :func:`finish` runs it in one go.
+``runtime/rpc/turns.py`` runs them on an event loop; :func:`finish` runs them without interruption.
 """
 
 from __future__ import annotations
@@ -23,20 +23,18 @@ class Need(Enum):
 
 ALONE, PAUSE = Need
 
-Steps = Generator[Need | None, None, _T]
-"""Work that yields between its steps and returns its result."""
+Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
 
-SMALL_ITEMS = 2000
-"""What takes a few milliseconds to write."""
+SMALL_ITEMS = 2000  # a value of this size takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""What takes some 0.1 ms: a thousand clients may request such a value at the same time."""
+"""Serializing this many takes some 0.1 ms: a thousand clients may request such a value at the same time."""
 
 _LETTERS_PER_ITEM = 16
 
 
 def finish(steps: Steps[_T]) -> _T:
-    """Return the result of work that runs here and now."""
+    """Run the steps without interruption and return their result."""
     while True:
         try:
             next(steps)
@@ -46,12 +44,12 @@ def finish(steps: Steps[_T]) -> _T:
 
 
 def is_small(value: object, most: int = SMALL_ITEMS) -> bool:
-    """Return whether a value of XML-RPC's types has no more than about ``most`` items, among which long texts count as many."""
+    """Return whether an XML-RPC value has at most about ``most`` items; long strings count as many."""
     return _left(value, most) >= 0
 
 
 def _left(value: object, left: int) -> int:
-    """Return what is left of a number of items; it is negative if they do not do."""
+    """Return ``left`` minus the number of items in ``value``; negative if there are more items than ``left``."""
     if isinstance(value, (str, bytes)):
         return left - 1 - len(value) // _LETTERS_PER_ITEM
     if not isinstance(value, (list, tuple, dict)):

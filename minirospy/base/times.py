@@ -1,4 +1,4 @@
-"""Times and durations as ROS messages hold them: seconds and nanoseconds, normalised.
+"""Times and durations as in ROS messages: seconds and nanoseconds, normalized.
 
 Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
 """
@@ -15,12 +15,12 @@ _V = TypeVar("_V", bound="TVal")
 
 
 class TVal:
-    """The common part of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalised."""
+    """The common part of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalized."""
 
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        """``secs`` may be a float where ``nsecs`` is 0. Raise ValueError or TypeError."""
+        """Take ``secs``, which may be a float if ``nsecs`` is 0. Raise ValueError or TypeError."""
         if type(secs) is int and type(nsecs) is int and 0 <= nsecs < _BILLION:
             self.secs: int = secs
             self.nsecs: int = nsecs
@@ -39,16 +39,16 @@ class TVal:
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
-        """Return whether it is zero."""
+        """Return whether the value is zero."""
         return not (self.secs or self.nsecs)
 
     def set(self, secs: int, nsecs: int) -> None:
-        """Set both parts, as they are."""
+        """Set both parts without normalizing."""
         self.secs = secs
         self.nsecs = nsecs
 
     def canon(self) -> None:
-        """Normalise, so that 0 <= nsecs < 1e9."""
+        """Normalize, so that 0 <= nsecs < 1e9."""
         if not 0 <= self.nsecs < _BILLION:
             carry, self.nsecs = divmod(self.nsecs, _BILLION)
             self.secs += carry
@@ -62,14 +62,14 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # A program has set them to what numpy has computed, which overflows, or is a fraction.
+        # A program may have assigned numpy values, which overflow, or fractions.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
 
-    # Two times, or two durations, compare themselves; a TVal compares with both.
+    # Time and Duration compare with their own class only; a TVal compares with both.
     def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, TVal) else NotImplemented
 
@@ -104,7 +104,7 @@ class TVal:
 class Time(TVal):
     """A point in time since the epoch; never negative."""
 
-    # What is pickled has to be found by other ROS 1 programs, and what they have pickled by this one.
+    # Pickles must be loadable by other ROS 1 programs, and theirs by this one.
     __module__ = "genpy.rostime"
 
     __slots__: list[str] = []
@@ -115,7 +115,7 @@ class Time(TVal):
             raise TypeError("time values must be positive")
 
     def to_time(self) -> float:
-        """Return the same as ``to_sec``, as ``time.time()`` counts."""
+        """Return the same as ``to_sec``, in the form of ``time.time()``."""
         return self.to_sec()
 
     def __add__(self, other: Duration) -> Time:
@@ -157,7 +157,7 @@ class Time(TVal):
 
 
 class Duration(TVal):
-    """A span of time; may be negative, then with negative ``secs`` and ``nsecs`` counted up."""
+    """A time span; may be negative, then with negative ``secs`` and positive ``nsecs``."""
 
     __module__ = "genpy.rostime"
 
@@ -243,18 +243,18 @@ class Duration(TVal):
     __hash__ = TVal.__hash__
 
 
-# As genpy's classes name them; the attributes themselves are TVal's.
+# Named as in genpy's classes; the attributes themselves belong to TVal.
 Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Return whole seconds, and the nanoseconds of the rest: cut off, as genpy does it, not rounded."""
+    """Return whole seconds, and the remaining nanoseconds, truncated like genpy does and not rounded."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 
 
 def _is_integer(value: object) -> bool:
-    """Return whether a number is an integer, numpy's included."""
+    """Return whether a number is an integer, including numpy's."""
     try:
         operator.index(value)  # type: ignore[arg-type]
     except TypeError:

@@ -1,4 +1,4 @@
-"""A tree as an SVG picture, for machines without graphviz: nodes and labelled edges in, text out. Pure."""
+"""Draw a tree as SVG, for machines without graphviz: nodes and labelled edges in, SVG text out. Pure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _STYLE = (
 
 
 class Edge(NamedTuple):
-    """An arrow from a parent to its child; the lines of ``label`` are beside it."""
+    """An arrow from a parent to its child; the lines of ``label`` are drawn next to it."""
 
     parent: str
     child: str
@@ -27,7 +27,7 @@ class Edge(NamedTuple):
 def tree_svg(
     edges: Sequence[Edge], title: str, *, alone: Iterable[str] = (), round_: Iterable[str] = ()
 ) -> str:
-    """Return the picture of one or several trees, roots above.
+    """Return a drawing of one or several trees, with the roots at the top.
 
     ``alone``: nodes without an edge. ``round_``: nodes drawn as ellipses. A node is drawn once: below the first
     parent that names it.
@@ -43,7 +43,7 @@ def tree_svg(
 
     drawing = _Drawing(children, frozenset(round_))
     right = float(_GAP_X)
-    # Roots first; what is then still missing is part of a loop.
+    # Roots first; the remaining nodes are part of a loop.
     for name in [*(name for name in children if name not in below), *children]:
         if name not in drawing.places:
             right = drawing.place(name, right)
@@ -58,7 +58,7 @@ class _Drawing:
 
     def place(self, root: str, left: float) -> float:
         """Place a tree to the right of ``left``; return its right edge."""
-        # Down by a list, then back up: deep trees do not exhaust Python's stack.
+        # Iterate with an explicit list, down and back up: recursion would exhaust Python's stack for deep trees.
         order: list[tuple[str, float]] = []
         waiting = [(root, float(_GAP_Y + _LINE))]
         seen = set()
@@ -88,7 +88,7 @@ class _Drawing:
         return left
 
     def _width(self, name: str) -> float:
-        """Return the room that a node takes, with the label above it."""
+        """Return the width of a node, including the label above it."""
         labels = [
             len(line)
             for edges in self._children.values()

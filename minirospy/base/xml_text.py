@@ -1,7 +1,7 @@
-"""XML text -> elements with their lines: the reader of launch files, robot descriptions, manifests and test results. Pure.
+"""Parse XML text into elements with line numbers, for launch files, robot descriptions, manifests and test results. Pure.
 
-A document type is accepted, as ROS accepts it, unless it declares entities or default values of attributes: a few hundred
-characters of these unfold to gigabytes. Nothing is ever loaded from another file or address.
+As in ROS, a document type is accepted, but not if it declares entities or default values of attributes: a few hundred
+characters of these can expand to gigabytes. Nothing is ever loaded from another file or address.
 Source: https://www.w3.org/TR/xml/.
 """
 
@@ -16,12 +16,12 @@ from minirospy.base.errors import MinirospyError
 
 __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
 
-MAX_LEVELS = 100  # tags inside tags; readers and libraries recurse once or more for each level
-_MAX_ELEMENTS = 1_000_000  # tags of a document; each takes about 500 bytes of memory, from 4 bytes of text
+MAX_LEVELS = 100  # nested tags; parsers and libraries recurse once or more for each level
+_MAX_ELEMENTS = 1_000_000  # tags per document; each takes about 500 bytes of memory, from 4 bytes of text
 
 
 class XmlError(MinirospyError):
-    """A text that is refused: ``line`` is where, 0 if it is not known, and ``why`` the reason."""
+    """The text is refused: ``line`` is the location, 0 if unknown, and ``why`` the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(line, why)
@@ -33,12 +33,12 @@ class XmlError(MinirospyError):
 
 
 class XmlSyntaxError(XmlError):
-    """A text that is not XML."""
+    """The text is not XML."""
 
 
 @dataclass
 class XmlElement:
-    """A tag on ``line``; ``text`` is its text without that of its children."""
+    """A tag at ``line``; ``text`` is its text without that of its children."""
 
     tag: str
     attributes: dict[str, str]
@@ -47,16 +47,16 @@ class XmlElement:
     text: str = ""
 
     def all(self, tag: str) -> Iterator[XmlElement]:
-        """Yield the children of this tag, in order."""
+        """Yield the children with this tag, in order."""
         return (child for child in self.children if child.tag == tag)
 
     def first(self, tag: str) -> XmlElement | None:
-        """Return the first child of this tag; None if there is none."""
+        """Return the first child with this tag; None if there is none."""
         return next(self.all(tag), None)
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that refuses what unfolds (XmlError, raised by Parse), and gives text in large pieces."""
+    """Return a parser that refuses expanding declarations (Parse raises XmlError), and delivers text in large pieces."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
@@ -80,7 +80,7 @@ def new_parser() -> expat.XMLParserType:
 
 
 def parse_xml(text: str | bytes) -> XmlElement:
-    """Return the root of an XML text. Raise XmlSyntaxError, XmlError."""
+    """Parse an XML text and return its root. Raise XmlSyntaxError, XmlError."""
     parser = new_parser()
     stack: list[XmlElement] = []
     texts: list[list[str]] = []
@@ -110,9 +110,9 @@ def parse_xml(text: str | bytes) -> XmlElement:
 
 
 def check_xml(text: str | bytes) -> None:
-    """Raise XmlError for what :func:`parse_xml` refuses: call it before a library parses the text.
+    """Raise XmlError for a text that :func:`parse_xml` refuses; call it before a library parses the text.
 
-    What is not XML is left to the library, whose own error its callers expect. It fails at the same place.
+    Text that is not XML is accepted here: callers expect the error that the library raises at the same place.
     """
     parser = new_parser()
     level, left = 0, _MAX_ELEMENTS
@@ -146,5 +146,5 @@ def _parse(parser: expat.XMLParserType, text: str | bytes) -> None:
         why = f"{expat.ErrorString(error.code)} (column {error.offset})"
         raise XmlSyntaxError(error.lineno, why) from None
     except (LookupError, ValueError) as error:
-        # An encoding that is unknown, or a text with a lone surrogate.
+        # The encoding is unknown, or the text contains a lone surrogate.
         raise XmlSyntaxError(0, str(error)) from None

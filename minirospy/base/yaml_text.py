@@ -1,7 +1,8 @@
-"""YAML text -> values, by PyYAML's safe loaders, refusing what takes minutes, fills the memory or crashes Python. Pure.
+"""Load YAML with PyYAML's safe loaders, but refuse text that takes minutes, fills the memory or crashes Python. Pure.
 
-A short text may be nested without end, unfold by its aliases, or be one number that takes hours: `1:59:59:...` has base 60.
-Everything that is refused, and everything else that PyYAML raises, is a yaml.YAMLError. PyYAML is imported at the first call.
+A short text may be nested without limit, expand through its aliases, or be a single number that takes hours to parse:
+`1:59:59:...` has base 60. Every refusal, and every other error of PyYAML, is raised as a yaml.YAMLError. PyYAML is
+imported at the first call.
 """
 
 from __future__ import annotations
@@ -18,24 +19,22 @@ if TYPE_CHECKING:
 
 __all__ = ["check_yaml", "fast_loader", "guarded", "load", "load_all", "one_line", "safe_load"]
 
-_MAX_LEVELS = 200  # lists and dictionaries inside each other; PyYAML recurses several times for each
-_MAX_VALUES = 1_000_000  # values of a text with its aliases unfolded
-_MAX_NUMBER = (
-    1_000  # characters; to read a number takes the square of its length, and a double has 309 digits at most
-)
+_MAX_LEVELS = 200  # nested lists and dictionaries; PyYAML recurses several times for each
+_MAX_VALUES = 1_000_000  # values in a text with its aliases expanded
+_MAX_NUMBER = 1_000  # characters; parsing takes quadratic time, and a double has at most 309 digits
 _INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
 _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
 
 def safe_load(text: str) -> object:
-    """Return the value of a text, as yaml.safe_load does. Raise yaml.YAMLError; TypeError if it is not a text."""
+    """Return the value of a text, like yaml.safe_load. Raise yaml.YAMLError; TypeError if it is not a string."""
     import yaml
 
     return load(text, yaml.SafeLoader)
 
 
 def load(text: str, loader: Loader) -> Any:
-    """Return the value of a text, by a class that derives from PyYAML's safe loaders. Raise yaml.YAMLError, TypeError."""
+    """Return the value of a text, loaded by a subclass of PyYAML's safe loaders. Raise yaml.YAMLError, TypeError."""
     import yaml
 
     _require_text(text)
@@ -47,7 +46,7 @@ def load(text: str, loader: Loader) -> Any:
 
 
 def load_all(text: str, loader: Loader) -> Iterator[Any]:
-    """Yield the values of the documents of a text, likewise. Raise yaml.YAMLError, TypeError."""
+    """Yield the values of the documents in a text, loaded the same way. Raise yaml.YAMLError, TypeError."""
     import yaml
 
     _require_text(text)
@@ -67,13 +66,13 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
 
 def _require_text(text: object) -> None:
-    """Raise TypeError for None, a number and the like: that is the program's mistake, not the text's."""
+    """Raise TypeError for a value that is not a string: that is an error of the program, not of the text."""
     if not isinstance(text, str | bytes):
         raise TypeError(f"YAML is a text, not {type(text).__name__}")
 
 
 def fast_loader() -> type[yaml.SafeLoader]:
-    """Return PyYAML's compiled safe loader, or, if it has none, the other one, which takes ten times as long."""
+    """Return PyYAML's compiled safe loader, or if it is missing the pure Python one, which takes ten times as long."""
     import yaml
 
     fastest: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -82,7 +81,7 @@ def fast_loader() -> type[yaml.SafeLoader]:
 
 @lru_cache(maxsize=32)
 def guarded(loader: Loader) -> Loader:
-    """Return a loader that refuses long numbers. What is added to ``loader`` later is known to it, too."""
+    """Return a loader that refuses long numbers. Constructors that are added to ``loader`` later also apply."""
     import yaml
 
     class Guarded(loader):  # type: ignore[valid-type,misc]
@@ -97,23 +96,21 @@ def guarded(loader: Loader) -> Loader:
 
 
 def check_yaml(text: str) -> None:
-    """Raise ValueError if a YAML text is nested too deeply, or unfolds to too much by its aliases.
+    """Raise ValueError if a YAML text is nested too deeply, or expands too much through its aliases.
 
-    Libraries of YAML read both: the first one may crash Python, what the second one gives is small only as long as
-    nobody sends or prints it. Raise yaml.YAMLError if it is not YAML.
+    YAML libraries accept both: nesting may crash Python, and the result of aliases is small only until it is sent or
+    printed. Raise yaml.YAMLError if the text is not YAML.
     """
-    # How deep it can be at most: by its brackets, and by what its lines start with. Nearly every text ends here.
+    # An upper bound of the depth, from brackets and indentation. Nearly every text passes here.
     indent = max(map(len, _INDENT.findall(text)), default=0)
     has_aliases = "*" in text and "&" in text
     if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:
         return
     import yaml
 
-    counts = [0]
-    """How many values each open collection has so far; the document's own first."""
+    counts = [0]  # number of values in each open collection, the document's first
     anchors: list[str | None] = []
-    sizes: dict[str, int | None] = {}
-    """Anchor -> the values in what it names; None while that is open."""
+    sizes: dict[str, int | None] = {}  # anchor -> number of values in its node; None while the node is open
     for event in yaml.parse(text, Loader=fast_loader()):
         match event:
             case yaml.AliasEvent(anchor=name):
@@ -142,14 +139,14 @@ def check_yaml(text: str) -> None:
 
 
 def one_line(error: Exception) -> str:
-    """Return a YAML library's complaint on one line."""
+    """Return a YAML library's error message on one line."""
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     mark = getattr(error, "problem_mark", None)
     return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
-"""What check_yaml raises, and PyYAML: for a date that is none, or for a tag such as !!bool on other text."""
+"""Raised by check_yaml and by PyYAML, for example for an invalid date, or for a tag such as !!bool on other text."""
 
 
 def _reason(error: Exception) -> str:

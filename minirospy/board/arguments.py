@@ -1,4 +1,4 @@
-"""The arguments of RPi.GPIO's functions: which are taken, and the errors of the others, in its words."""
+"""Check the arguments of RPi.GPIO's functions, with RPi.GPIO's error texts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from minirospy.board.events import Detector, Slope
 
 __all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of"]
 
-NO_BOUNCETIME = -666
-"""RPi.GPIO's default: every edge counts."""
+NO_BOUNCETIME = -666  # RPi.GPIO's default: no debouncing
 
 
 def channels_of(channel: object) -> list[int]:
-    """Return the channels of one or of several. Raise ValueError."""
+    """Return the list of channels from a single channel or a sequence. Raise ValueError."""
     if isinstance(channel, int):
         return [channel]
     if not isinstance(channel, (list, tuple)):
@@ -29,13 +28,13 @@ def level_of(value: object) -> int:
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
         raise TypeError("not a level")
-    # numpy.bool_ and its kin.
+    # numpy.bool_ and similar types.
     return 1 if value else 0
 
 
 def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
-    """Return what looks for an edge; ``bouncetime`` in ms. Raise ValueError, TypeError."""
-    # Whole milliseconds: a time in seconds, such as 0.2, is refused with a TypeError, as by RPi.GPIO.
+    """Return a detector for an edge; ``bouncetime`` in ms. Raise ValueError, TypeError."""
+    # Whole milliseconds: like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
     edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:
         raise ValueError("The edge must be set to RISING, FALLING or BOTH")

@@ -1,4 +1,4 @@
-"""The virtual board for programs that play the world: press its buttons, look at its lights, walk before its scanner.
+"""The virtual board for programs that simulate its surroundings: press buttons, read lights, move a person.
 
 ::
 
@@ -29,10 +29,10 @@ __all__ = ["Board", "BoardState", "Edge"]
 
 @dataclass(frozen=True)
 class BoardState:
-    """The board at one moment.
+    """A snapshot of the board.
 
     ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person``: metres from the scanner, ahead and to the left,
-    None for nobody there.
+    or None if there is no person.
     """
 
     name: str
@@ -45,15 +45,15 @@ class BoardState:
 
 
 class Board:
-    """The board ``name`` (default: MINIROSPY_BOARD, else "default"), started when it is not there yet.
+    """The board ``name`` (default: MINIROSPY_BOARD, else "default"), started if it is not running.
 
-    For any thread. Pins are BCM numbers, 0 to 53. Every method raises BoardError on a pin that does not
+    Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError on a pin that does not
     exist and on a board that does not answer.
     """
 
     def __init__(self, name: str | None = None) -> None:
         directory = BoardDirectory.find(name)
-        # Weak: a watch that nobody holds any more takes no more edges.
+        # Weak references: an abandoned watch receives no more edges.
         self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
         self.name = directory.name
@@ -68,32 +68,32 @@ class Board:
         self.close()
 
     def press(self, pin: int) -> None:
-        """Push the button at ``pin``, until :meth:`release`.
+        """Press the button at ``pin``, until :meth:`release`.
 
         The wired buttons (11, 12) then read 1; a button at any other pin reads 1 too, unless the pin has its
-        pull-up on: then it connects to ground and reads 0.
+        pull-up enabled: then it connects to ground and reads 0.
         """
         self._link.call(Press(pin))
 
     def release(self, pin: int) -> None:
-        """Let go of the button at ``pin``; a level that :meth:`set` put there goes too."""
+        """Release the button at ``pin``; also undoes :meth:`set` of an input."""
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
-        """Drive an input to ``level`` (0 or 1) from outside; set an output as a second program would."""
+        """Drive an input to ``level`` (0 or 1) from outside; set an output as another program would."""
         self._link.call(Force(pin, level))
 
     @property
     def person(self) -> Position | None:
-        """The position of the person in front of the scanner: metres ahead and to the left; None: nobody is there."""
+        """The position of the person in front of the scanner, in metres ahead and to the left; None if there is no person."""
         return self._link.person
 
     def move_person(self, position: Position | None) -> None:
-        """Put the person somewhere (see :attr:`person`), or send them away (None)."""
+        """Place the person at a position (see :attr:`person`), or remove them (None)."""
         self._link.call(MovePerson(position))
 
     def reset(self) -> None:
-        """As when it was new: all pins inputs at 0, no button pressed, nobody before the scanner."""
+        """Reset the board: every pin becomes an input at 0, every button is released, the person is removed."""
         for pin, (state, fresh) in enumerate(zip(self.state().pins, BoardModel().pins, strict=True)):
             if state != fresh:
                 self._link.call(Setup(pin, Function.IN, initial=0))
@@ -105,17 +105,17 @@ class Board:
         return self._link.levels[_checked(pin)]
 
     def levels(self) -> dict[int, int]:
-        """BCM pin -> level, of all pins."""
+        """Return BCM pin -> level, for all pins."""
         return dict(enumerate(self._link.levels))
 
     def state(self) -> BoardState:
-        """Return a snapshot that does not change any more."""
+        """Return a snapshot of the board."""
         return BoardState(self.name, tuple(self._link.states), self._link.person)
 
     def watch(self, pins: Iterable[int] | None = None, timeout: float | None = None) -> Iterator[Edge]:
-        """Yield the edges of ``pins`` (default: all) from this call on, as they come.
+        """Yield the edges of ``pins`` (default: all) from this call on, as they occur.
 
-        Ends when ``timeout`` seconds have passed in all (None: never).
+        Stops after ``timeout`` seconds in total (None: never).
         """
         chosen = None if pins is None else frozenset(_checked(pin) for pin in pins)
         arrived: queue.SimpleQueue[Edge] = queue.SimpleQueue()
@@ -125,7 +125,7 @@ class Board:
         return self._edges(arrived, chosen, deadline)
 
     def close(self) -> None:
-        """Hang up; the pins stay as they are. Once or often."""
+        """Disconnect; the pins remain unchanged. Idempotent."""
         self._link.close()
 
     def _edges(

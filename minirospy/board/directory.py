@@ -1,7 +1,7 @@
 """The files of a board: its name in, the paths of its socket, lock and saved pins out.
 
-``MINIROSPY_BOARD`` names the board (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder that holds
-it, by default one in the temporary folder that only this user may enter.
+``MINIROSPY_BOARD`` is the board's name (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder of its files,
+by default one in the temporary folder that only this user may enter.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from minirospy.base.errors import BoardError
 __all__ = ["BoardDirectory"]
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,60}")
-_SOCKET_PATH_LIMIT = 100
-"""Bytes in a Unix socket's path; macOS allows 103, Linux 107."""
+_SOCKET_PATH_LIMIT = 100  # bytes in a Unix socket's path; macOS allows 103, Linux 107
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class BoardDirectory:
 
     @classmethod
     def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> BoardDirectory:
-        """Return the place of board ``name`` (default: what the environment says).
+        """Return the directory of board ``name`` (default: from the environment).
 
         Raise BoardError on a name that is not a file name.
         """
@@ -48,11 +47,11 @@ class BoardDirectory:
         return cls(name, folder.absolute())
 
     def names(self) -> list[str]:
-        """Return the boards of this folder, sorted."""
+        """Return the names of the boards in this folder, sorted."""
         return sorted(path.name.removesuffix(".lock") for path in self.folder.glob("*.lock"))
 
     def prepare(self) -> None:
-        """Make the folder; raises BoardError when it cannot be made or others may write to it."""
+        """Create the folder. Raise BoardError if it cannot be created or other users may write to it."""
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             found = self.folder.lstat()
@@ -65,33 +64,33 @@ class BoardDirectory:
 
     @property
     def uses_unix_socket(self) -> bool:
-        """Return whether the server listens on ``socket_path``; else on loopback TCP, as ``address_path`` says."""
+        """Return whether the server listens on ``socket_path``; otherwise it uses loopback TCP, at ``address_path``."""
         has_unix = sys.platform != "win32" and hasattr(socket, "AF_UNIX")
         return has_unix and len(os.fsencode(self.socket_path)) <= _SOCKET_PATH_LIMIT
 
     @property
     def socket_path(self) -> Path:
-        """The Unix socket."""
+        """The path of the Unix socket."""
         return self.folder / f"{self.name}.sock"
 
     @property
     def address_path(self) -> Path:
-        """The file with "port token" of a TCP server; only this user may read it."""
+        """The path of the file with "port token" of a TCP server; only this user may read it."""
         return self.folder / f"{self.name}.address"
 
     @property
     def lock_path(self) -> Path:
-        """The file that the one server keeps locked."""
+        """The path of the file that the running server keeps locked."""
         return self.folder / f"{self.name}.lock"
 
     @property
     def state_path(self) -> Path:
-        """The board as the last server left it."""
+        """The path of the file with the board's state as saved by the last server."""
         return self.folder / f"{self.name}.pins"
 
     @property
     def log_path(self) -> Path:
-        """Return the path of the log of a failing server."""
+        """The path of the log of a failing server."""
         return self.folder / f"{self.name}.log"
 
 

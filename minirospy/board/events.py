@@ -1,6 +1,6 @@
-"""Edge detection: edges and the clock in, callbacks out, one after another on one thread.
+"""Edge detection: edges and the time in, callbacks out, sequentially on one thread.
 
-Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
+Debouncing is that of RPi.GPIO: the first edge is reported, then the pin is ignored for the bounce time.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Callback = Callable[[int], object]
 
 
 class Slope(IntEnum):
-    """Which edges count, with RPi.GPIO's numbers."""
+    """The direction of the edges to detect, with RPi.GPIO's numbers."""
 
     RISING = 31
     FALLING = 32
@@ -26,7 +26,7 @@ class Slope(IntEnum):
 
 
 class Detector:
-    """Watches one channel: decides which edges count and remembers that one did.
+    """Watches one channel: decides which edges count and records that one occurred.
 
     ``bouncetime`` is in seconds, None without debouncing.
     """
@@ -41,7 +41,7 @@ class Detector:
         self._occurred = threading.Event()
 
     def see(self, level: int, now: float) -> bool:
-        """Return whether an edge to ``level`` at ``now`` (seconds of a clock that never goes back) counts."""
+        """Return whether an edge to ``level`` at ``now`` (seconds of a monotonic clock) counts."""
         if self.slope is not Slope.BOTH and (self.slope is Slope.RISING) != bool(level):
             return False
         if self._bouncetime is not None and self._last is not None and now - self._last <= self._bouncetime:
@@ -51,18 +51,18 @@ class Detector:
         return True
 
     def excludes(self, waiter: Detector) -> bool:
-        """Return whether nobody may wait with ``waiter`` while this one watches the channel."""
+        """Return whether waiting with ``waiter`` conflicts with this detector, which watches the same channel."""
         same = waiter.slope is self.slope
         return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
 
     def take(self) -> bool:
-        """Return whether an edge counted since the last call."""
+        """Return whether an edge was counted since the last call."""
         occurred = self._occurred.is_set()
         self._occurred.clear()
         return occurred
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait up to ``timeout`` seconds for an edge that counts."""
+        """Wait up to ``timeout`` seconds for an edge that counts; return whether one occurred."""
         if timeout is not None or sys.platform != "win32":
             return self._occurred.wait(timeout)
         # Windows delivers Ctrl-C only between waits.
@@ -72,7 +72,7 @@ class Detector:
 
 
 class CallbackThread:
-    """Runs callbacks in the order of their edges; an exception of one is printed and the next one runs."""
+    """Runs callbacks in the order of their edges; an exception of one is printed and the next one still runs."""
 
     def __init__(self) -> None:
         self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()
@@ -80,11 +80,11 @@ class CallbackThread:
         self._thread.start()
 
     def schedule(self, detector: Detector) -> None:
-        """Run all callbacks of ``detector``, unless it is removed before its turn."""
+        """Run all callbacks of ``detector``, unless it is removed before that."""
         self._due.put(detector)
 
     def close(self) -> None:
-        """End the thread after the callback that runs now."""
+        """Stop the thread after the callback in progress."""
         self._due.put(None)
         if threading.current_thread() is not self._thread:
             self._thread.join(1.0)

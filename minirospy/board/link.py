@@ -1,7 +1,7 @@
 """A process's connection to a board: operations in, the mirrored pins and edges out.
 
-Blocking, for any thread; one reader thread keeps the mirror. When no server answers, one is started; when it
-dies, the next one is, and what was not yet acknowledged is sent again: the caller notices nothing.
+Blocking and thread-safe; one reader thread updates the mirror. If no server answers, one is started; if it
+dies, another one is started, and unacknowledged requests are sent again without an error for the caller.
 """
 
 from __future__ import annotations
@@ -44,16 +44,13 @@ if TYPE_CHECKING:
 __all__ = ["Edge", "Link"]
 
 START_PATIENCE = 30.0
-"""Seconds for a server to start; a loaded small machine needs two or three, one that is also blocked fifteen."""
+"""Seconds for a server to start; a loaded small machine needs two or three, one with blocked I/O up to fifteen."""
 
-ANSWER_PATIENCE = 40.0
-"""Seconds for an answer: longer than a dead server takes to be replaced."""
+ANSWER_PATIENCE = 40.0  # seconds to wait for an answer: longer than replacing a dead server takes
 
-CLOSE_PATIENCE = 0.5
-"""Seconds that close() waits until the last outputs have arrived."""
+CLOSE_PATIENCE = 0.5  # seconds that close() waits for the last outputs to arrive
 
-MAX_UNACKNOWLEDGED = 10_000
-"""Requests under way; beyond, an output waits for the server."""
+MAX_UNACKNOWLEDGED = 10_000  # requests in progress; with more, an output waits for the server
 
 _SERVE = """\
 import sys
@@ -61,11 +58,11 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""`python -m minirospy.board.server`, which also finds a package that is imported from the current folder."""
+"""Like `python -m minirospy.board.server`, but also finds a package imported from the current folder."""
 
 
 class Edge(NamedTuple):
-    """Pin ``pin`` (BCM) went to ``level`` at ``time`` (Unix seconds)."""
+    """Pin ``pin`` (BCM) changed to ``level`` at ``time`` (Unix seconds)."""
 
     pin: int
     level: int
@@ -73,18 +70,18 @@ class Edge(NamedTuple):
 
 
 class Link:
-    """One connection.
+    """A connection to a board.
 
     ``levels`` mirrors every pin's level and is always the same list: reading it is the fast way to read a pin.
     ``on_edge`` is called on the reader thread, for every edge on the board.
 
-    Raise BoardError when no server can be started.
+    Raise BoardError if no server can be started.
     """
 
     def __init__(self, directory: BoardDirectory, on_edge: Callable[[Edge], None] | None = None) -> None:
         self._directory = directory
         self._on_edge = on_edge
-        # Re-entrant: a signal handler (a node's shutdown hook) may set pins while its thread is in here.
+        # Reentrant: a signal handler (a node's shutdown hook) may set pins while its thread has the lock.
         self._news = threading.Condition(threading.RLock())
         self._number = 0
         self._acknowledged = 0
@@ -102,9 +99,9 @@ class Link:
         self._reader.start()
 
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
-        """Carry ``operation`` out; when this returns, the mirror shows it. None only waits for what was sent.
+        """Perform ``operation``, and return when the mirror shows it; None only waits for the operations sent before.
 
-        Raise BoardError when the board refuses or does not answer within ``timeout`` seconds.
+        Raise BoardError if the board refuses or does not answer within ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)
@@ -119,7 +116,7 @@ class Link:
                 raise BoardError(f"the virtual board [{self._directory.name}] does not answer")
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
-        """Set the latches of output pins, in order, without waiting; the mirror shows it immediately."""
+        """Set the latches of output pins, in order, without waiting; the mirror shows the levels immediately."""
         with self._news:
             if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
                 self.call(None)
@@ -130,7 +127,7 @@ class Link:
                     self._written[pin] = number
 
     def close(self) -> None:
-        """Wait shortly for the last outputs, then hang up. The pins stay as they are."""
+        """Wait shortly for the last outputs, then disconnect. The pins remain unchanged."""
         if self._closed:
             return
         with contextlib.suppress(BoardError):
@@ -185,8 +182,8 @@ class Link:
                 return None
             now = time.time()
             edges = []
-            # A server that was killed may not have saved its last changes: what this process set up is set
-            # up again, with the levels that it last knew.
+            # A killed server may not have saved its last changes: repeat the setup of this process's pins, with the
+            # last levels known here.
             for pin in sorted(self._mine):
                 state = self.states[pin]
                 latch = state.latch if state.function is Function.OUT else None
@@ -204,11 +201,11 @@ class Link:
         return connection
 
     def _take(self, message: Message) -> Edge | None:
-        """Mirror one message (under the lock); return the edge that it reports."""
+        """Apply one message to the mirror (under the lock); return the edge that it reports, if any."""
         if isinstance(message, Changed):
             self.states[message.pin] = message.state
             level = message.state.level
-            # News from before our own latest write would take it back for a moment.
+            # A change sent before this process's latest write would undo that write for a moment.
             if message.pin not in self._written:
                 self.levels[message.pin] = level
             return Edge(message.pin, level, message.time) if message.edge else None
@@ -236,7 +233,7 @@ class Link:
 
 
 class _Connection:
-    """A socket on which the server has said Welcome: ``pins`` and ``person`` are what it sent."""
+    """A socket on which the server has sent Welcome, with ``pins`` and ``person``."""
 
     def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link
@@ -246,12 +243,12 @@ class _Connection:
         self.person: Position | None = welcome.person
 
     def send(self, data: bytes) -> None:
-        # A server that died is noticed, and replaced, by the reader.
+        # The reader notices a dead server and replaces it.
         with contextlib.suppress(OSError):
             self._socket.sendall(data)
 
     def incoming(self) -> Iterator[list[Message]]:
-        """Yield the batches of messages that arrive until the connection ends."""
+        """Yield batches of arriving messages until the connection is closed."""
         if self._more:
             yield self._more
         with contextlib.suppress(OSError, ProtocolError):
@@ -259,14 +256,14 @@ class _Connection:
                 yield list(self._stream.feed(data))
 
     def hang_up(self) -> None:
-        # shutdown first: it wakes the reader, a mere close would not.
+        # shutdown first: it wakes the reader, while close would not.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
 
 def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connection:
-    """Connect to the board's server; start one when none answers."""
+    """Connect to the board's server; start one if none answers."""
     directory.prepare()
     deadline = time.monotonic() + START_PATIENCE
     process: subprocess.Popen[bytes] | None = None
@@ -279,15 +276,15 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without an answer: it met a server that was just ending. Below 0: a Ctrl-C that was meant
-            # for us killed it before it had left our terminal.
+            # Status 0 without an answer: it found another server that was just exiting. Negative: a Ctrl-C for this
+            # process killed the new one before it had left the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
 
 
 def _connect(directory: BoardDirectory) -> _Connection | None:
-    """Return the connection, after Hello and Welcome, or None when nobody answers."""
+    """Return the connection, after Hello and Welcome, or None if no server answers."""
     token = ""
 
     try:
@@ -327,7 +324,7 @@ def _connect(directory: BoardDirectory) -> _Connection | None:
 
 
 def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
-    """Return a server process in a new session, which outlives this one as long as the board has users."""
+    """Start and return a server process in a new session, which outlives this process while the board has clients."""
     import subprocess
 
     if not sys.executable:
@@ -337,20 +334,20 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    # A temporary board is for what the guarded process has started, and need not outlive it.
+    # A temporary board serves the processes started here, and need not outlive this one.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(
             [sys.executable, "-c", _SERVE, root, str(directory.folder), directory.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            # On Windows the server writes its log itself: server.py says why.
+            # On Windows the server writes its log itself; the reason is in server.py.
             stderr=log,
             cwd=directory.folder,
             start_new_session=True,
             creationflags=flags,
         )
-    # Somebody must fetch its exit status, or a long-lived client keeps a zombie.
+    # Collect its exit status, or a long-lived client would keep a zombie.
     threading.Thread(target=process.wait, name="gpio-server-wait", daemon=True).start()
     return process
 

@@ -1,8 +1,8 @@
 """The behaviour of a board: operations in, changed pins out. Pure.
 
-A pin is an input or an output. An output's level is its latch; an input's is what the world drives it to
-(a pressed button, a jumper wire), else its pull resistor, else 0. The latch outlives the direction and the
-process that wrote it, as on a Raspberry Pi. In front of the board is a scanner, and perhaps a person.
+A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside
+(a pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch survives changes of
+direction and the process that wrote it. In front of the board is a scanner, and perhaps a person.
 """
 
 from __future__ import annotations
@@ -31,14 +31,12 @@ __all__ = [
     "Write",
 ]
 
-PINS = 54
-"""Pins of the chip in BCM numbering: 0 to 53."""
+PINS = 54  # of the chip in BCM numbering: 0 to 53
 
-LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}
-"""BCM pin -> colour of the light that is wired to it."""
+LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}  # BCM pin -> colour of its LED
 
 BUTTONS = (11, 12)
-"""BCM pins of the wired buttons: a resistor holds them at 0, pressing makes them 1."""
+"""BCM pins of the wired buttons: a resistor pulls them to 0, pressing drives them to 1."""
 
 
 class Function(IntEnum):
@@ -57,7 +55,7 @@ class Pull(IntEnum):
 
 
 class Pin(NamedTuple):
-    """One pin; ``world`` is the level that it is driven to from outside, or None when nothing drives it."""
+    """One pin; ``world`` is the level that it is driven to from outside, or None if it is not driven."""
 
     function: Function = Function.IN
     pull: Pull = Pull.OFF
@@ -66,7 +64,7 @@ class Pin(NamedTuple):
 
     @property
     def level(self) -> int:
-        """Return the level that is read at the pin: 0 or 1."""
+        """Return the level read at the pin: 0 or 1."""
         if self.function is Function.OUT:
             return self.latch
         if self.world is not None:
@@ -75,7 +73,7 @@ class Pin(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """Choose a pin's function; ``initial`` is an output's first level, None keeps the latch."""
+    """Set a pin's function; ``initial`` is an output's first level, None keeps the latch."""
 
     pin: int
     function: int
@@ -90,19 +88,19 @@ class Write(NamedTuple):
 
 
 class Press(NamedTuple):
-    """A finger pushes the button at ``pin``."""
+    """Press the button at ``pin``."""
 
     pin: int
 
 
 class Release(NamedTuple):
-    """The finger leaves the button at ``pin``."""
+    """Release the button at ``pin``."""
 
     pin: int
 
 
 class Force(NamedTuple):
-    """A wire puts ``level`` on an input; an output's latch is set, as another program would."""
+    """Drive an input to ``level``, or set an output's latch as another program would."""
 
     pin: int
     level: int
@@ -110,12 +108,11 @@ class Force(NamedTuple):
 
 Operation = Setup | Write | Press | Release | Force
 
-Position = tuple[float, float]
-"""Metres from the scanner: ahead of it, and to its left."""
+Position = tuple[float, float]  # metres ahead of the scanner, and to its left
 
 
 class Change(NamedTuple):
-    """``pin`` is now ``state``; ``edge`` says whether its level changed."""
+    """``pin`` is now in ``state``; ``edge`` is true if its level changed."""
 
     pin: int
     state: Pin
@@ -123,11 +120,11 @@ class Change(NamedTuple):
 
 
 class OperationError(ValueError):
-    """An operation with a pin, level, function, pull or position that does not exist."""
+    """An operation has an invalid pin, level, function, pull or position."""
 
 
 class BoardModel:
-    """All the pins of one board, and the person before it."""
+    """All the pins of one board, and the person in front of it."""
 
     def __init__(self, pins: Sequence[Pin] | None = None, person: Position | None = None) -> None:
         fresh = [Pin(world=0 if number in BUTTONS else None) for number in range(PINS)]
@@ -135,7 +132,7 @@ class BoardModel:
         self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
-        """Carry one operation out whole; the pins that differ. Raise OperationError and changes nothing."""
+        """Perform one operation completely, and return the pins that changed. Raise OperationError without changing anything."""
         match operation:
             case Setup(pin, function, pull, initial):
                 wanted = self._set_up(_pin(pin), function, pull, initial)
@@ -163,7 +160,7 @@ class BoardModel:
         return changes
 
     def move_person(self, position: Position | None) -> bool:
-        """Put the person there, None being out of the room; whether that is elsewhere. Raise OperationError."""
+        """Set the person's position (None: no person); return whether it changed. Raise OperationError."""
         if position is not None and not all(map(math.isfinite, position)):
             raise OperationError(f"a position is two lengths in metres, not {position}")
         moved = position != self.person
@@ -178,7 +175,7 @@ class BoardModel:
         return {pin: state if initial is None else state._replace(latch=_level(initial))}
 
     def _pressed(self, pin: int) -> int:
-        # A button added to a pin with a pull-up connects it to ground; the wired ones connect to 3.3 V.
+        # A button at a pin with a pull-up connects it to ground; the wired ones connect to 3.3 V.
         return 0 if pin not in BUTTONS and self.pins[pin].pull is Pull.UP else 1
 
 

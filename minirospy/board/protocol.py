@@ -1,8 +1,8 @@
 """Messages between a board's server and its clients <-> bytes (msgpack). Pure.
 
-Each message is an array: its kind's number, then its fields. A client opens with Hello and then sends
-Requests, numbered upwards; the server opens with Welcome (the whole board), sends Changed and PersonMoved to
-everybody when something changes, and Done to a client for the requests it carried out, after what they caused.
+Each message is an array: the number of its kind, then its fields. A client first sends Hello and then
+Requests with increasing numbers. The server first sends Welcome (the whole board), and then Changed and PersonMoved to
+all clients on each change. It sends Done to a client for its finished requests, after the changes that they caused.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _MAX_BUFFER = 1 << 20
 
 
 class ProtocolError(ValueError):
-    """Bytes that are not a message of this protocol."""
+    """The bytes are not a message of this protocol."""
 
 
 class Hello(NamedTuple):
@@ -60,20 +60,20 @@ class Hello(NamedTuple):
 
 
 class MovePerson(NamedTuple):
-    """The person goes to a position; None is out of the room."""
+    """Move the person to a position; None removes the person."""
 
     position: Position | None
 
 
 class Request(NamedTuple):
-    """Carry ``operation`` out; None requests only the Done."""
+    """Perform ``operation``; None requests only the Done."""
 
     number: int
     operation: Operation | MovePerson | None
 
 
 class Welcome(NamedTuple):
-    """The server's first message: every pin, and where the person is."""
+    """The server's first message: every pin, and the person's position."""
 
     version: int
     pins: list[Pin]
@@ -81,7 +81,7 @@ class Welcome(NamedTuple):
 
 
 class Changed(NamedTuple):
-    """A pin changed at ``time`` (Unix seconds); ``edge`` says whether its level did."""
+    """A pin changed at ``time`` (Unix seconds); ``edge`` is true if its level changed."""
 
     pin: int
     state: Pin
@@ -96,13 +96,13 @@ class PersonMoved(NamedTuple):
 
 
 class Done(NamedTuple):
-    """Every request up to ``number`` is carried out."""
+    """All requests up to ``number`` are done."""
 
     number: int
 
 
 class Refused(NamedTuple):
-    """Request ``number`` changed nothing, because of ``why``."""
+    """Request ``number`` changed nothing, for the reason ``why``."""
 
     number: int
     why: str
@@ -135,13 +135,13 @@ def serialize(message: Message) -> bytes:
 
 
 class Stream:
-    """Bytes in, messages out, of one direction of one connection."""
+    """The decoder for one direction of one connection: bytes in, messages out."""
 
     def __init__(self) -> None:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
 
     def feed(self, data: bytes) -> Iterator[Message]:
-        """Yield the messages that ``data`` completes; raises ProtocolError."""
+        """Yield the messages that ``data`` completes. Raise ProtocolError."""
         try:
             self._unpacker.feed(data)
             for item in self._unpacker:
@@ -151,12 +151,12 @@ class Stream:
 
 
 def encode_board(pins: list[Pin], person: Position | None) -> bytes:
-    """Return a board as one block, for the file that keeps it."""
+    """Return a board as one block of bytes, for the file in which it is saved."""
     return serialize(Welcome(VERSION, pins, person))
 
 
 def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
-    """Return the pins and the person of :func:`encode_board`; raises ProtocolError."""
+    """Return the pins and the person of :func:`encode_board`. Raise ProtocolError."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
         raise ProtocolError("not a saved board")
@@ -212,5 +212,4 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
     lambda position: PersonMoved(_position(position)),
-)
-"""In the order of _KINDS."""
+)  # in the order of _KINDS

@@ -1,4 +1,4 @@
-"""Detection of a Raspberry Pi, whose own pins the virtual board does not move."""
+"""Detect a Raspberry Pi, whose physical pins the virtual board does not control."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def model_name(file: Path = _MODEL_FILE) -> str | None:
 
 
 def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
-    """Print one line on stderr when this is a Raspberry Pi: here only its virtual twin moves."""
+    """Print a warning on stderr if this is a Raspberry Pi: the program only controls a virtual board."""
     name = model_name(file)
     if name is not None:
         print(

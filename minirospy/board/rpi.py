@@ -1,4 +1,4 @@
-"""RPi.GPIO: the virtual board's functions; importing it warns where a Raspberry Pi lacks its library."""
+"""RPi.GPIO on the virtual board; importing it warns on a Raspberry Pi that the real library is missing."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The module of `import RPi.GPIO as GPIO`: the API of RPi.GPIO 0.7.1 on the virtual board.
 
 Names, defaults, error texts and warnings are RPi.GPIO's
-(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The board is reached at the first call that needs it,
-not on import. Leaving the process leaves the pins as they are, as on hardware; only cleanup() resets them.
+(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The connection to the board is made at the first call that needs
+it, not on import. As on hardware, the pins keep their state when the process exits; only cleanup() resets them.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ HEADER = {
 
 
 class Gpio:
-    """One program's view of the board: its numbering mode, the pins that it set up, its events."""
+    """The board from the view of one program: its numbering mode, the pins that it set up, its events."""
 
     def __init__(self, board: str | None = None) -> None:
         self._board = board
@@ -119,10 +119,10 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # channel -> BCM pin of what is set up, for the two calls that must be fast.
+        # Channel -> BCM pin of the channels that are set up, for the two calls that must be fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The same, of channels that a signal's cleanup() has released: the call that it interrupted still finds them.
+        # The same for channels released by cleanup() in a signal handler: the interrupted call still finds them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -140,17 +140,17 @@ class Gpio:
         self._interrupted.clear()
 
     def getmode(self) -> int | None:
-        """BCM, BOARD or None."""
+        """Return BCM, BOARD or None."""
         return self._mode
 
     def setwarnings(self, flag: bool) -> None:
-        """Set whether RuntimeWarnings are given."""
+        """Set whether RuntimeWarnings are issued."""
         self._warns = bool(flag)
 
     def setup(
         self, channel: int | Sequence[int], direction: int, pull_up_down: int = PUD_OFF, initial: int = -1
     ) -> None:
-        """Make a channel, or several, an input or an output."""
+        """Configure one or several channels as input or output."""
         direction, pull_up_down, initial = map(operator.index, (direction, pull_up_down, initial))
         if direction not in {IN, OUT}:
             raise ValueError("An invalid direction was passed to setup()")
@@ -165,7 +165,7 @@ class Gpio:
             self._set_up(one, direction, pull_up_down, level)
 
     def output(self, channel: int | Sequence[int], value: int | bool | Sequence[int | bool]) -> None:
-        """Set output channels; one value serves them all."""
+        """Set output channels; a single value applies to all of them."""
         try:
             # The usual case first: one channel, one value.
             pin = self._writable[channel]  # type: ignore[index]
@@ -176,7 +176,7 @@ class Gpio:
             self._linked().write(((pin, level),))
 
     def input(self, channel: int) -> int:
-        """Return the level of a channel that is set up, output or input: 0 or 1."""
+        """Return the level of a configured channel, output or input: 0 or 1."""
         try:
             return self._levels[self._readable[channel]]
         except (KeyError, TypeError):
@@ -191,7 +191,7 @@ class Gpio:
         return int(self._linked().states[pin].function)
 
     def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
-        """Make what this program set up inputs again; without argument forget the numbering mode, too."""
+        """Make the channels that this program set up inputs again; without argument also reset the numbering mode."""
         with self._lock:
             everything = channel is None
             wanted = (
@@ -199,8 +199,8 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
-                # A shutdown hook: the program may have checked its flag, and be about to use its pin. It is not to fail
-                # for that: RPi.GPIO, being C, ends its calls first.
+                # In a shutdown hook the program may already have checked its flag, and be about to use its pin. That
+                # must not fail: RPi.GPIO is written in C and finishes its calls first.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -213,7 +213,7 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Also if nothing was left: RPi.GPIO only checks whether it has touched a pin yet.
+                # Even if no channel was set up: RPi.GPIO only checks whether it has accessed a pin yet.
                 self._mode = None
 
         if not mine:
@@ -232,7 +232,7 @@ class Gpio:
         *,
         channel: int | None = None,
     ) -> None:
-        """Watch an input for edges; ``callback(channel)`` runs for each. ``bouncetime`` in ms."""
+        """Detect edges of an input; ``callback(channel)`` runs for each. ``bouncetime`` in ms."""
         number = gpio if gpio is not None else channel
         if number is None or edge is None:
             raise TypeError("add_event_detect() needs a channel and an edge")
@@ -250,7 +250,7 @@ class Gpio:
             self._detectors[pin] = detector
 
     def add_event_callback(self, gpio: int, callback: Callback) -> None:
-        """Add a callback for a channel that add_event_detect watches."""
+        """Add a callback for a channel with add_event_detect."""
         if not callable(callback):
             raise TypeError("Parameter must be callable")
         pin = self._input_pin(gpio)
@@ -265,7 +265,7 @@ class Gpio:
     def wait_for_edge(
         self, channel: int, edge: int, bouncetime: int = NO_BOUNCETIME, timeout: int = -1
     ) -> int | None:
-        """Wait for an edge, up to ``timeout`` ms (-1: for ever); the channel, or None when time is up."""
+        """Wait for an edge, up to ``timeout`` ms (-1: forever); return the channel, or None on a timeout."""
         pin = self._input_pin(channel)
         detector = detector_of(channel, edge, bouncetime)
         if operator.index(timeout) <= 0 and timeout != -1:
@@ -282,17 +282,17 @@ class Gpio:
                 self._waiting.pop(pin, None)
 
     def event_detected(self, channel: int) -> bool:
-        """Return whether an edge came since the last call."""
+        """Return whether an edge occurred since the last call."""
         detector = self._detectors.get(self._pin(channel))
         return detector is not None and detector.take()
 
     def remove_event_detect(self, gpio: int) -> None:
-        """Stop watching a channel; callbacks that have not started will not run."""
+        """Stop detecting edges of a channel; callbacks that have not started will not run."""
         with self._lock:
             self._forget_events(self._pin(gpio))
 
     def close(self) -> None:
-        """Hang up; the pins stay, but for those with a running PWM, which go low."""
+        """Disconnect; the pins keep their state, except those with a running PWM, which go low."""
         for reference in list(self._waves.values()):
             wave = reference()
             if wave is not None:
@@ -307,7 +307,7 @@ class Gpio:
         atexit.unregister(self.close)
 
     def output_pin(self, channel: int) -> int:
-        """Return the BCM pin of a channel, for a PWM; raises what PWM() raises."""
+        """Return the BCM pin of a channel, for a PWM. Raise the exceptions of PWM()."""
         pin = self._pin(channel)
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")
@@ -316,11 +316,11 @@ class Gpio:
         return pin
 
     def register_wave(self, wave: Wave) -> None:
-        """Remember who modulates a pin."""
+        """Record that a PWM uses a pin."""
         self._waves[wave.pin] = weakref.ref(wave)
 
     def unregister_wave(self, wave: Wave) -> None:
-        """Free the pin for another PWM."""
+        """Release the pin for another PWM."""
         self._waves.pop(wave.pin, None)
 
     def write(self, pin: int, level: int) -> None:
@@ -369,14 +369,14 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Before the call of the board: a Ctrl-C may end that call, and cleanup() has to undo what the board did.
+            # Before calling the board: a Ctrl-C may interrupt that call, and cleanup() must undo its effect.
             self._directions[pin] = direction
 
         link.call(Setup(pin, direction, pull, level))
 
         with self._lock:
             if pin not in self._directions:
-                # A signal handler's cleanup() came during the call of the board.
+                # A signal handler has called cleanup() during the call of the board.
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin
@@ -429,7 +429,7 @@ class Gpio:
                 callbacks.schedule(detector)
 
     def _warn(self, text: str, depth: int) -> None:
-        """Warn about the user's line, ``depth`` calls above this one."""
+        """Warn at the user's line, which is ``depth`` calls above this one."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
 
@@ -440,7 +440,7 @@ _gpio = Gpio()
 class PWM:
     """Pulse width modulation of an output channel; ``frequency`` in Hz.
 
-    It ends with stop() or with the object, as RPi.GPIO's does: keep a reference.
+    As in RPi.GPIO, it stops when stop() is called or the object is deleted: keep a reference.
     """
 
     def __init__(self, channel: int, frequency: float) -> None:
@@ -451,16 +451,16 @@ class PWM:
         self._wave = Wave(_gpio, pin, frequency)
 
     def start(self, dutycycle: float) -> None:
-        """Begin with ``dutycycle`` percent."""
+        """Start with a duty cycle of ``dutycycle`` percent."""
         self.ChangeDutyCycle(dutycycle)
         self._running.start()
 
     def ChangeDutyCycle(self, dutycycle: float) -> None:  # noqa: N802 - RPi.GPIO's name
-        """0.0 to 100.0 percent."""
+        """Set the duty cycle, 0.0 to 100.0 percent."""
         self._running.set(duty=dutycycle)
 
     def ChangeFrequency(self, frequency: float) -> None:  # noqa: N802 - RPi.GPIO's name
-        """Hz, above 0.0."""
+        """Set the frequency in Hz, above 0.0."""
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:

@@ -1,6 +1,6 @@
-"""A safety scanner that is not there: a room with walls and a person in, ranges and fields out. Pure.
+"""A simulated safety scanner: a room with walls and a person in, ranges and fields out. Pure.
 
-The geometry is that of SICK's nanoScan3 as its ROS 1 driver publishes it: 1651 beams over 275 degrees. Lengths are in
+The geometry is that of SICK's nanoScan3 as published by its ROS 1 driver: 1651 beams over 275 degrees. Lengths are in
 metres, angles in rad, x straight ahead of the scanner and y to its left.
 """
 
@@ -18,18 +18,15 @@ ANGLE_MIN = -2.39983
 ANGLE_INCREMENT = 0.0029088794
 RANGE_MIN = 0.1
 RANGE_MAX = 40.0
-NOISE = 0.004
-"""The spread of a range, in metres."""
-FIELDS = (0.4, 0.2)
-"""How far the warning field and the protective field reach."""
+NOISE = 0.004  # standard deviation of a range, in metres
+FIELDS = (0.4, 0.2)  # reach of the warning field and of the protective field, in metres
 
 _PLAIN, _REFLECTOR = 90.0, 250.0
-_DARK_EDGE = 0.35
-"""The least share of a surface's brightness: that of one seen from the side."""
+_DARK_EDGE = 0.35  # minimum share of a surface's brightness, for one seen from the side
 
 
 class Wall(NamedTuple):
-    """A straight piece of wall between two points; a reflector shines back all light."""
+    """A straight wall between two points; a reflector returns all light."""
 
     x1: float
     y1: float
@@ -39,7 +36,7 @@ class Wall(NamedTuple):
 
 
 class Circle(NamedTuple):
-    """A round thing, such as a person's legs, seen from above."""
+    """A round object seen from above, such as a person's legs."""
 
     x: float
     y: float
@@ -47,12 +44,12 @@ class Circle(NamedTuple):
 
     @property
     def distance(self) -> float:
-        """From the scanner to its nearest point; never less than nothing."""
+        """The distance from the scanner to the circle's closest point; never negative."""
         return max(0.0, math.hypot(self.x, self.y) - self.radius)
 
 
 class Scan(NamedTuple):
-    """One turn: a range and an intensity for each beam (``inf``: nothing hit), and which beams hit a reflector."""
+    """One rotation: a range and an intensity for each beam (``inf``: nothing hit), and which beams hit a reflector."""
 
     ranges: list[float]
     intensities: list[float]
@@ -60,7 +57,7 @@ class Scan(NamedTuple):
 
     @property
     def nearest(self) -> float:
-        """The least range."""
+        """The smallest range."""
         return min(self.ranges)
 
     def fields(self) -> tuple[bool, bool]:
@@ -69,7 +66,7 @@ class Scan(NamedTuple):
         return nearest >= FIELDS[0], nearest >= FIELDS[1]
 
 
-# A room of 6 m by 4 m with a door to the left, and a reflector on the wall ahead; the scanner at the wall behind.
+# A room of 6 m by 4 m with a door to the left, and a reflector on the wall ahead; the scanner is at the wall behind.
 WALLS = (
     Wall(-1.0, -2.0, 5.0, -2.0),
     Wall(5.0, -2.0, 5.0, -0.3),
@@ -82,7 +79,7 @@ WALLS = (
 
 
 class Room:
-    """Walls that stay, and a person who moves. ``seed`` makes the noise repeatable."""
+    """Fixed walls, and a person who moves. ``seed`` makes the noise reproducible."""
 
     def __init__(self, walls: Sequence[Wall] = WALLS, seed: int | None = None) -> None:
         self.person: Circle | None = None
@@ -90,7 +87,7 @@ class Room:
         self._walls = [_nearest_wall(_angle(beam), walls) for beam in range(BEAMS)]
 
     def scan(self, noise: float = NOISE) -> Scan:
-        """Return what the scanner sees now."""
+        """Return a scan of the present room."""
         ranges, intensities, reflectors = [], [], []
         gauss = self._noise.gauss
         person = self._person_ranges()
@@ -110,7 +107,7 @@ class Room:
         return Scan(ranges, intensities, reflectors)
 
     def _person_ranges(self) -> dict[int, float]:
-        """Beam -> distance, of the beams that meet the person."""
+        """Return beam -> distance, for the beams that hit the person."""
         person = self.person
         if person is None:
             return {}
@@ -134,7 +131,7 @@ def _angle(beam: int) -> float:
 
 
 def _nearest_wall(angle: float, walls: Sequence[Wall]) -> tuple[float, float, bool]:
-    """Return the distance, brightness and kind of what a beam meets first."""
+    """Return the distance of the first wall that a beam hits, its brightness, and whether it is a reflector."""
     dx, dy = math.cos(angle), math.sin(angle)
     nearest: tuple[float, float, bool] = (math.inf, 0.0, False)
     for wall in walls:

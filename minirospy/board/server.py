@@ -1,7 +1,7 @@
-"""The process that holds one board: `python -m minirospy.board.server FOLDER NAME`.
+"""The server process of one board: `python -m minirospy.board.server FOLDER NAME`.
 
-The first client starts it and it ends by itself shortly after the last one left; a lock file lets exactly one
-live. The board is written to a file when it changes, so the next server goes on where this one stopped.
+The first client starts it, and it exits shortly after the last one has disconnected; a lock file ensures that only one
+runs. The board is saved to a file when it changes, so the next server continues with the same state.
 """
 
 from __future__ import annotations
@@ -39,26 +39,24 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5
-"""Seconds that a board without clients waits for the next one."""
+LINGER = 1.5  # seconds that a board without clients waits for the next one
 
 SAVE_AFTER = 0.05
-"""Seconds from a change to its file: a fast blinker is written 20 times a second, not at each change."""
+"""Seconds from a change to saving it: with a fast blinking LED the file is written 20 times a second, not at each change."""
 
+# Unsent bytes for a client; beyond that it is disconnected, and reconnects when it reads again
 MAX_UNSENT = 1 << 20
-"""Bytes that wait for a client that does not read; then it is dropped, and joins again when it wakes up."""
 
-LOCK_PATIENCE = 5.0
-"""Seconds to wait for the lock of a server that is about to end."""
+LOCK_PATIENCE = 5.0  # seconds to wait for the lock of a server that is about to exit
 
 
 def main(argv: list[str]) -> int:
-    """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
+    """Serve the board NAME of FOLDER until it has no clients; return 0 also if another server runs."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # Not the open file that it is elsewhere: Windows could not remove that, nor its folder.
+        # Not an open file, as on other systems: Windows could not remove it, nor its folder.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board that somebody kept stays, also when another process starts it again.
+    # A board that already has saved state is kept, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:
@@ -71,7 +69,7 @@ def main(argv: list[str]) -> int:
 
 
 class _LogOnDemand(io.TextIOBase):
-    """A standard error that opens its file for each text, so that the file exists only where something went wrong."""
+    """A standard error that opens its file for each write, so that the file exists only after an error."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -107,7 +105,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # Where a client keeps it open, the next server replaces it.
+            # If a client has it open, the next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):
@@ -144,7 +142,7 @@ class _Server:
         return Done(request.number)
 
     def _apply(self, operation: Operation | MovePerson) -> list[Message]:
-        """Return what everybody is to hear. Raise OperationError."""
+        """Apply an operation and return the messages for all clients. Raise OperationError."""
         if isinstance(operation, MovePerson):
             return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
         now = time.time()
@@ -159,13 +157,13 @@ class _Server:
         if self._saving is not None:
             self._saving.cancel()
             self._saving = None
-        # A removed folder (a test's, a cleaned /tmp) must not fail the clients.
+        # A removed folder (a test's, a cleaned /tmp) must not cause errors in the clients.
         with contextlib.suppress(OSError):
             _write_private(self._directory.state_path, encode_board(self._model.pins, self._model.person))
 
 
 class _Client(asyncio.Protocol):
-    """One connection: reads messages, hands them on, writes answers."""
+    """One connection: reads messages, passes them on, writes answers."""
 
     def __init__(self, server: _Server) -> None:
         self._server = server
@@ -185,7 +183,7 @@ class _Client(asyncio.Protocol):
         except ProtocolError:
             self.drop()
             return
-        # One Done speaks for all before it: a burst of outputs is answered once.
+        # The last Done covers all before it, so a burst of outputs is answered once.
         done: list[Message] = [answer for answer in answers if isinstance(answer, Done)]
         refused: list[Message] = [answer for answer in answers if isinstance(answer, Refused)]
         if answers:
@@ -223,7 +221,7 @@ def _saved(directory: BoardDirectory) -> BoardModel:
 
 
 def _write_private(path: Path, data: bytes) -> None:
-    """Replace ``path`` whole, readable by this user only."""
+    """Replace ``path`` atomically by a file that only this user can read."""
     fresh = path.with_name(path.name + ".new")
     with os.fdopen(private_files.create_file(fresh), "wb") as file:
         file.write(data)
@@ -232,7 +230,7 @@ def _write_private(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _locked(directory: BoardDirectory) -> Iterator[bool]:
-    """Yield whether this process got the board's lock; waits a little for one that is about to end."""
+    """Yield whether this process got the board's lock; waits shortly for a server that is about to exit."""
     deadline = time.monotonic() + LOCK_PATIENCE
     with os.fdopen(
         private_files.open_file(directory.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b"

@@ -1,4 +1,4 @@
-"""The square wave of a PWM, as the virtual board shows it."""
+"""The square wave of a PWM on the virtual board."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 
-PWM_LIMIT = 50.0
-"""Hz: a faster PWM shows on the board with this frequency and its own duty cycle."""
+PWM_LIMIT = 50.0  # Hz; a faster PWM appears on the board with this frequency and its own duty cycle
 
 
 class Output(Protocol):
-    """The output channels, as a wave needs them."""
+    """The interface to the output channels that a wave uses."""
 
     def write(self, pin: int, level: int) -> None:
         """Set the level of a pin."""
 
     def register_wave(self, wave: Wave) -> None:
-        """Record the wave of its pin."""
+        """Record that a wave uses its pin."""
 
     def unregister_wave(self, wave: Wave) -> None:
-        """Free the pin for another wave."""
+        """Release the pin for another wave."""
 
 
 class Wave:
@@ -53,7 +52,7 @@ class Wave:
         self._changed.set()
 
     def start(self) -> None:
-        """Begin; again after stop()."""
+        """Start the wave; also possible after stop()."""
         if self._thread is None:
             self._stopping = False
             self._gpio.register_wave(self)
@@ -61,7 +60,7 @@ class Wave:
             self._thread.start()
 
     def stop(self) -> None:
-        """End with the pin low; the pin is free for another PWM."""
+        """Stop, and set the pin low; another PWM may then use it."""
         thread, self._thread = self._thread, None
         self._stopping = True
         self._changed.set()
@@ -70,7 +69,7 @@ class Wave:
         self._gpio.unregister_wave(self)
 
     def _run(self) -> None:
-        # Without a board there is nothing to modulate any more.
+        # Without a board there is no pin to modulate.
         with contextlib.suppress(BoardError):
             while not self._stopping:
                 self._changed.clear()

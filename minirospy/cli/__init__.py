@@ -1,1 +1,1 @@
-"""The commands: a command is a typed function and a `main(argv) -> int`; thin over the rooms below."""
+"""The commands. A command is a typed function and a `main(argv) -> int`; the logic is in the modules that they call."""

@@ -1,4 +1,4 @@
-"""minirospy board: the virtual board as a picture, and its buttons, pins and person for scripts."""
+"""`minirospy board`: a picture of the virtual board, and commands for its buttons, pins and the simulated person."""
 
 from __future__ import annotations
 
@@ -27,13 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""How far a key moves the person, in metres; also the width of a place on the map, and half its height."""
+"""The person's step per key in metres; also the width of a map cell, and half its height."""
 
-_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6
-"""What the map shows, in metres."""
+_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # metres that the map shows
 
-_START: Position = (0.6, 0.0)
-"""Where the person comes in."""
+_START: Position = (0.6, 0.0)  # where the person enters
 
 _STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "right": (0.0, -_STEP)}
 
@@ -44,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # For what the verbs open, as the variable would be for a node.
+        # Set the variable, which nodes read as well, for the boards that the verbs open.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -57,7 +55,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """The picture of a board for rich: its lights, its buttons, the person, and the other pins in use."""
+    """A picture of a board for rich: its lights, its buttons, the person, and other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state
@@ -103,7 +101,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """Return the floor before the scanner from above, the scanner at its lower edge: its two fields, and the person."""
+    """Return the floor in front of the scanner, seen from above: the scanner's two fields and the person."""
     from rich.text import Text
 
     body = Circle(*person)
@@ -168,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the last drawing; below it where the cursor cannot go back (TERM=dumb)."""
+    """Yield a function that draws over the last drawing, or below it if the cursor cannot move back (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -206,7 +204,7 @@ def _press(pin: Sequence[int]) -> None:
         for each in pin:
             board.press(each)
             used = board.state().pins[each]
-            # A pin that a program reads with a pull resistor has a button of the user's own.
+            # An input with a pull resistor may have a button that the user has wired.
             if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
                 part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
                 warn(

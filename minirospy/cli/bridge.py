@@ -248,7 +248,7 @@ def _show_status(port: int | None, rosbridge_port: int | None, token: str, *, as
     ports = [each for each in (port, rosbridge_port) if each is not None]
     for each in ports:
         _check_range("port", each, 1, 65535)
-    # Those of Foxglove, rosbridge and web_video_server.
+    # The default ports of Foxglove, rosbridge and web_video_server.
     return show_status(ports or (8765, 9090, 8080), token, as_json=as_json)
 
 
@@ -258,11 +258,11 @@ def _check_range(name: str, value: int, low: int, high: int) -> None:
 
 
 def _given_token(option: str, given: str | None, variable: str) -> str:
-    """Return the token of an option, else that of a variable, "" if there is none."""
+    """Return the token from an option, else from a variable, "" if there is none."""
     if given is None:
         return os.environ.get(variable, "")
     if not given:
-        # Perhaps a variable that is not set: it must not open the bridge to everybody.
+        # The argument may be an unset shell variable, which must not open the bridge to everybody.
         raise Misuse(f"--{option} wants a token of 8 to 200 characters, and got an empty one")
     return given
 
@@ -286,7 +286,8 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     is_any = options.address in ("0.0.0.0", "::")
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
-        # localhost may be ::1, and another user's server there would get the token. A certificate shows who serves.
+        # localhost may resolve to ::1, and another user's server there would receive the token. A certificate would
+        # identify the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)

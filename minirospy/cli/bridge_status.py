@@ -1,4 +1,4 @@
-"""`minirospy bridge --status`: what running bridges serve, and to whom."""
+"""`minirospy bridge --status`: what running bridges serve, and their clients."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _Json = Any
 
 
 class _Token(NamedTuple):
-    """``is_kept``: it is from ROS_HOME, where this user's bridges keep theirs."""
+    """A token. ``is_kept``: it is from ROS_HOME, where this user's bridges store theirs."""
 
     text: str
     is_kept: bool
 
 
 class _NoBridgeError(BridgeError):
-    """Nothing answers at a port."""
+    """No bridge answers at a port."""
 
 
 def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
-    """Print the status of the bridges at these ports of this machine; return the exit status.
+    """Print the status of the local bridges at these ports; return the exit status.
 
-    Raise BridgeError if none answers, or one refuses.
+    Raise BridgeError if none answers, or one refuses access.
     """
     found: dict[str, _Json] = {}
     faults: list[BridgeError] = []
@@ -40,7 +40,7 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
         except BridgeError as error:
             faults.append(error)
         else:
-            # A bridge has a port for each protocol.
+            # A bridge has several ports, one per protocol: list it once.
             found.setdefault(status["node"], status)
 
     if as_json and found:
@@ -92,11 +92,11 @@ def _token(given: str) -> _Token:
 
 
 def _fetch(port: int, token: _Token) -> _Json:
-    """Return the JSON of the status page."""
+    """Return the JSON of a bridge's status page."""
     import http.client
     import ssl
 
-    # Of this machine: whose certificate it is does not matter.
+    # The server is on this machine, so its certificate need not be verified.
     context = ssl._create_unverified_context()
     plain = http.client.HTTPConnection("127.0.0.1", port, timeout=_SECONDS)
     encrypted = http.client.HTTPSConnection("127.0.0.1", port, timeout=_SECONDS, context=context)

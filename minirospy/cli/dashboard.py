@@ -1,4 +1,4 @@
-"""`minirospy dashboard`, `rqt` and its kin: the graph and the board in a browser. How to use it: docs/dashboard.md."""
+"""`minirospy dashboard`, `rqt` and its tools: the graph and the board in a browser. How to use it: docs/dashboard.md."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
-Fields = Mapping[str, Sequence[str]]
-"""The settings of a view, as its link has them."""
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as in its link
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -29,7 +28,7 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``): both are in COMMANDS."""
+    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``), from COMMANDS."""
     command = COMMANDS.get(name.lower())
     if command is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -37,7 +36,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command; launch files start it as a node, with remappings among its words."""
+    """Run a command. Launch files start it as a node, so its arguments may contain remappings."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
@@ -73,7 +72,7 @@ def _parser(name: str, what: str) -> Parser:
 
 
 def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None:
-    """Accept an option of rqt that has no meaning for a page."""
+    """Accept an option of rqt that has no effect on the page."""
     if takes_value:
         parser.add_argument(
             *words, dest="ignored", metavar="X", help="accepted, without effect", completer="nothing"
@@ -148,7 +147,7 @@ def _window(
 ) -> Command:
     """Return the command of a window of rqt.
 
-    ``what`` is the description, ``add_arguments`` adds its arguments, of which ``chosen`` makes the view and its settings.
+    ``what`` is the description; ``add_arguments`` adds its arguments, which ``chosen`` converts to the view and its settings.
     """
 
     def make_parser() -> Parser:
@@ -292,7 +291,7 @@ def _serve(
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
-    ``node_name``: that of joint_state_publisher_gui, which publishes joints; else the dashboard's own.
+    ``node_name``: the name of joint_state_publisher_gui, which publishes joints; by default the dashboard's own.
     """
     from minirospy.web.serve import require_libraries
 
@@ -310,7 +309,7 @@ def _serve(
     from minirospy.web.dashboard.dashboard import PORT, Dashboard
     from minirospy.web.serve import run
 
-    # Bags of the command line may be anywhere.
+    # Bags on the command line may be in any folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
@@ -326,7 +325,7 @@ def _serve(
     )
 
     class Started:
-        """The dashboard at the first port that is free, of those that are wanted."""
+        """Opens the dashboard on the given port; by default on PORT, or on any free port if that one is in use."""
 
         dashboard: Dashboard
 
@@ -379,9 +378,9 @@ def _serve(
 
 
 def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
-    """Return this user's tokens; where they cannot be kept in ROS_HOME, new ones, unless they have to be the same next time.
+    """Return this user's tokens; if they cannot be stored in ROS_HOME, new ones, unless ``must_be_kept``.
 
-    On loopback, too, the page needs the token to start programs and to open files: other users of the machine reach it.
+    Even on loopback the page needs the token to start programs and open files: other users of the machine can connect to it.
     """
     from minirospy.base.errors import BridgeError
     from minirospy.web.access import new_token
@@ -411,9 +410,9 @@ def _announce(
     from minirospy.web.dashboard.views import link
 
     is_any = address in ("0.0.0.0", "::")
-    # Not localhost: a browser may try ::1 first, where another user's program may listen at this port.
+    # Do not use localhost: a browser may try ::1 first, and another user's program may listen there on this port.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
-    # The person at this machine gets the rights of its programs.
+    # The local user's link gets the rights of the user's own programs.
     own = tokens.read if read_only else tokens.write
     here = link(host, port, view, fields, token=own)
     is_opened = not no_browser and _open_browser(partial(link, host, port, view, fields), own, codes)
@@ -430,7 +429,7 @@ def _announce(
 
 
 def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
-    """Open the browser with a code in place of the token; return whether there is one. On the loop."""
+    """Open the browser with a one-time code instead of the token; return whether there is a browser. Runs on the loop."""
     import asyncio
 
     from minirospy.web.dashboard.browser import open_link
@@ -442,7 +441,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Later than the code's end by its own clock.
+    # Check after the code has expired by its own clock.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 
@@ -457,7 +456,7 @@ _ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tu
     "rqt_reconfigure": (_add_nodes, _nodes),
     "rqt_top": (None, _top),
 }
-"""The commands that have arguments of their own: what adds them, and what makes the view and its settings of them."""
+"""Commands with arguments: the function that adds them, and the function that converts them to a view and its settings."""
 
 COMMANDS = {
     window.command: Command("rviz", _rviz_parser, _rviz)
@@ -465,4 +464,4 @@ COMMANDS = {
     else _window(window.command, window.view, window.what, *_ARGUMENTS.get(window.command, ()))
     for window in WINDOWS
 }
-"""The commands of rqt, and rviz, by name."""
+"""The commands of rqt and rviz, by name."""

@@ -29,10 +29,10 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""In the middle between two looks at the button, of which there are ten a second: then the LED takes its usual time."""
+"""Between two of the button's ten polls per second, so that the LED reacts after its typical delay."""
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""A Windows with a virus scanner, or a Raspberry Pi, takes long; a launch that has failed ends the wait."""
+"""Long enough for Windows with a virus scanner, or a Raspberry Pi. A failed launch ends the wait early."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
@@ -82,7 +82,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Return whether this is a terminal whose cursor cannot go back, as in an editor's window."""
+    """Return whether this is a terminal that cannot move the cursor back, such as in an editor."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -90,7 +90,7 @@ def _is_dumb() -> bool:
 
 @contextlib.contextmanager
 def _own_world() -> Iterator[Path]:
-    """Set up a master port and a board of the demo's own, so that it disturbs nobody; yield a folder for its files."""
+    """Set up a separate master port and board, so that the demo affects nothing else; yield a folder for its files."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
         os.environ["MINIROSPY_LOCAL"] = "1"
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{_free_port()}"
@@ -102,9 +102,10 @@ def _own_world() -> Iterator[Path]:
 
 
 def _free_port() -> int:
-    """Return a port for the master, which starts later.
+    """Return a free port for the master, which starts later.
 
-    The system's own choice would be ephemeral, from 32768 or 49152 on: any connection of another program may get it meanwhile.
+    Do not use the system's choice, an ephemeral port from 32768 or 49152 on: another program's connection may get it
+    meanwhile.
     """
     for port in random.sample(range(20_000, 32_000), 100):
         with socket.socket() as probe, contextlib.suppress(OSError):
@@ -115,7 +116,7 @@ def _free_port() -> int:
 
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run roslaunch with the workshop's launch file; end it by Ctrl-C's signal, which ends all its nodes."""
+    """Run roslaunch with the workshop's launch file; stop it and its nodes with SIGINT."""
     command = [
         sys.executable,
         "-m",
@@ -149,7 +150,7 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
-    """Press the button until the LED lights: then both nodes are connected. Raise MinirospyError."""
+    """Press the button until the LED lights, which shows that both nodes are connected. Raise MinirospyError."""
     print("Starting the master, button_publisher.py and led_actuator.py ...", flush=True)
     end = time.monotonic() + _START_SECONDS
     while time.monotonic() < end:
@@ -165,14 +166,14 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release; return the seconds until the LED has followed, None if it did not."""
+    """Press or release the button; return the seconds until the LED followed, None if it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
 
 
 def _wait_for(board: Board, level: int, timeout: float) -> int | None:
-    """Wait until the LED has ``level``, and return it; return None after ``timeout`` seconds."""
+    """Wait until the LED has ``level``, and return the level; return None after ``timeout`` seconds."""
     watch = board.watch([LED], timeout=timeout)
     if board.get(LED) == level:
         return level
@@ -192,7 +193,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """The demo where nobody watches, or nothing can be drawn: a line for each press."""
+    """The demo as one line per press, for outputs that are not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)
@@ -212,7 +213,7 @@ class _Lines:
 
 
 class _Picture:
-    """The demo on a terminal: the board, and what is happening on it."""
+    """The demo on a terminal: the board, and the current step."""
 
     def __init__(self, board: Board) -> None:
         from rich.console import Console

@@ -227,7 +227,7 @@ def _gateway(
     options = GatewayOptions(name, imports or not name, namespace, network, rules)
 
     async def start(node: Node) -> Gateway:
-        # What the gateway logs goes where the node's lines go.
+        # Send the gateway's log to the node's log.
         logging.getLogger("minirospy.fleet").parent = node.log
         return Gateway(node, options)
 
@@ -327,7 +327,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
             parameters.set_parameter(graph, name, machine)
             print(f"robot [{robot}]: only machine {machine} is shown (parameter {name})")
             return 0
-        # Without a choice nothing has to be taken back.
+        # If no machine was chosen, there is nothing to delete.
         with contextlib.suppress(NotFoundError):
             parameters.delete_parameter(graph, name)
     print(f"robot [{robot}]: the machine that came first is shown")
@@ -335,7 +335,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
-    """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
+    """Return the endpoints to connect to and to listen on. Raise BridgeError without the library, Misuse if one is invalid."""
     from minirospy.base.environment import Environment
     from minirospy.fleet.network import (
         EndpointError,

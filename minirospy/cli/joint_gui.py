@@ -1,4 +1,4 @@
-"""`rosrun joint_state_publisher_gui joint_state_publisher_gui`: sliders in the browser, or in a terminal without a screen."""
+"""`rosrun joint_state_publisher_gui joint_state_publisher_gui`: sliders in a browser, or in a terminal without a display."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _NAME = "joint_state_publisher_gui"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node; return its exit status.
 
-    Its sliders are a page where a browser can show itself, and where there is neither a screen nor a terminal: then the link is
-    printed. ``--page`` and ``--terminal`` choose; without the libraries of the page it is the terminal.
+    The sliders are a page if a browser can be opened, and also if there is neither a display nor a terminal: then its link is
+    printed. ``--page`` and ``--terminal`` override this; without the page's libraries the terminal is used.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if "--terminal" in words or not (_uses_page(words) and _has_libraries()):

@@ -1,4 +1,4 @@
-"""`minirospy VERB`: every command under one name; a verb's module is imported when it is typed."""
+"""`minirospy VERB`: every command under one name; a verb's module is imported when the verb is used."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb that was typed; return the exit status as in minirospy.command.command."""
+    """Run the given verb; return the exit status as in minirospy.command.command."""
     words = list(sys.argv[1:] if argv is None else argv)
     return run("minirospy", lambda: _dispatch(words))
 

@@ -1,6 +1,6 @@
-"""`minirospy python FILE`: run a program with the Python that minirospy is installed in.
+"""`minirospy python FILE`: run a program with the Python in which minirospy is installed.
 
-For a separate installation (`pipx install minirospy`, `uv tool install minirospy`), where `python FILE` is another Python.
+For a separate installation (`pipx install minirospy`, `uv tool install minirospy`), where `python` is another Python.
 """
 
 from __future__ import annotations

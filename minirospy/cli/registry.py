@@ -1,9 +1,9 @@
-"""Every command, in one table: the console scripts, `minirospy VERB` and completion are read from it.
+"""A table of all commands, from which the console scripts, `minirospy VERB` and completion are generated.
 
-The build makes the console scripts (hatch_build.py); `python tools/commands.py` writes the lists of the shells
-and of the conda recipe.
+The build makes the console scripts (hatch_build.py); `python tools/commands.py` writes the lists for the shells and for the
+conda recipe.
 
-A command's module is imported when the command is started, or completed.
+A command's module is imported when the command is started or completed.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ __all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "console_scripts", "find_scri
 
 
 class Entry(NamedTuple):
-    """A command: where it is, and what it is called.
+    """A command: its module and its names.
 
-    ``script`` is the console script, ``verb`` what follows `minirospy`; either may be empty. A verb without a summary
-    is not shown in the help. ``grammar`` is the Command or Family in ``module``; a command that reads its words by
-    hand has none, and names a function of minirospy.cli.completion.completers in ``completer`` instead.
+    ``script`` is the console script, ``verb`` the word after `minirospy`; either may be empty. A verb without a summary
+    is not shown in the help. ``grammar`` is the name of the Command or Family in ``module``; a command that parses its
+    arguments itself has none, and names a function of minirospy.cli.completion.completers in ``completer`` instead.
     """
 
     module: str
@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """Return the console script's function as an entry point names it."""
+        """Return the console script's function in the syntax of an entry point."""
         return f"minirospy.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
@@ -117,7 +117,7 @@ COMMANDS = (
     Entry("ros.catkin.commands.find", "catkin_find_pkg", "FIND_PKG", "catkin_find_pkg"),
     Entry("ros.catkin.commands.find", "catkin_topological_order", "TOPOLOGICAL_ORDER", "catkin_topological_order"),
 )  # fmt: skip
-"""Verbs in the order of `minirospy -h`, then the commands that are console scripts alone."""
+"""Verbs in the order of `minirospy -h`, then commands that are only console scripts."""
 
 SHELL_FUNCTIONS = {
     "roscd": "package_folders",
@@ -128,11 +128,11 @@ SHELL_FUNCTIONS = {
     "roscp": "package_file_and_target",
     "rosmv": "package_file_and_target",
 }
-"""What `minirospy shell` defines: the function of minirospy.cli.completion.completers for each."""
+"""The functions that `minirospy shell` defines, each with its completer in minirospy.cli.completion.completers."""
 
 
 def console_scripts() -> dict[str, str]:
-    """Return the console scripts, with the function of each: ``project.scripts`` of the project's metadata."""
+    """Return the console scripts and their functions, for ``project.scripts`` in the project's metadata."""
     return {entry.script: entry.target for entry in COMMANDS if entry.script}
 
 

@@ -1,6 +1,6 @@
-"""`minirospy ros2-bridge`: topics, services, actions between ROS 1 and ROS 2 (docs/ros2.md).
+"""`minirospy ros2-bridge`: topics, services and actions between ROS 1 and ROS 2 (docs/ros2.md).
 
-It runs next to an installed ROS 2, or without one by Zenoh.
+It uses an installed ROS 2, or Zenoh without one.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def _ros2_bridge(
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
     if connect and not zenoh:
         raise Misuse("--connect is for --zenoh")
-    # Here already: the sides are opened when there is a master.
+    # Check it before the wait for a master, after which the backends are opened.
     parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
     catalogue = Catalogue(Packages().folders())
     open_side = _zenoh(known, catalogue, connect) if zenoh else _rclpy()
@@ -140,14 +140,14 @@ def _ros2_bridge(
 
     async def start(node: Node) -> Ros2Bridge | _Listing:
         loop = asyncio.get_running_loop()
-        # A router that does not answer keeps its thread waiting.
+        # Open Zenoh in a thread: it blocks while a router does not answer.
         opened = loop.run_in_executor(None, open_side, BRIDGE_PREFIX) if zenoh else None
         side = await opened if opened else open_side(BRIDGE_PREFIX)
         bridge = Ros2Bridge(node, side, options, catalogue)
         return _Listing(bridge, node) if list else bridge
 
     name = f"{BRIDGE_PREFIX}_list" if list else BRIDGE_PREFIX
-    # No message class of ROS 1 can be imported where those of ROS 2 have the same names.
+    # ROS 1 message classes cannot be imported if ROS 2 packages of the same names are.
     return run(name, (), start, lambda _: None, imports_messages=False)
 
 
@@ -186,7 +186,7 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
 
 
 class _Listing:
-    """Prints what would be bridged once ROS 2 has found its nodes, and ends the node."""
+    """Prints what would be bridged once ROS 2 has discovered its nodes, and then stops the node."""
 
     def __init__(self, bridge: Ros2Bridge, node: Node) -> None:
         self._bridge = bridge
@@ -201,7 +201,7 @@ class _Listing:
             await asyncio.sleep(_LOOK_SECONDS)
             looks += 1
             if looks < _LONELY_LOOKS and not self._bridge.side.nodes():
-                # ROS 2 has not found its nodes yet.
+                # ROS 2 has not discovered its nodes yet.
                 continue
             found = await self._bridge.pairs()
             quiet = quiet + 1 if found == before else 0

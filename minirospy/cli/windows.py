@@ -1,6 +1,6 @@
-"""The windows of rqt, and RViz, in one table: each is a command, a plug-in of rqt with its view, and a ROS package. Pure.
+"""A table of the windows of rqt, and RViz: each is a command, an rqt plugin with its view, and a ROS package. Pure.
 
-The build writes the packages (`rosrun rqt_plot rqt_plot`, `rospack find rqt_plot`) into ``ros/``, as it does with messages.
+The build writes the packages (`rosrun rqt_plot rqt_plot`, `rospack find rqt_plot`) into ``ros/``, as it does for messages.
 """
 
 from __future__ import annotations
@@ -36,16 +36,11 @@ class Window(NamedTuple):
 
     command: str
     view: str
-    what: str
-    """The command's description: what the window does, "in a browser" follows."""
-    version: str
-    """The version of ROS's package."""
-    description: str
-    """That of the package."""
-    package: str = ""
-    """The package's name if it is not the command's."""
-    programs: tuple[str, ...] = ()
-    """The package's programs if they are others than one with the package's name."""
+    what: str  # the command's description, without "in a browser"
+    version: str  # of the ROS package
+    description: str  # of the ROS package
+    package: str = ""  # package name, if it differs from the command
+    programs: tuple[str, ...] = ()  # the package's programs, if they differ from the package name
 
 
 WINDOWS = (
@@ -80,12 +75,12 @@ WINDOWS = (
     Window("smach_viewer", "smach", "Shows state machines", "0.4.13", "State machines of smach, in a browser.",
            programs=("smach_viewer", "smach_viewer.py")),
 )  # fmt: skip
-"""To add a window: a line here, and its arguments in dashboard.py if it has any; then ``python tools/commands.py``."""
+"""To add a window, add a line here, its arguments (if any) in dashboard.py, and run ``python tools/commands.py``."""
 
 
 def view_of_plugin(plugin: str) -> str:
-    """Return the view for a name that `rqt --standalone` takes. Raise UsageError if there is none."""
-    # Imported here: every command imports this table.
+    """Return the view for a name given to `rqt --standalone`. Raise UsageError if there is none."""
+    # Imported late, because every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS
 

@@ -1,4 +1,4 @@
-"""The rospy API: thin blocking twins over `minirospy.runtime`; what `import rospy` re-exports.
+"""The rospy API: thin blocking wrappers over `minirospy.runtime`, which `import rospy` re-exports.
 
 Source: http://wiki.ros.org/rospy/Overview.
 """
@@ -154,7 +154,7 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Before the first message is imported: where ROS 2 is sourced, its packages of the same names come first.
+# Before the first message is imported: if ROS 2 is sourced, its packages of the same names come first on the path.
 prefer_ros1()
 
 
@@ -174,9 +174,9 @@ def on_shutdown(h: Callable[[], object]) -> None:
 
 
 def signal_shutdown(reason: object) -> None:
-    """Shut the node down; hooks run in this thread."""
+    """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # The caller needs no notification: what the thread does now is its clean-up, and may sleep.
+    # The caller needs no further notification: anything the thread does now is clean-up, and may sleep.
     current_session().poll_shutdown()
 
 
@@ -205,22 +205,22 @@ def is_shutdown_requested() -> bool:
 
 
 def is_down() -> bool:
-    """Return whether the node has shut down, for a library: the calling thread does not count as one that polls."""
+    """Return whether the node has shut down. For libraries: the calling thread does not count as one that polls."""
     return current_session().is_shutdown()
 
 
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
-    """Have a shutdown call ``interrupt`` while a block runs: it ends what blocks in it, from any thread."""
+    """While the block runs, let a shutdown call ``interrupt``, which must unblock calls in it, from any thread."""
     return current_session().lifecycle.interrupting(interrupt)
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """Return the global, remapped name of ``name`` as this node, or the node ``caller_id``, sees it."""
+    """Return the global, remapped name of ``name``, as seen by this node or the node ``caller_id``."""
     return current_session().resolve(name and str(name), caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """Return the remapping of ``name`` on the command line, as a global name; ``name`` itself where there is none."""
+    """Return the command line's remapping of ``name``, as a global name; ``name`` itself if there is none."""
     return current_session().identity.remap(name, caller_id)
 
 
@@ -230,5 +230,5 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
 
 
 def load_command_line_node_params(argv: Sequence[str]) -> dict[str, object]:
-    """Return the private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raise ROSInitException."""
+    """Return the private parameters on a command line: ``_rate:=5`` gives {"rate": 5}. Raise ROSInitException."""
     return private_parameters(names.parse_arguments(argv))

@@ -1,4 +1,4 @@
-"""The links of a topic as programs see them in ``impl.connections``: with the attributes of rospy's transports.
+"""The links of a topic as programs see them in ``impl.connections``, with the attributes of rospy's transports.
 
 Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module.html (class Transport).
 """
@@ -17,12 +17,12 @@ __all__ = ["Connection", "connection_to_publisher", "connection_to_subscriber"]
 
 
 class Connection(NamedTuple):
-    """One end of a link, as it was when it was looked at.
+    """A snapshot of one end of a link.
 
-    ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` the topic; ``id`` is unique in the node.
+    ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` is the topic; ``id`` is unique in the node.
     ``endpoint_id`` is the URI of the publisher's Slave API, or the name of the subscribing node. ``callerid_pub``,
-    ``header``, ``type`` and ``md5sum`` are what a publisher sent; this node as publisher has none. ``stat_bytes`` and
-    ``stat_num_msg`` count what has been received or sent.
+    ``header``, ``type`` and ``md5sum`` are those that the publisher sent; they are empty if this node is the publisher.
+    ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent.
     """
 
     link: InLink | OutLink
@@ -41,16 +41,16 @@ class Connection(NamedTuple):
     done: bool = False
 
     def get_transport_info(self) -> str:
-        """Return the text of the Slave API's getBusInfo."""
+        """Return the link's description in the Slave API's getBusInfo."""
         return connection_text(self.link)
 
     def close(self) -> None:
-        """End the link. A subscriber makes it again as long as the publisher is registered."""
+        """Close the link. A subscriber reconnects as long as the publisher is registered."""
         self.link.close()
 
 
 def connection_to_publisher(link: InLink, topic: str) -> Connection:
-    """Return the subscriber's end of a link."""
+    """Return the subscriber's end of a link, as a Connection."""
     header = dict(link.header)
     return Connection(
         link,
@@ -71,5 +71,5 @@ def connection_to_publisher(link: InLink, topic: str) -> Connection:
 
 
 def connection_to_subscriber(link: OutLink, topic: str) -> Connection:
-    """Return the publisher's end of a link."""
+    """Return the publisher's end of a link, as a Connection."""
     return Connection(link, topic, "o", link.peer, link.number, link.transport, link.sent_bytes, link.sent)

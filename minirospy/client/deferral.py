@@ -1,4 +1,4 @@
-"""Critical sections of the main thread, where no signal is dispatched."""
+"""Critical sections of the main thread, in which no signal is dispatched."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ __all__ = ["Deferral", "is_main_thread"]
 
 
 class Deferral:
-    """A critical section of the main thread: ``with deferral:`` a signal is dispatched when the block ends.
+    """A critical section of the main thread: ``with deferral:`` delays the dispatch of a signal to the end of the block.
 
-    A hook may publish, log or register, and so must not run while the main thread is in the middle of one. In
-    other threads, where no signal arrives, without effect.
+    A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of one of these.
+    Has no effect in other threads, where no signal arrives.
     """
 
     def __init__(self) -> None:
-        self.pending = False
-        """Whether a signal waits for the main thread. Set by the signal's handler."""
+        self.pending = False  # a signal waits for the main thread; set by the signal handler
+        # Dispatches the pending signal; called in the main thread
         self.dispatch: Callable[[], object] = lambda: None
-        """Dispatch the pending signal. In the main thread."""
         self._depth = 0
 
     @property
@@ -38,13 +37,13 @@ class Deferral:
             self.poll()
 
     def poll(self) -> None:
-        """Dispatch a pending signal, where this is the main thread and outside of a critical section."""
+        """Dispatch a pending signal, if called in the main thread outside of a critical section."""
         if self.pending and not self._depth and is_main_thread():
             self.dispatch()
 
     @contextlib.contextmanager
     def lifted(self) -> Iterator[None]:
-        """Leave the critical section for the length of a block: for the user's code."""
+        """Leave the critical section during a block that runs the user's code."""
         depth = int(is_main_thread())
         self._depth -= depth
         try:
@@ -54,5 +53,5 @@ class Deferral:
 
 
 def is_main_thread() -> bool:
-    """Return whether the calling thread is the one that signals interrupt."""
+    """Return whether the calling thread is the main thread, which signals interrupt."""
     return threading.current_thread() is threading.main_thread()

@@ -1,4 +1,4 @@
-"""The texts of an interrupted process: what it still waits for, without tracebacks of the interrupt."""
+"""The messages of an interrupted process: what it still waits for, and no tracebacks of the interrupt."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def report_waiting(*, is_leaving: bool) -> None:
     """Print what the process still waits for; ``is_leaving``: the node waits for the master to unregister it."""
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-    # There may be no terminal any more.
+    # The terminal may be gone.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 
 
 def _what_runs() -> str:
-    """Return the thread or process that keeps this process from its exit, and where in the program it is."""
+    """Return the thread or process that delays the exit of this process, with its location in the program."""
     main = threading.main_thread()
     threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
     frames = sys._current_frames()
@@ -30,7 +30,7 @@ def _what_runs() -> str:
         if thread.is_alive() and (place := _place(frames.get(thread.ident or 0))):
             return f"thread {thread.name} at {place}"
 
-    # A main thread that runs no code of the program's waits at its exit.
+    # The main thread runs no code of the program, so it waits for other threads at exit.
     if len(threads) > 1:
         return f"thread {threads[1].name}"
     loaded = sys.modules.get("multiprocessing")
@@ -39,11 +39,11 @@ def _what_runs() -> str:
 
 
 def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
-    """Let the program, or a thread of it, that does not catch an expected error end without a traceback, with status 0."""
+    """Let an uncaught expected error exit the program, or a thread, without a traceback and with status 0."""
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:
-        # An interrupted wait may find its lock not acquired, which is a RuntimeError.
+        # An interrupted wait may raise RuntimeError because its lock is not acquired.
         while isinstance(error, RuntimeError):
             error = error.__context__
         return error is not None and is_expected(error)
@@ -65,7 +65,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
 
 
 def _place(frame: FrameType | None) -> str:
-    """Return file:line of the program's own code that is innermost; "" where there is none."""
+    """Return the innermost file:line of the program's own code; "" if there is none."""
     libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
     while frame is not None and frame.f_code.co_filename.startswith(libraries):
         frame = frame.f_back

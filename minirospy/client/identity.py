@@ -1,4 +1,4 @@
-"""The identity of a node: its name, its namespace, its settings from the command line and the environment.
+"""The identity of a node: its name, its namespace, and its settings from the command line and the environment.
 
 Source: http://wiki.ros.org/Names, http://wiki.ros.org/Remapping%20Arguments.
 """
@@ -23,12 +23,12 @@ _UNNAMED = "unnamed"
 
 
 class Identity:
-    """A name, and how other names are resolved from there. Before :meth:`take_name` that of a program without a node."""
+    """A node's name, and name resolution relative to it. Before :meth:`take_name` it is that of a program without a node."""
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """``previous``: the identity that is kept until :meth:`take_name`, but for topics, which are resolved as without."""
+        """Take ``previous``, the identity to use until :meth:`take_name`, except for topics, which ignore it."""
+        # Keys are resolved names; empty before init_node
         self.remappings: dict[str, str] = previous.remappings if previous else {}
-        """By resolved names; empty before init_node."""
         self._name: str | None = previous._name if previous else None
         self._arguments: names.Arguments | None = previous._arguments if previous else None
         self._environment: Environment | None = previous._environment if previous else None
@@ -43,7 +43,7 @@ class Identity:
 
     @property
     def arguments(self) -> names.Arguments:
-        """The command line: that of init_node, before it that of the process."""
+        """The command line: the one passed to init_node, or before that the one of the process."""
         if self._arguments is None:
             self._arguments = names.parse_arguments(sys.argv)
         return self._arguments
@@ -56,24 +56,23 @@ class Identity:
         return self._name
 
     def be_called(self, name: str) -> None:
-        """Use a global name until :meth:`take_name`."""
+        """Use a global name until :meth:`take_name` is called."""
         self._name = name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        """Return the global name of ``name``, as seen by this node or the node ``caller_id``."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
-            # As rospy reads it: `~` keeps a slash behind it, and `~/x` is `/x`.
+            # As in rospy, a slash after `~` is kept, and `~/x` is `/x`.
             resolved = names.join(node_name, names.canonicalize(name)[1:])
         else:
             resolved = names.resolve(name, node_name)
         return self.remappings.get(resolved, resolved)
 
     def resolve_topic(self, name: str) -> str:
-        """Return the global name of a topic, which keeps the name that it was created with.
+        """Return the global name of a topic, whose handle keeps the name resolved at its creation.
 
-        Before init_node it has the remappings of the process's command line, but cannot be private:
-        raises ValueError.
+        Before init_node the remappings of the process's command line apply, and a private name raises ValueError.
         """
         if self._is_named:
             return self.resolve(name)
@@ -82,7 +81,7 @@ class Identity:
         return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the remapping of ``name`` as it is spelled on the command line; else ``name`` itself."""
+        """Return the command line's remapping for exactly this spelling of ``name``; otherwise ``name`` itself."""
         mapped = self.arguments.remappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 
@@ -91,7 +90,7 @@ class Identity:
         self._arguments = names.parse_arguments(argv)
 
     def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
-        """Read the environment, and be the node ``name`` of the command line ``argv``. Raise ROSInitException."""
+        """Read the environment, and become the node ``name`` of the command line ``argv``. Raise ROSInitException."""
         arguments = self._arguments = names.parse_arguments(argv)
         self._is_named = True
         try:
@@ -107,7 +106,7 @@ class Identity:
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, object]:
-    """Return the values of ``_param:=value``, read as YAML. Raise ROSInitException on what is not YAML."""
+    """Return the values of ``_param:=value``, parsed as YAML. Raise ROSInitException on invalid YAML."""
     if arguments.wrong:
         raise ROSInitException(
             f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="
@@ -128,7 +127,7 @@ def private_parameters(arguments: names.Arguments) -> dict[str, object]:
 
 
 def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
-    """Warn, as rospy does, of a name that is not legal in the graph; the master may refuse it later."""
+    """Warn, as rospy does, that a name is not legal in the graph; the master may refuse it later."""
     if not names.is_legal_name(name):
         warnings.warn(
             f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",
@@ -139,7 +138,7 @@ def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
 def _read_environment() -> Environment:
     """Return the environment, overridden by the process's own command line.
 
-    As in rospy, the ``argv`` that a program passes to init_node does not count here, but for ``__name``.
+    As in rospy, the ``argv`` that a program passes to init_node is ignored here, except for ``__name``.
     """
     special: Mapping[str, str] = names.parse_arguments(sys.argv).special
     hosts = [value for key, value in special.items() if key in {"__ip", "__hostname"}]

@@ -1,4 +1,4 @@
-"""The lifecycle of a node: its hooks, its shutdown, and which threads of the program were notified of it.
+"""The lifecycle of a node: its hooks, its shutdown, and the threads that have been notified of it.
 
 Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 """
@@ -22,10 +22,10 @@ _log = logging.getLogger(__name__)
 
 
 class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
-    """A blocking call was ended by the node's shutdown; a KeyboardInterrupt, too, as in rospy.
+    """The node's shutdown interrupted a blocking call; as in rospy, this is also a KeyboardInterrupt.
 
-    asyncio would take a KeyboardInterrupt for the end of its loop: `minirospy.aio` raises the plain one, which is this
-    one's base and the `minirospy.ROSInterruptException` that catches both.
+    asyncio would treat a KeyboardInterrupt as a request to stop its loop, so `minirospy.aio` raises the base class, which is
+    also `minirospy.ROSInterruptException` and catches both.
     """
 
 
@@ -35,7 +35,7 @@ class _ThisThread(threading.local):
 
 
 class _Interrupting:
-    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
+    """The context manager of :meth:`Lifecycle.interrupting`; a class, for speed, since each service call uses it."""
 
     __slots__ = ("_interrupt", "_lifecycle")
 
@@ -53,40 +53,39 @@ class _Interrupting:
 
 
 class Lifecycle:
-    """From the first hook to the last: what runs when the node shuts down, and in which order."""
+    """The node's shutdown: which functions it calls, and in which order."""
 
     def __init__(self, leave: Callable[[], object]) -> None:
-        """``leave()`` takes the node out of the graph."""
+        """Take ``leave()``, which removes the node from the graph."""
         self._leave = leave
         self._lock = threading.RLock()
         self._claim = threading.Lock()
-        """Held from the start of the shutdown on. A lock, since a signal's handler may come between any two steps."""
+        """Locked from the start of the shutdown on. It is a lock, since a signal handler may run between any two steps."""
+        # Set after the shutdown hooks have run: every blocking call returns
         self.shutting_down = SignalSafeEvent()
-        """Set once the shutdown hooks have run: every blocking call ends."""
-        self.left = SignalSafeEvent()
-        """Set once the node has left the graph."""
-        self.reason: object = None
-        """What the shutdown was requested with."""
+        self.left = SignalSafeEvent()  # set when the node has left the graph
+        self.reason: object = None  # the reason passed with the shutdown request
 
-        self.hooks: list[Callable[[], object]] = []
-        """Called while is_shutdown() is false."""
+        self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() is false
+        # Called after ``hooks``, including hooks that were added by a hook
         self.late_hooks: list[Callable[[], object]] = []
-        """Called after those, also after the ones that a hook has added."""
         self.interrupts: list[Callable[[], object]] = []
-        """Called once is_shutdown() is true, before the node leaves the graph: they end what blocks."""
+        """Called to unblock blocking calls, once is_shutdown() is true and before the node leaves the graph."""
 
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
         self._this_thread = _ThisThread(self.machine.main)
 
     def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
-        """Call ``hook`` when the node shuts down, or now where it has; ``hooks``: a list above, by default the first.
+        """Call ``hook`` when the node shuts down, or now if it already has.
+
+        ``hooks`` is one of the lists above, by default the first.
 
         Raise TypeError.
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        # A signal that is dispatched in between would shut down without this hook.
+        # Otherwise a signal dispatched in between could shut down without this hook.
         with self.deferral, self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
@@ -94,12 +93,13 @@ class Lifecycle:
         hook()
 
     def signal_shutdown(self, reason: object) -> bool:
-        """Shut the node down: hooks run in this thread, blocking calls end, the node leaves the graph.
+        """Shut the node down: hooks run in this thread, blocking calls are interrupted, the node leaves the graph.
 
-        Return False, without waiting, where a shutdown is under way already.
+        Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Entered first: a second signal that interrupts what is claimed and not yet done would leave it so.
+            # Enter the deferral first: a second signal right after the claim would leave the shutdown claimed but
+            # never done.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)
@@ -124,9 +124,9 @@ class Lifecycle:
         return True
 
     def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
-        """While a block runs, have a shutdown call ``interrupt`` to end what blocks in it.
+        """While a block runs, let a shutdown call ``interrupt`` to unblock calls in it.
 
-        A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
+        A signal handler may call it at any moment of the main thread, so the events that it sets are SignalSafeEvents.
         """
         return _Interrupting(self, interrupt)
 
@@ -140,7 +140,7 @@ class Lifecycle:
 
     @property
     def is_shutdown_requested(self) -> bool:
-        """Return whether a shutdown has started: its hooks may still be running."""
+        """Return whether a shutdown has started; its hooks may still be running."""
         return self._claim.locked()
 
     def is_shutdown(self) -> bool:
@@ -162,9 +162,9 @@ class Lifecycle:
         return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
-        """Notify the calling thread, whose sleep a shutdown has cut short. Raise ROSInterruptException.
+        """Notify the calling thread, whose sleep was interrupted by a shutdown. Raise ROSInterruptException.
 
-        In a loop that polls is_shutdown() the sleep just ends early, as with rospy: the loop will poll, and what follows
+        In a loop that polls is_shutdown() the sleep just returns early, as with rospy: the loop will poll, and the code after
         it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
         """
         state = self._this_thread.state
@@ -173,25 +173,25 @@ class Lifecycle:
         state.awareness = Awareness.CUT_SHORT
 
     def interrupted(self, text: str) -> ROSInterruptException:
-        """Return the error that notifies the calling thread of the shutdown, for it to raise."""
+        """Mark the calling thread as notified of the shutdown, and return the exception for it to raise."""
         self._this_thread.state.awareness = Awareness.NOTIFIED
         return ROSInterruptException(text)
 
     def is_interrupt(self, error: BaseException) -> bool:
-        """Return whether an error that ends the program, or a thread of it, is the one that was to interrupt it."""
+        """Return whether an error that terminates the program, or a thread of it, is the interrupt that was raised there."""
         if isinstance(error, KeyboardInterrupt) and self.machine.signals:
             return True
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
     def _run_hooks(self) -> None:
-        """Run the hooks until none is left, also of those that a hook, or meanwhile another thread, adds; then be shut down."""
+        """Run the hooks, including those added by hooks or other threads meanwhile, until none is left; then set shutdown."""
         while not self.shutting_down.is_set():
             for hooks in (self.hooks, self.late_hooks):
                 while hooks:
                     self._run(hooks.pop(0))
             with self._lock:
                 if not self.hooks and not self.late_hooks:
-                    # A hook that is added from now on is called immediately.
+                    # From now on a new hook is called immediately.
                     self.shutting_down.set()
 
     def _run(self, hook: Callable[[], object]) -> None:
@@ -199,7 +199,7 @@ class Lifecycle:
             with self.deferral.lifted():
                 hook()
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-            # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
+            # A KeyboardInterrupt is the second Ctrl-C. Ignore write errors: the terminal may be gone.
             if type(error) is not KeyboardInterrupt:
                 with contextlib.suppress(OSError, ValueError):
                     traceback.print_exc()

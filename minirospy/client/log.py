@@ -1,7 +1,7 @@
-"""The log functions: loginfo, logwarn_once, logerr_throttle and their kin.
+"""The log functions: loginfo, logwarn_once, logerr_throttle and the others.
 
-Everything goes through Python's ``logging``, by the logger "rosout" and its children, so that a program
-may add its own handlers; ours are in `log_handlers.py`. Source: http://wiki.ros.org/rospy/Overview/Logging.
+They use Python's ``logging``, with the logger "rosout" and its children, so that a program may add its own handlers;
+minirospy's handlers are in `log_handlers.py`. Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     class Keywords(TypedDict, total=False):
-        """The keywords that a log function passes to Python's logging."""
+        """The keyword arguments that a log function passes to Python's logging."""
 
         exc_info: object
         extra: Mapping[str, object] | None
@@ -65,7 +65,7 @@ _F = TypeVar("_F", bound=Callable[..., None])
 
 
 class LogFunction(Protocol):
-    """``loginfo`` and its kin."""
+    """The type of ``loginfo`` and similar functions."""
 
     def __call__(
         self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[Keywords]
@@ -74,7 +74,7 @@ class LogFunction(Protocol):
 
 
 class ThrottledLogFunction(Protocol):
-    """``loginfo_throttle`` and its kin."""
+    """The type of ``loginfo_throttle`` and similar functions."""
 
     def __call__(
         self,
@@ -84,7 +84,7 @@ class ThrottledLogFunction(Protocol):
         logger_name: str | None = None,
         **kwargs: Unpack[Keywords],
     ) -> None:
-        """Log, but from this place in the code at most once in ``period`` seconds."""
+        """Log, but at most once in ``period`` seconds from this call site."""
 
 
 def logger_of(name: str | None) -> logging.Logger:
@@ -103,7 +103,7 @@ def write(
     stack_info: bool = False,
     stacklevel: int = 1,
 ) -> None:
-    """Log for the caller at ``frame``. A method is named with its class, as rospy does it."""
+    """Log for the caller at ``frame``. Like rospy, prefix a method's name with its class."""
     at = frame
     while stacklevel > 1 and at.f_back is not None:
         stacklevel, at = stacklevel - 1, at.f_back
@@ -135,7 +135,7 @@ def _log_function(level: int, name: str) -> LogFunction:
 
 
 class _CallSites:
-    """Which places in the code have logged: when, and what. A place is one call, whatever function it calls."""
+    """The call sites that have logged: when, and which text. A site is one call expression, whatever function it calls."""
 
     def __init__(self) -> None:
         self._once: set[tuple[str, int, int]] = set()
@@ -143,7 +143,7 @@ class _CallSites:
         self._texts: dict[tuple[str, int, int], object] = {}
 
     def is_first(self, frame: FrameType) -> bool:
-        """Return whether the call at ``frame`` has not logged before."""
+        """Return whether this is the first message from the call site at ``frame``."""
         place = _place(frame)
         if place in self._once:
             return False
@@ -151,18 +151,18 @@ class _CallSites:
         return True
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
-        """Return whether the call at ``frame`` was last due more than ``period`` seconds ago."""
+        """Return whether the call site at ``frame`` was last due more than ``period`` seconds ago."""
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
-        # Simulated time has jumped back: start again.
+        # If simulated time has jumped back, start again.
         due = before is None or now - before > pause or now < before
         if due:
             self._times[place] = now
         return due
 
     def is_new(self, frame: FrameType, text: object) -> bool:
-        """Return whether the call at ``frame`` logged another text before, or none."""
+        """Return whether this call site's message is its first, or differs from its last."""
         place = _place(frame)
         if place in self._texts and self._texts[place] == text:
             return False
@@ -170,8 +170,7 @@ class _CallSites:
         return True
 
 
-places = _CallSites()
-"""Which places of the program have logged."""
+places = _CallSites()  # the call sites in the program that have logged
 
 
 def _once_function(level: int, name: str) -> LogFunction:
@@ -197,7 +196,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         if not logger.isEnabledFor(level):
             return
         frame = sys._getframe(1)
-        # A period of 0 is none: then the text alone decides, or nothing.
+        # A period of 0 counts as none: then only the text decides, if at all.
         due = places.is_due(frame, period) if period else not identical
         if identical:
             due = places.is_new(frame, msg) or due
@@ -215,7 +214,7 @@ def _named(function: _F, name: str, doc: str) -> _F:
 
 
 def _place(frame: FrameType) -> tuple[str, int, int]:
-    """Return the place of a call in the code: two calls on one line are two places."""
+    """Return the location of a call site; two calls on one line have different ones."""
     return frame.f_code.co_filename, frame.f_lineno, frame.f_lasti
 
 

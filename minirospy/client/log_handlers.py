@@ -1,4 +1,4 @@
-"""Where log lines go: the handlers for the terminal and for /rosout.
+"""The handlers that write log lines to the terminal and to /rosout.
 
 Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -33,7 +33,7 @@ _text = logging.Formatter()
 
 
 class DeferringHandler(logging.Handler):
-    """Files and streams are not reentrant: a signal waits until a record is written."""
+    """A handler that defers signals while it writes a record, since files and streams are not reentrant."""
 
     def handle(self, record: logging.LogRecord) -> bool:
         """Write one record."""
@@ -42,22 +42,22 @@ class DeferringHandler(logging.Handler):
 
 
 class RosStreamHandler(DeferringHandler):
-    """Lines as rospy prints them: debug and info to stdout, the rest to stderr, coloured on a terminal.
+    """Prints log lines like rospy: debug and info to stdout, other levels to stderr, coloured on a terminal.
 
-    ROSCONSOLE_FORMAT chooses the form (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
+    ROSCONSOLE_FORMAT sets the format (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
     """
 
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """``stdout``, ``stderr``: where to write; None: what ``sys`` has while a line is written."""
+        """Take the streams ``stdout`` and ``stderr``; None: those in ``sys`` at the time of writing a line."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout
         self._stderr = stderr
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one line. A message that does not take its arguments raises TypeError, as rospy's does."""
+        """Write one line. A message that does not match its arguments raises TypeError, as in rospy."""
         line = _line(record)
         is_fine = record.levelno < logging.WARNING
         stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
@@ -69,24 +69,24 @@ class RosStreamHandler(DeferringHandler):
             try:
                 stream.write(line + "\n")
             except UnicodeEncodeError:
-                # A terminal that has not every letter, as on Windows.
+                # The terminal's encoding may lack some characters, as on Windows.
                 encoding = stream.encoding or "ascii"
                 stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
         except RuntimeError:
-            # A signal handler logs while the line that it interrupted is being written.
+            # A signal handler may log while the line that it interrupted is being written.
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # Without a terminal, or with one that was closed, which is not an error of the program.
+            # There is no terminal, or it was closed; this is not an error of the program.
             pass
 
 
 class RosOutHandler(DeferringHandler):
-    """Log records to /rosout (http://wiki.ros.org/rosout); for a logger of the program's own, too."""
+    """Publishes log records to /rosout (http://wiki.ros.org/rosout); a program may add it to its own loggers."""
 
     def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
-        """``tell_topics``: say what the node publishes in each line."""
+        """Take ``tell_topics``: whether each message lists the topics that the node publishes."""
         from rosgraph_msgs.msg import Log
 
         from minirospy.client.publisher import Publisher
@@ -97,7 +97,7 @@ class RosOutHandler(DeferringHandler):
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Publish one record, unless publishing itself is what logs."""
+        """Publish one record, unless publishing itself logged it."""
         session = current_session()
         node = session.node
         if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
@@ -163,7 +163,7 @@ def _wall_time(record: logging.LogRecord, form: str | None = None) -> str:
 
 
 def _stamp(record: logging.LogRecord, form: str | None = None) -> str:
-    """Wall time, and behind it the simulated time where that is used."""
+    """Return the wall time, followed by the simulated time if that is used."""
     wall = _wall_time(record, form)
     clock = current_session().clock
     return f"{wall}, {clock.now() / 1e9:f}" if isinstance(clock, SimulatedClock) else wall

@@ -1,4 +1,4 @@
-"""The logging of a node from init_node on: which handlers its loggers have, its log file, its logger services.
+"""The logging of a node from init_node on: its loggers' handlers, its log file, its logger services.
 
 Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -31,11 +31,11 @@ _log = logging.getLogger(__name__)
 
 
 def configure(session: Session, log_level: int | None, log_file: str | None) -> None:
-    """Set up the handlers for the node: terminal, log file. ``log_file``: the ``__log:=`` argument.
+    """Set up the node's handlers: terminal and log file. ``log_file``: the ``__log:=`` argument.
 
-    A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
-    ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
-    written or read is reported in one line. Raise ValueError on a log level that is not one of rospy's.
+    A configuration file of the user's (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in ROS_HOME)
+    replaces these handlers, as http://wiki.ros.org/rospy/Overview/Logging describes. A file that cannot be
+    written or read is reported in one line. Raise ValueError on a log level that rospy does not have.
     """
     if log_level is not None and log_level not in PYTHON_LEVELS:
         raise ValueError(
@@ -52,7 +52,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
 
-    # For a configuration file of the user's, and for programs that look for their log.
+    # For a user's configuration file, and for programs that search for their log.
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not _configured_by_file(session):
         _rosout.setLevel(logging.INFO)
@@ -61,12 +61,12 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
 
-    # Warnings of the library itself go to the same places.
+    # Warnings of the library itself get the same handlers.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    # rospy logs its own warnings by the logger of the program, whose level may hide them.
+    # rospy logs its own warnings with the program's logger, whose level may hide them.
     terminal.addFilter(lambda record: _rosout.isEnabledFor(record.levelno))
     _add_handler(session, ours, terminal)
     if path.parent.parent == session.identity.environment.log_dir:
@@ -74,7 +74,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
 
 def start(session: Session, *, rosout: bool) -> None:
-    """Offer the node's logger services, and publish to ``/rosout`` where ``rosout`` is set."""
+    """Offer the node's logger services, and publish to ``/rosout`` if ``rosout`` is set."""
     _offer_logger_services()
     if rosout:
         _start_rosout(session)
@@ -90,13 +90,13 @@ def _start_rosout(session: Session) -> None:
 
 
 def _add_handler(session: Session, logger: logging.Logger, handler: logging.Handler) -> None:
-    """Add ``handler`` to ``logger`` until the process becomes another node."""
+    """Add ``handler`` to ``logger`` until the process creates another node."""
     logger.addHandler(handler)
     session.on_replaced.append(lambda: logger.removeHandler(handler))
 
 
 def _offer_logger_services() -> None:
-    """Offer the node's services that list and set the levels of its loggers."""
+    """Offer the services that list the node's loggers and set their levels."""
     from roscpp.msg import Logger
     from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
 
@@ -118,7 +118,7 @@ def _offer_logger_services() -> None:
 
 
 def _configured_by_file(session: Session) -> bool:
-    """Follow the user's own configuration of ``logging``, where there is one."""
+    """Apply the user's configuration file for ``logging`` and return True, or return False if there is none."""
     named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
     folder = session.identity.environment.home / "config"
     found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
@@ -142,11 +142,11 @@ def _configured_by_file(session: Session) -> bool:
 
 
 def _log_to_file(session: Session, path: Path) -> None:
-    """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
+    """Write all loggers to the node's file, like rospy, without printing anything twice on the terminal."""
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
-        """Of the name that programs find among the root logger's handlers with rospy."""
+        """A handler with the class name that programs expect among the root logger's handlers in rospy."""
 
     try:
         file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
@@ -158,8 +158,8 @@ def _log_to_file(session: Session, path: Path) -> None:
     root = logging.root
     if not root.handlers:
         root.setLevel(logging.INFO)
-    # Handlers that the program itself gave the root before (basicConfig) stay, where rospy takes them
-    # away; but what rosout has written to the terminal is not written there again.
+    # Keep handlers that the program itself added to the root logger before (basicConfig), which rospy removes. Filter
+    # them so that lines from rosout are not printed on the terminal twice.
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
@@ -171,9 +171,9 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 
 
 def _link_latest(folder: Path) -> None:
-    """``latest`` beside the folder of a run is a link to it."""
+    """Link ``latest``, next to the folder of a run, to that folder."""
     link = folder.parent / "latest"
-    # No links on this file system, or another node was faster.
+    # The file system has no links, or another node was faster.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

@@ -1,4 +1,4 @@
-"""The parameter server as rospy has it. Source: http://wiki.ros.org/rospy/Overview/Parameter%20Server."""
+"""The parameter server functions of rospy. Source: http://wiki.ros.org/rospy/Overview/Parameter%20Server."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ _T = TypeVar("_T")
 
 
 class Unspecified:
-    """The default of ``default``: None is a value that a caller may want back."""
+    """The default of ``default``, since a caller may want None back."""
 
 
 UNSPECIFIED = Unspecified()
 
 
 class MasterGoneError(ROSException, ConnectionRefusedError):
-    """No master answers: rospy lets the socket's error through, and programs catch either."""
+    """The master does not answer. rospy raises the socket's error, and programs may catch either."""
 
     def __str__(self) -> str:
         return str(self.args[0])
 
 
 def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
-    """Return a parameter's value, or ``default`` where it is not set.
+    """Return a parameter's value, or ``default`` if it is not set.
 
-    Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
-    Raise KeyError if it is neither set nor has a default, ROSException where the master fails.
+    As in rospy, bytes and dates are returned as xmlrpc.client.Binary and DateTime.
+    Raise KeyError if it is neither set nor has a default, ROSException if the master fails.
     """
     value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
@@ -64,7 +64,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
-    """Return the same from a cache that the master keeps up to date; before init_node without the cache."""
+    """Return the same from a cache that the master keeps up to date; before init_node, without the cache."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():
@@ -91,8 +91,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 def set_param(param_name: str, param_value: object) -> None:
     """Set a parameter; a dictionary sets a whole namespace.
 
-    Raise TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
-    fails.
+    Raise TypeError or OverflowError on a value that XML-RPC has no type for, ROSException if the master fails.
     """
     name = current_session().resolve(param_name)
     warn_of_illegal_name(param_name)
@@ -101,7 +100,7 @@ def set_param(param_name: str, param_value: object) -> None:
     except ROSException:
         check_sendable(param_value)
         raise
-    # The master does not notify the node that has set it.
+    # The master does not notify the node that sets the parameter.
     current_session().parameter_changed(name)
 
 
@@ -114,7 +113,7 @@ def has_param(param_name: str) -> bool:
 
 
 def delete_param(param_name: str) -> None:
-    """Delete a parameter. Raise KeyError if it is not set, ROSException where the master fails."""
+    """Delete a parameter. Raise KeyError if it is not set, ROSException if the master fails."""
     if not _may_be_name(param_name):
         raise KeyError(param_name)
     name = current_session().resolve(param_name)
@@ -128,9 +127,9 @@ def delete_param(param_name: str) -> None:
 
 
 def search_param(param_name: str) -> str | None:
-    """Return the nearest parameter of this name, upwards from this node's namespace; None if there is none.
+    """Return the closest parameter of this name, upwards from this node's namespace; None if there is none.
 
-    Raise ROSException if the master fails, or the name is a private one.
+    Raise ROSException if the master fails, or the name is private.
     """
     name = current_session().identity.arguments.remappings.get(param_name, param_name)
     check_sendable(name)
@@ -151,7 +150,7 @@ def get_param_names() -> list[str]:
 
 
 class KeptParameters:
-    """The parameters that get_param_cached keeps, for a program that reads them or is notified of changes.
+    """The cache of get_param_cached, for a program that reads it or wants notifications of changes.
 
     Such a program may replace :meth:`update` by its own function.
     """
@@ -161,18 +160,18 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter that get_param_cached was called for before. Raise KeyError."""
+        """Return a parameter that was read with get_param_cached before. Raise KeyError."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
         return get_param_cached(key)
 
     def set_notifier(self, notifier: Callable[[str, object], object] | None) -> None:
-        """Call ``notifier(key, value)`` when the master reports a change; a deleted one has the value {}."""
+        """Call ``notifier(key, value)`` when the master reports a change; the value of a deleted parameter is {}."""
         self._notifier = notifier
 
     def update(self, key: str, value: object) -> None:
-        """Record that the master has reported a change."""
+        """Handle a change reported by the master."""
         if self._notifier:
             self._notifier(key, value)
 
@@ -197,7 +196,7 @@ def _get(name: str) -> object:
 
 
 def _may_be_name(param_name: object) -> bool:
-    """Return whether it is text, or None, which is the node's namespace; anything else is the name of no parameter."""
+    """Return whether the value can be a parameter's name: a string, or None for the node's namespace."""
     return param_name is None or isinstance(param_name, str)
 
 
@@ -211,13 +210,13 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Return a value with bytes and dates in xmlrpc.client's wrappers, as from Python's own client."""
+    """Return a value with bytes and dates in xmlrpc.client's wrappers, like Python's own client."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
         return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
-        # Imported here: http.client and its kin cost more than all else of this module.
+        # Imported here: http.client and its imports cost more than the rest of this module.
         import xmlrpc.client
 
         return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)
@@ -225,7 +224,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise what rospy raises on a value for which XML-RPC has no type."""
+    """Raise rospy's exception for a value for which XML-RPC has no type."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

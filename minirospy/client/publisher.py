@@ -1,4 +1,4 @@
-"""Publisher as rospy has it: messages become bytes here, in the thread that publishes.
+"""The Publisher of rospy: it serializes messages here, in the thread that publishes.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -40,29 +40,29 @@ __all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
 _OF_THE_LIBRARY = frozenset({"/rosout", "/statistics"})
-"""Topics on which the library itself publishes: a program needs no error about them."""
+"""Topics on which the library itself publishes: errors about them are not reported to the program."""
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
 class SubscribeListener:
-    """Is notified when subscribers connect and disconnect; override what you need."""
+    """Receives notifications when subscribers connect and disconnect; override the methods you need."""
 
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """Handle a new subscriber: ``topic_publish`` reaches all, ``peer_publish`` only this one."""
+        """Handle a new subscriber: ``topic_publish`` publishes to all subscribers, ``peer_publish`` only to this one."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        """Handle the end of a subscriber; ``num_peers`` are left."""
+        """Handle the disconnection of a subscriber; ``num_peers`` remain."""
 
 
 class Publisher(Topic[_M_co]):
     """Publishes messages of ``data_class`` on a topic.
 
-    ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
-    number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets
+    ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: no
+    limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives
     the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
-    subscribers, in a thread of the library, one event after the other; an object that is not a listener is ignored,
+    subscribers, in a thread of the library, one event at a time; an object that is not a listener is ignored,
     with a warning. Raise ValueError on a bad name, class or queue_size.
     """
 
@@ -104,10 +104,10 @@ class Publisher(Topic[_M_co]):
         self._session.when_ready(state.register, state.title)
 
     def publish(self, *args: object, **kwds: object) -> None:
-        """Publish a message, or the message that these field values make.
+        """Publish a message, or the message with these field values.
 
         Raise ROSException before init_node and after unregister, ROSSerializationException or TypeError on
-        values that do not fit. Waits for no subscriber longer than a few milliseconds, except with ``queue_size=None``.
+        invalid values. Waits for a subscriber a few milliseconds at most, except with ``queue_size=None``.
         """
         state = self.impl
         if state is None:
@@ -117,15 +117,15 @@ class Publisher(Topic[_M_co]):
         else:
             state.check_initialized()
             if len(args) == 1 and isinstance(args[0], AnyMsg):
-                # As with rospy, the bytes are not checked against the type.
+                # As in rospy, the bytes are not checked against the type.
                 state.publish(args[0])
             else:
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
 
     def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> bool:
-        """Wait until so many subscribers are connected; False if ``timeout`` seconds were not enough.
+        """Wait until ``count`` subscribers are connected; return False if that takes longer than ``timeout`` seconds.
 
-        What is published before a subscriber is connected does not reach it, unless the topic is latched.
+        A subscriber does not receive messages published before it was connected, unless the topic is latched.
         Raise ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
         """
         if self.impl is None:
@@ -134,18 +134,18 @@ class Publisher(Topic[_M_co]):
 
 
 class PublishedTopic(SharedTopic):
-    """One published topic of the process: what its Publishers share."""
+    """A topic published by this process; its Publishers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
-        # asyncio comes with it.
+        # Imported here, since it imports asyncio.
         from minirospy.runtime.node.topics import Publication
 
         super().__init__(session, topic, data_class)
         self._deferral = session.lifecycle.deferral
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Message]] = set()
+        # Notified of subscribers; a program may add and remove listeners
         self.subscriber_listeners: list[SubscribeListener] = []
-        """Are notified of subscribers; a program may add and remove."""
         self._events: InOrder | None = None
         self._waiting: list[Callable[[], None]] = []
         self._had_subscriber = False
@@ -183,11 +183,11 @@ class PublishedTopic(SharedTopic):
         publication.headers.update(headers or {})
 
     def register(self) -> None:
-        """Register with the master, once."""
+        """Register with the master, only once."""
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Before the registration: a subscriber may connect immediately, and a publish() before the answer counts.
+            # Set before registering: a subscriber may connect immediately, and a publish() before the answer counts.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -195,34 +195,34 @@ class PublishedTopic(SharedTopic):
     def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
-            # A process that has forked, or is another node by now, has forgotten it.
+            # After a fork, or after the process became another node, the topic is no longer in the table.
             if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
             del self._session.published[self.resolved_name]
             if not self._session.node or self._session.is_shutdown():
                 return
-            # Started before another thread can publish the topic again.
+            # Start this before another thread can publish the topic again.
             wait = self._session.start(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
     @property
     def title(self) -> str:
-        """The topic's publisher, as an error names it."""
+        """The name of the topic's publisher in error messages."""
         return f"the publisher of {self.resolved_name}"
 
     @property
     def queue_size(self) -> int | None:
-        """Return the last queue_size that a Publisher was given; None if publish() waits for the sockets."""
+        """Return the queue_size passed to the last Publisher; None if publish() waits for the sockets."""
         return self.publication.queue_size
 
     @property
     def headers(self) -> dict[str, str]:
-        """Return what is added to the connection headers."""
+        """Return the fields that are added to the connection headers."""
         return self.publication.headers
 
     @property
     def is_latch(self) -> bool:
-        """Return whether a subscriber that connects later gets the last message; may be changed."""
+        """Return whether a subscriber that connects later receives the last message; may be changed."""
         return self.publication.latch
 
     @is_latch.setter
@@ -230,18 +230,18 @@ class PublishedTopic(SharedTopic):
         self.publication.latch = value
 
     def enable_latch(self) -> None:
-        """Give subscribers that connect later the last message."""
+        """Send the last message to subscribers that connect later."""
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Notify ``l`` of subscribers that connect and disconnect from now on; ignore, with a warning, what is not a listener."""
+        """Notify ``l`` of subscribers that connect and disconnect from now on; warn if it is not a listener, and ignore it."""
         if _is_listener(l):
             self.subscriber_listeners.append(l)
         else:
             warnings.warn(_not_a_listener(l), SyntaxWarning, stacklevel=2)
 
     def check_initialized(self) -> None:
-        """Raise ROSException before init_node. In a fork of the node, log that the topic is the parent's."""
+        """Raise ROSException before init_node. In a fork of the node, log that the topic belongs to the parent."""
         if self._session.is_abandoned:
             if self.resolved_name not in _OF_THE_LIBRARY:
                 current_session().report_fork(self.title)
@@ -262,7 +262,7 @@ class PublishedTopic(SharedTopic):
             self._log_unheard()
 
     def forget_subscribers(self) -> None:
-        """Publish to no subscriber from now on: this process is a fork, and the subscribers are its parent's."""
+        """Stop publishing to the present subscribers: this process is a fork, and they are connected to its parent."""
         self.publication.links = ()
         self._registered = False
 
@@ -294,24 +294,24 @@ class PublishedTopic(SharedTopic):
         return [connection_to_subscriber(link, self.resolved_name) for link in self.publication.links]
 
     def get_stats(self) -> tuple[str, int, list[tuple[object, ...]]]:
-        """Return the row of the Slave API's getBusStats."""
+        """Return the topic's row of the Slave API's getBusStats."""
         rows: list[tuple[object, ...]] = [
             (c.id, c.stat_bytes, c.stat_num_msg, not c.done) for c in self.connections
         ]
         return self.resolved_name, self.publication.sent_bytes, rows
 
     def get_num_connections(self) -> int:
-        """Return how many links there are."""
+        """Return the number of links."""
         return len(self.publication.links)
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Return whether the node of this name is connected."""
+        """Return whether the node ``endpoint_id`` is connected."""
         return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
-        """Log that the first message had no subscriber: a warning only if the master knows one that is connecting.
+        """Log that the first message had no subscriber: as a warning only if the master knows one that is still connecting.
 
-        Most topics have no subscriber at first, or ever.
+        Many topics have no subscriber at first, or ever.
         """
         if self.publication.expected and not self._session.is_shutdown():
             _log.warning(
@@ -330,12 +330,12 @@ class PublishedTopic(SharedTopic):
         try:
             message.serialize(pieces)
         except SerializationOverflowError:
-            # rospy converts no OverflowError of struct's: programs catch it by this type.
+            # rospy does not convert struct's OverflowError: programs catch that type.
             raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
                 raise self._refused(message, error) from None
-            # What rospy makes of None.
+            # rospy replaces None by "0".
             message.header.frame_id = "0"
             pieces.clear()
             try:
@@ -345,7 +345,7 @@ class PublishedTopic(SharedTopic):
         return pieces.frame()
 
     def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
-        """Return the error of a message that does not fit its type: rospy's words, then where it was published."""
+        """Return the error for a message that does not match its type: rospy's text, then the topic."""
         where = f"topic {self.resolved_name}, type {message._type}"
         return ROSSerializationException(f"{error}\n({where})")
 
@@ -367,7 +367,7 @@ class PublishedTopic(SharedTopic):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
-        # Looked up in the worker: a listener's attribute may be a property, which is the user's code.
+        # Read the attribute in the worker: it may be a property, which runs the user's code.
         for listener in list(self.subscriber_listeners):
             if is_up:
                 self._events.start(
@@ -385,12 +385,12 @@ def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
 
 
 def _is_listener(value: object) -> bool:
-    """Return whether an object has a method of SubscribeListener; programs need not inherit from it."""
+    """Return whether an object has a method of SubscribeListener; programs need not derive from it."""
     return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument for which rospy refuses every subscriber."""
+    """Return the warning about an argument that is not a listener; with it, rospy refuses every subscriber."""
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"
@@ -398,7 +398,7 @@ def _not_a_listener(value: object) -> str:
 
 
 def _checked_size(queue_size: int | None) -> int | None:
-    """Return a Publisher's queue_size as rospy reads it: a negative one means unlimited. Raise ValueError."""
+    """Return a Publisher's queue_size as rospy interprets it: a negative one means unlimited. Raise ValueError."""
     if queue_size is None:
         return None
     try:

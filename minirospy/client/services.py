@@ -1,4 +1,4 @@
-"""Service and ServiceProxy as rospy has them. Source: http://wiki.ros.org/rospy/Overview/Services."""
+"""The Service and ServiceProxy of rospy. Source: http://wiki.ros.org/rospy/Overview/Services."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ class Service(Generic[_S_co]):
     """Offers a service: ``handler(request)`` returns the response.
 
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
-    values, or the value of its only field. What it raises goes to the client as the call's error;
-    ``error_handler(error, type, error, traceback)`` is called too, in place of a log line. Each connection has
-    a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted and not needed.
-    Raise ValueError on an empty name, ServiceException where this node offers the service already.
+    values, or the value of its only field. An exception from it becomes the error of the client's call;
+    ``error_handler(error, type, error, traceback)`` is then called in place of a log line. Each connection has
+    a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted for compatibility.
+    Raise ValueError on an empty name, ServiceException if this node already offers the service.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Service(Generic[_S_co]):
         return self._ended.is_set()
 
     def shutdown(self, reason: str = "") -> None:
-        """Stop offering the service; a call under way gets its answer."""
+        """Stop offering the service; a call in progress gets its answer."""
         self._ended.set()
         with self._session.lock:
             server, self._server = self._server, None
@@ -113,7 +113,7 @@ class Service(Generic[_S_co]):
             del self._session.offered[self.resolved_name]
             if not server or not self._session.node or self._session.is_shutdown():
                 return
-            # Started before another thread can offer the service again.
+            # Start this before another thread can offer the service again.
             wait = self._session.start(self._session.node.unserve(server))
         unregister_from_master(wait)
 
@@ -157,7 +157,7 @@ class Service(Generic[_S_co]):
             return buffer.getvalue()
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
-        except Exception as error:  # the user's handler: its error is the client's answer
+        except Exception as error:  # raised by the user's handler; it is sent to the client
             self._report(error)
             raise ServiceException(f"error processing request: {error}") from error
 
@@ -176,8 +176,8 @@ class Service(Generic[_S_co]):
 class ServiceProxy(Generic[_S_co]):
     """Calls a service: ``proxy(request)``, or with the request's fields as arguments.
 
-    ``persistent`` keeps one connection for all calls; it is made again when the server has ended it. A proxy
-    may be used by several threads; with ``persistent`` they wait for each other. ``headers`` are added to the
+    ``persistent`` keeps one connection for all calls, and reconnects after the server has closed it. Several threads
+    may use a proxy; with ``persistent`` they wait for each other. ``headers`` are added to the
     connection header, which the handler finds in ``request._connection_header``.
     """
 
@@ -188,7 +188,7 @@ class ServiceProxy(Generic[_S_co]):
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        # A name that was never set (None) is an error only when it is called.
+        # A name that was never set (None) raises an error only when it is called.
         self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
         self.request_class: type[Message] = service_class._request_class
@@ -197,27 +197,26 @@ class ServiceProxy(Generic[_S_co]):
         self.md5sum: str = service_class._md5sum
         self.buff_size = 65536
         self.persistent = persistent
-        self.uri: str | None = None
-        """Where the service was found last, ``rosrpc://host:port``."""
+        self.uri: str | None = None  # the service's last known address, ``rosrpc://host:port``
 
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # The calls that reached the service: the seq of requests that start with a header.
+        # The number of calls that reached the service: the seq of requests that start with a header.
         self._calls = 0
         self._lock = threading.Lock()
 
     def __call__(self, *args: object, **kwds: object) -> Any:
         """Call the service and return its response.
 
-        Raise ServiceException if the call fails, TypeError or AttributeError where the arguments do not
-        fit the request, SerializationError where a value does not.
+        Raise ServiceException if the call fails, TypeError or AttributeError if the arguments do not
+        match the request, SerializationError if a value does not.
         """
         return self.call(*args, **kwds)
 
     def call(self, *args: object, **kwds: object) -> Any:
-        """Call the service, as calling the proxy itself does."""
+        """Call the service, like calling the proxy itself."""
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
@@ -226,21 +225,21 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._client and (self._client.has_ended() or self._client_session is not current_session()):
-                # In a fork the connection is the parent's: two processes would read each other's responses.
+                # In a fork the connection belongs to the parent: two processes would read each other's responses.
                 self._disconnect()
             if self._client is None:
                 self._client, self._client_session = self._connect(body), current_session()
             return self._exchange(self._client, body, keep=True)
 
     def wait_for_service(self, timeout: float | None = None) -> None:
-        """Wait until the service is there. Raise ROSException after ``timeout`` seconds."""
+        """Wait until the service is available. Raise ROSException after ``timeout`` seconds."""
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection; a call that another thread makes by it fails."""
+        """Close a persistent connection; a call that another thread makes on it fails."""
         client = self._client
         if client and self._lock.locked():
-            # Closing a socket does not end the wait of another thread for it. That thread closes it.
+            # Closing a socket does not wake a thread that waits for it, so shut it down; that thread then closes it.
             client.hang_up()
         else:
             self._disconnect()
@@ -256,7 +255,7 @@ class ServiceProxy(Generic[_S_co]):
         try:
             request.serialize(buffer)
         except SerializationError:
-            # rospy connects first: a service that is missing or of another type is the error that it raises.
+            # rospy connects first, so an error about a missing service or wrong type precedes serialization errors.
             if self._client is None:
                 self._connect_by_master(None, b"").close()
             self._calls += 1
@@ -264,7 +263,7 @@ class ServiceProxy(Generic[_S_co]):
         return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """Return a connection for the call of ``request``, which may have been sent by then."""
+        """Return a connection for sending ``request``, which may already have been sent on it."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)
@@ -273,9 +272,9 @@ class ServiceProxy(Generic[_S_co]):
                 ahead.close()
 
     def _connect_ahead(self) -> ServiceClient | None:
-        """Return a connection to where the service was last, opened while the master is queried for where it is now.
+        """Return a connection to the service's last address, opened while the master is queried for the present one.
 
-        Only within this machine: elsewhere to connect may take its time.
+        Only to this machine, since connecting elsewhere may take long.
         """
         from minirospy.runtime.node.service_client import parse_service_uri
 
@@ -309,8 +308,8 @@ class ServiceProxy(Generic[_S_co]):
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to end: then once more. One that is silent may have
-                # the request by now.
+                # The server may have been about to exit: then connect again. A server that does not answer may
+                # already have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
                     return ahead
@@ -360,7 +359,7 @@ class ServiceProxy(Generic[_S_co]):
 def wait_for_service(service: str, timeout: float | Duration | None = None) -> None:
     """Wait until a service is registered and answers.
 
-    Raise ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down, ValueError
+    Raise ROSException after ``timeout`` seconds, ROSInterruptException if the node shuts down, ValueError
     on a timeout of 0.
     """
     session = current_session()
@@ -392,7 +391,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 
 def _probe(name: str, timeout: float) -> str | None:
-    """Return why the service cannot be called yet; None if it can."""
+    """Return the reason why the service cannot be called yet; None if it can."""
     from minirospy.runtime.node.service_client import ServiceClient
 
     session = current_session()

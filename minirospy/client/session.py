@@ -1,4 +1,4 @@
-"""The one node of a process, as rospy has it: what rospy's functions share, in an object that is replaced and never reset.
+"""The single node of a process: the state that rospy's functions share, in an object that is replaced and never reset.
 
 Publishers, services, time and log register with the session; it imports none of them.
 """
@@ -21,7 +21,7 @@ from minirospy.core.graph.parameter_cache import ParameterCache
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
-    # A program that has no node yet does not pay for asyncio.
+    # Only for type checking: a program without a node does not import asyncio.
     from minirospy.client.publisher import PublishedTopic
     from minirospy.client.services import Service
     from minirospy.client.subscriber import SubscribedTopic
@@ -32,33 +32,30 @@ __all__ = ["Session", "current_session", "replace_session", "replace_session_in_
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
-"""How long the master may take to answer: one of many nodes that start together on a small computer waits for its turn."""
+"""Time limit of a call; on a small computer, many nodes that start together wait for each other."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
 
 class Session:
-    """A node of this process, from before init_node to after its shutdown: its name, lifecycle, clock, tables and loop."""
+    """A node of this process, from before init_node until after its shutdown: its name, lifecycle, clock, tables and loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
-        """``previous``: the session that this one replaces; name, clock and listeners go on until init_node."""
+        """Take ``previous``, the session to replace; its name, clock and listeners remain in use until init_node."""
         self.is_fork = is_fork
-        self.is_abandoned = False
-        """Whether this process is a fork, and the session its parent's."""
+        self.is_abandoned = False  # this process is a fork, and the session belongs to its parent
         self._forked_from = previous.name if previous and is_fork else ""
-        self._reported: set[str] = set()
-        """The handles that :meth:`report_fork` has named."""
+        self._reported: set[str] = set()  # handles that :meth:`report_fork` has already reported
         self.identity: Identity = Identity(previous.identity if previous else None)
         self.lifecycle = Lifecycle(self._leave)
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
-        self.lock = threading.RLock()
-        """Orders registrations, and guards the tables."""
+        self.lock = threading.RLock()  # orders registrations, and guards the tables
         self.clock: Clock = previous.clock if previous else WallClock()
+        # Notified of each new simulated time
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
-        """Notified of each simulated time."""
+        # The time is available: after init_node, or once a program without a node has set it
         self.has_time: bool = bool(previous and previous.has_time)
-        """Whether the time is available: from init_node on, or once a program without a node has set it."""
 
         self.published: dict[str, PublishedTopic] = {}
         self.subscribed: dict[str, SubscribedTopic] = {}
@@ -69,11 +66,10 @@ class Session:
         )
         """Called with the name and the value of each parameter that the master reports as changed."""
         self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
-        """Called by the next init_node: removes what this one has installed in the process."""
+        """Called by the next init_node; each function removes something that this session has installed in the process."""
+        # The arguments of init_node; None before it is called
         self.init_arguments: tuple[object, ...] | None = None
-        """What init_node was called with; None before."""
-        self.node: Node | None = None
-        """The node, once init_node is done."""
+        self.node: Node | None = None  # set when init_node is done
 
         self._opened: Node | None = None
         self._loop: LoopThread | None = None
@@ -89,7 +85,7 @@ class Session:
         return self.identity.name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        """Return the global name of ``name``, as seen by this node or the node ``caller_id``."""
         return self.identity.resolve(name, caller_id)
 
     @property
@@ -99,7 +95,7 @@ class Session:
 
     @property
     def master(self) -> MasterProxy:
-        """The master, called from the caller's own thread."""
+        """The master's proxy; calls run in the caller's own thread."""
         if self._master is None or self._master.caller_id != self.name:
             environment = self.identity.environment
             self._master = MasterProxy(
@@ -109,12 +105,12 @@ class Session:
 
     def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
         """Start the loop and the node's servers. Raise ROSInitException."""
-        # Imported here: a program that has no node need not pay for asyncio.
+        # Imported here: a program without a node need not import asyncio.
         from minirospy.runtime.node.node import Node
         from minirospy.runtime.transport.loop import LoopThread
 
         with self.lifecycle.deferral:
-            # asyncio's loops do not come to their end where they are interrupted at their start.
+            # asyncio's loops do not shut down properly if interrupted while starting.
             self._loop = LoopThread()
         self._opened = Node(
             self.name,
@@ -129,7 +125,7 @@ class Session:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
 
     def publish_node(self) -> None:
-        """Make the node that was opened the process's: what was made before registers now."""
+        """Make the opened node the process's node, and register everything that waited for it."""
         with self.lock:
             self.node = self._opened
             waiting, self._waiting_for_node = self._waiting_for_node, []
@@ -139,7 +135,7 @@ class Session:
     def when_ready(self, function: Callable[[], object], handle: str = "") -> None:
         """Call ``function`` now, or in init_node if that has not been called yet.
 
-        ``handle`` names what ``function`` registers, for :meth:`report_fork`.
+        ``handle`` is the name of the handle that ``function`` registers, for :meth:`report_fork`.
         """
         with self.lock:
             is_ready = self.node is not None
@@ -152,11 +148,11 @@ class Session:
 
     @property
     def is_fork_without_node(self) -> bool:
-        """Return whether a node forked this process, which has not called init_node since."""
+        """Return whether this process is a fork of a node and has not called init_node since."""
         return self.is_fork and self.node is None and not self.is_shutdown()
 
     def why_fork_has_no_effect(self, handle: str) -> str:
-        """Return the text of the error about a handle that only a node can use."""
+        """Return the text of the error about a handle that has no effect in a fork."""
         return (
             f"{handle} has no effect in this process, which is a fork of node [{self._forked_from}]: call "
             "rospy.init_node() in the child process, and create it after that"
@@ -173,14 +169,16 @@ class Session:
         return self.start(coroutine)()
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
-        """Start ``coroutine`` on the node's loop, under a lock that orders the starts; what is returned waits for it.
+        """Start ``coroutine`` on the node's loop; return a function that waits for its result.
+
+        A lock keeps the starts in order.
 
         Raise as :meth:`run` does.
         """
         assert self._loop is not None
         loop = self._loop
         with self.lifecycle.deferral:
-            # A shutdown in the middle would wait for the end of the loop, which needs a lock that this thread holds.
+            # A shutdown at this point would wait for the loop to close, which needs a lock that this thread holds.
             wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
@@ -190,7 +188,7 @@ class Session:
             self._loop.post(function, *args)
 
     def parameter_changed(self, key: str) -> None:
-        """Forget what was cached of the parameter ``key``, which was set or deleted."""
+        """Discard the cached value of the parameter ``key``, which was set or deleted."""
         with self.lock:
             self.parameters.changed(key)
 
@@ -203,7 +201,7 @@ class Session:
     def poll_shutdown(self) -> bool:
         """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
         if self._installs_signals:
-            # A fork is left to the system until it polls.
+            # A fork keeps the default signal handling until it polls.
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
@@ -217,30 +215,30 @@ class Session:
         self.lifecycle.spin()
 
     def shut_down_at_exit(self) -> None:
-        """Shut down at the program's exit. Where another thread does that, let it finish first."""
+        """Shut down when the program exits. If another thread is doing that, wait for it."""
         if self._opened or self.is_fork:
             self.lifecycle.signal_shutdown("atexit")
             wait_for_event(self.lifecycle.left, None)
         self.signals.flush_at_exit()
 
     def abandon_in_fork(self) -> None:
-        """Detach what is left of this session in a fork: the node, its sockets and its locks are the parent's."""
+        """Detach the remains of this session in a fork: the node, its sockets and its locks belong to the parent."""
         self.is_abandoned = True
         for published in self.published.values():
             published.forget_subscribers()
         self.published, self.subscribed, self.offered = {}, {}, {}
         self.node = None
-        # Another thread of the parent's may have held it.
+        # Another thread of the parent may have held it.
         self.lock = threading.RLock()
         self.signals.release()
 
     # --- helpers
 
     def _leave(self) -> None:
-        """Leave the graph. Takes as long as the master answers: see Node.close(), which sets the limits."""
+        """Leave the graph. Waits as long as the master answers: see Node.close(), which sets the limits."""
         if self._opened and self._loop:
             try:
-                # After a signal the watchdog prints what is waited for.
+                # After a signal the watchdog prints the reason for waiting.
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
@@ -266,8 +264,8 @@ class Session:
             raise self.lifecycle.interrupted("rospy shutdown") from error
 
     def _on_shutdown_request(self, reason: str) -> None:
-        """Shut down at a request from outside: as rospy does, print why."""
-        # There may be no terminal any more.
+        """Shut down at the request of another process; like rospy, print the reason."""
+        # The terminal may be gone.
         with contextlib.suppress(OSError, ValueError):
             print(
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
@@ -281,7 +279,7 @@ class Session:
             listener(key, value)
 
     def _forget_parameters(self) -> None:
-        """Forget all cached parameters: the master has restarted, and the node is not subscribed to them any more."""
+        """Discard all cached parameters: the master has restarted, and the node is no longer subscribed to them."""
         if self.node:
             keys = list(self.node.parameters)
             self.node.parameters.clear()
@@ -299,9 +297,9 @@ def current_session() -> Session:
 
 
 def replace_session() -> None:
-    """Let init_node make another node, once the node has left the graph; without effect before, and after a signal.
+    """Let init_node make another node, once the node has left the graph; no effect before that, or after a signal.
 
-    What the program made for the old node, such as its publishers, stays with that.
+    Objects that the program made for the old node, such as its publishers, stay with it.
     """
     session = _Process.session
     if session.lifecycle.left.is_set() and not session.lifecycle.machine.signals:
@@ -310,7 +308,7 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Give a fork a new session: the name, the time and log lines continue, the node stays the parent's."""
+    """Give a fork a new session: the name, the time and log lines remain, the node stays with the parent."""
     session = _Process.session
     _Process.session = Session(session, is_fork=True)
     if session.is_shutdown():

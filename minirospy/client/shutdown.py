@@ -1,7 +1,7 @@
 """The shutdown of a process that is a node, as a state machine; docs/shutdown.md draws it.
 
-Events come in: a signal, a phase that the node has entered, a tick of the clock. Actions come out. No thread, signal or clock
-is touched here: :mod:`minirospy.client.signals` is the shell that performs the actions.
+Events come in: a signal, a phase that the node has entered, a tick of the clock. Actions come out. This module touches no
+thread, signal or clock: :mod:`minirospy.client.signals` is the shell that performs the actions.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-_GRACE_SECONDS = 0.5
-"""How long the main thread has to start the hooks, and again to notice that is_shutdown() is true."""
+_GRACE_SECONDS = 0.5  # for the main thread to start the hooks, and again to notice that is_shutdown() is true
 _REPORT_SECONDS = 2.0
 
 
@@ -20,9 +19,9 @@ class Phase(enum.IntEnum):
 
     RUNNING = 0
     HOOKS = 1  # is_shutdown() is still false
-    DOWN = 2  # is_shutdown() is true, blocking calls end
+    DOWN = 2  # is_shutdown() is true, blocking calls are interrupted
     LEAVING = 3  # the node waits for the master to unregister it
-    LEFT = 4  # the master does not know the node any more
+    LEFT = 4  # the master no longer knows the node
 
 
 class Action(enum.Enum):
@@ -37,16 +36,16 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """The knowledge that a thread of the program has of the shutdown."""
+    """How much a thread of the program knows of the shutdown."""
 
     NONE = 0  # it has never called is_shutdown()
     POLLS = 1
-    CUT_SHORT = 2  # it polls; since the shutdown ended its sleep it has not yet
-    NOTIFIED = 3  # by is_shutdown() or an exception: what it does now is its clean-up
+    CUT_SHORT = 2  # it polls, but has not done so since the shutdown interrupted its sleep
+    NOTIFIED = 3  # by is_shutdown() or an exception: anything it does now is clean-up
 
 
 class ThreadState:
-    """The shutdown as one thread of the program sees it."""
+    """The state of the shutdown from the view of one thread of the program."""
 
     __slots__ = ("awareness",)
 
@@ -55,26 +54,25 @@ class ThreadState:
 
 
 class ShutdownMachine:
-    """The rules: what is done about a signal, and how long after it.
+    """The rules: the actions that follow a signal, and after how long.
 
-    Time is whatever the caller passes as ``now``, in seconds. One thread calls :meth:`signal` and :meth:`tick`; any thread
-    may set :attr:`phase` and the awareness of :attr:`main`.
+    Time is the value that the caller passes as ``now``, in seconds. One thread calls :meth:`signal` and :meth:`tick`; any
+    thread may set :attr:`phase` and the awareness of :attr:`main`.
     """
 
     def __init__(self) -> None:
         self.main = ThreadState()
         self.main_has_ended = False
-        self.runs_in_main = False
-        """Whether the main thread itself runs the hooks, and leaves the graph."""
+        self.runs_in_main = False  # the main thread itself runs the hooks, and leaves the graph
         self.phase = Phase.RUNNING
         self.signals = 0
         self._signalled = 0.0
+        # The earliest time at which the main thread could notice that is_shutdown() is true
         self._free: float | None = None
-        """When the main thread could first notice that is_shutdown() is true."""
         self._done: set[Action] = set()
 
     def signal(self, now: float) -> list[Action]:
-        """Count a signal of the user's and return what it causes beyond the shutdown."""
+        """Count a signal from the user and return its actions other than the shutdown itself."""
         self.signals += 1
         if self.signals == 1:
             self._signalled = now
@@ -84,13 +82,13 @@ class ShutdownMachine:
 
         is_leaving = self.phase is Phase.LEAVING
         if is_leaving and self.runs_in_main:
-            # It is in no code of the program's.
+            # The main thread is not in the program's code.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
 
     def tick(self, now: float) -> list[Action]:
-        """Return what is due after a signal; each action once."""
+        """Return the actions that are due after a signal; each action once."""
         if not self.signals:
             return []
         if self._free is None and self.phase >= (Phase.LEFT if self.runs_in_main else Phase.DOWN):
@@ -109,5 +107,5 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception: it has ended, or does what it does in view of the shutdown."""
+        """Return whether the main thread needs no exception: it has exited, or is aware of the shutdown."""
         return self.main_has_ended or self.main.awareness > Awareness.NONE

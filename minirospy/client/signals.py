@@ -1,7 +1,7 @@
-"""SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down: the shell of `minirospy.client.shutdown`.
+"""Let SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down: the shell of `minirospy.client.shutdown`.
 
-The handler runs in the main thread and only marks a signal as pending. A watchdog thread, which reads the signals from a
-file descriptor also while the main thread is in C code, feeds the state machine and performs its actions.
+The handler runs in the main thread and only marks a signal as pending. A watchdog thread reads the signals from a
+file descriptor, even while the main thread is in C code, feeds the state machine and performs its actions.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
-"""How long a signal waits for the main thread's next call of rospy, where a hook is sure to meet no half-done step."""
+"""Wait this long for the main thread's next call of rospy: only there a hook cannot interrupt a half-done step."""
 
 _TICK_SECONDS = 0.01
+# Limit of one tick, so that time in which the process or the machine was suspended does not count
 _MAX_STEP = 0.05
-"""The most that one tick counts for: time in which the process or the machine was stopped is not the program's."""
 
 
 class SignalWatchdog:
-    """The signals of this process, from :meth:`install` on."""
+    """Handles the signals of this process, from :meth:`install` on."""
 
     def __init__(
         self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
     ) -> None:
-        """``stop_leaving()`` lets the node leave the graph without the master's answer.
+        """Take ``stop_leaving()``, which lets the node leave the graph without the master's answer.
 
-        ``is_sending()``: whether a link's lock is held, so that a hook that publishes might wait for its own thread.
+        ``is_sending()`` returns whether a link's lock is held, so that a hook that publishes could deadlock.
         """
         self._lifecycle = lifecycle
         self._machine = lifecycle.machine
@@ -50,13 +50,11 @@ class SignalWatchdog:
         self._deferral.dispatch = self._dispatch
         self._stop_leaving = stop_leaving
         self._is_sending = is_sending
+        # Signal number -> previous handler
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
-        """The handlers before, by the numbers of the signals."""
         self._number = int(signal.SIGINT)
-        self._interrupt: Action | None = None
-        """The exception that the main thread is to raise."""
-        self._is_nudge = False
-        """Whether a nudge is on its way to the handler."""
+        self._interrupt: Action | None = None  # the exception that the main thread must raise
+        self._is_nudge = False  # a nudge has been sent but has not reached the handler yet
         self._nudging = threading.Lock()
         self._sending: socket.socket | None = None
         self._arrived = self._handled = self._nudges = 0
@@ -67,14 +65,14 @@ class SignalWatchdog:
         return self._sending is not None
 
     def install(self) -> None:
-        """Let the signals shut the node down. Only the main thread can install handlers; without effect in another."""
+        """Let the signals shut the node down. Only the main thread can install handlers; no effect in others."""
         if threading.current_thread() is not threading.main_thread():
             return
 
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # nohup ignores SIGHUP, which stays so.
+            # nohup ignores SIGHUP, and this must stay so.
             if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self._on_signal)
@@ -85,11 +83,11 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # An event loop's, which was installed first.
+            # It belongs to an event loop that was installed first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:
-        """Give the signals back to their previous handlers, and end the watchdog thread. In the main thread."""
+        """Restore the previous handlers, and stop the watchdog thread. In the main thread."""
         for number, handler in self._previous.items():
             if self._is_handled(number):
                 signal.signal(number, handler)
@@ -102,7 +100,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Write what the program has printed while Ctrl-C still works; from here on the third is the system's business."""
+        """Flush the program's output while Ctrl-C still works; after this, a third Ctrl-C is handled by the system."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:
@@ -117,7 +115,7 @@ class SignalWatchdog:
         self._deferral.pending = True
         self._handled += 1
         if self._sending is not None:
-            # Wakes the watchdog also if an event loop has taken the file descriptor. No signal has the number 0.
+            # Wake the watchdog even if an event loop has taken the file descriptor. No signal has the number 0.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 
@@ -136,7 +134,7 @@ class SignalWatchdog:
         action, self._interrupt = self._interrupt, None
         if action is Action.KEYBOARD_INTERRUPT:
             raise KeyboardInterrupt
-        # Meanwhile it may have been notified: what would be interrupted now is the program's clean-up.
+        # If it was notified meanwhile, the exception would interrupt the program's clean-up.
         if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
@@ -163,7 +161,7 @@ class SignalWatchdog:
                 self._perform(machine.tick(now))
 
                 if not (was_pending and deferral.pending):
-                    # Whatever passed before the signal does not count.
+                    # Time before the signal does not count.
                     deferred_at = now
                 elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()
@@ -172,7 +170,7 @@ class SignalWatchdog:
         return number in self._previous and signal.getsignal(number) == self._on_signal
 
     def _new_signals(self) -> int:
-        """Return how many signals of the user's have come that the machine has not counted.
+        """Return how many signals from the user have arrived that the machine has not counted yet.
 
         An event loop may have taken the file descriptor: then only the handler reports a signal.
         """
@@ -196,15 +194,15 @@ class SignalWatchdog:
                     os._exit(_EXIT_STATUS)
 
     def _nudge(self) -> None:
-        """Run the handler in the main thread, and end a system call that it is in."""
+        """Run the handler in the main thread, and interrupt its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # One at a time: the system makes one of two that were not delivered yet, and they have to be counted.
+                # Send one at a time: the system merges two undelivered ones, but they are counted.
                 return
             self._nudges += 1
             self._is_nudge = True
             if sys.platform == "win32":
-                # The only signal that ends time.sleep() there.
+                # On Windows, only this signal interrupts time.sleep().
                 signal.raise_signal(signal.SIGINT)
             else:
                 signal.pthread_kill(threading.main_thread().ident or 0, self._number)

@@ -44,9 +44,9 @@ def init_node(
 ) -> None:
     """Make this process the node ``name``; waits for a master.
 
-    ``anonymous`` adds a number, so that many of a name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
-    Raise ValueError on a name that is empty or has a namespace, ROSException when called again with other
-    arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut down while it
+    ``anonymous`` appends a number, so that several nodes of one name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
+    Raise ValueError on a name that is empty or has a namespace, ROSException if called again with other
+    arguments, ROSInitException if the node cannot be set up, ROSInterruptException if it is shut down while it
     waits.
     """
     _check_name(name)
@@ -83,7 +83,7 @@ def init_node(
 
 
 def start_clock() -> None:
-    """Follow /clock where the master's /use_sim_time is set. Raise ROSInitException if the master fails."""
+    """Follow /clock if the master's /use_sim_time is set. Raise ROSInitException if the master fails."""
     session = current_session()
     try:
         is_simulated = session.master.has_param("/use_sim_time") and session.master.get_param("/use_sim_time")
@@ -122,7 +122,7 @@ def _warn_of_name(name: str) -> None:
 
 
 def _release_previous(session: Session) -> None:
-    """Remove what the process's previous node has installed, such as its log handlers."""
+    """Remove everything that the process's previous node has installed, such as its log handlers."""
     for release in session.on_replaced:
         release()
     session.on_replaced.clear()
@@ -130,13 +130,13 @@ def _release_previous(session: Session) -> None:
 
 @functools.cache
 def _install_process_hooks() -> None:
-    """Install, once for all sessions of the process, what its exit, its forks and its interrupts need."""
+    """Install the hooks for exit, forks and interrupts, once for all sessions of the process."""
     suppress_tracebacks(_is_interrupt)
     atexit.register(lambda: current_session().shut_down_at_exit())
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
 
-        # Python drops a signal that comes to the child before it is set up: Pool.terminate() would wait forever.
+        # Python drops a signal that reaches the child before it is set up: Pool.terminate() would wait forever.
         def block_signals() -> None:
             mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
 
@@ -153,11 +153,11 @@ def _install_process_hooks() -> None:
 def _leave_with_child_process() -> None:
     """Shut the node down when the function of a multiprocessing.Process returns.
 
-    Such a process calls the finalizers of multiprocessing, but with some versions of Python no atexit functions.
+    Such a process calls the finalizers of multiprocessing, but in some versions of Python no atexit functions.
     """
     process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
     if process and util and process.parent_process() is not None:
-        # A high priority: the node leaves before the process joins its own children, as with atexit.
+        # A high priority: as with atexit, the node leaves before the process joins its own children.
         util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 
@@ -166,7 +166,7 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _wait_for_master(session: Session) -> None:
-    """Wait until the master answers, and print once that it does not. Raise ROSInterruptException at a shutdown."""
+    """Wait until the master answers; if it does not, print that once. Raise ROSInterruptException at a shutdown."""
     uri = session.identity.environment.master_uri
     is_reported = False
 
@@ -185,7 +185,7 @@ def _wait_for_master(session: Session) -> None:
             if wait_for_event(session.lifecycle.shutting_down, _POLL_SECONDS):
                 break
         except RpcFault:
-            return  # a master that lacks this call, as that of @foxglove/ros1
+            return  # a master without this call, such as that of @foxglove/ros1
         except RpcError as error:
             raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:
@@ -195,7 +195,7 @@ def _wait_for_master(session: Session) -> None:
 
 
 def _set_parameters(session: Session, parameters: Mapping[str, object]) -> None:
-    """Set the private parameters of the command line."""
+    """Set the private parameters from the command line."""
     for key, value in parameters.items():
         session.master.set_param(names.resolve("~" + key, session.name), value)
 

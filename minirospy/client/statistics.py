@@ -1,6 +1,6 @@
-"""Topic statistics: what arrives on a topic, counted by publisher, and published on /statistics.
+"""Topic statistics: the messages received on a topic, counted by publisher, and published on /statistics.
 
-On where the parameter /enable_statistics is set when a topic is subscribed to.
+Enabled if the parameter /enable_statistics is set when a topic is subscribed to.
 Source: http://wiki.ros.org/Topics#Topic_statistics, http://wiki.ros.org/rospy/Overview/Topics%20statistics.
 """
 
@@ -28,9 +28,9 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """The limits of a window that adapts: it doubles below ``min_elements`` messages and halves above ``max_elements``.
+    """The limits of an adaptive window: it doubles below ``min_elements`` messages and halves above ``max_elements``.
 
-    ``min_size`` and ``max_size`` bound it, in seconds.
+    Its length stays between ``min_size`` and ``max_size`` seconds.
     """
 
     min_elements: float = 10
@@ -40,14 +40,14 @@ class WindowLimits(NamedTuple):
 
     @classmethod
     def read(cls, get: Callable[[str, object], float]) -> WindowLimits:
-        """Return the limits that the parameters /statistics_window_... set; ``get(key, default)`` reads one."""
+        """Return the limits set by the parameters /statistics_window_...; ``get(key, default)`` reads one."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
         )
 
 
 class Spread(NamedTuple):
-    """Mean, standard deviation and maximum of some seconds."""
+    """The mean, standard deviation and maximum of some durations, in seconds."""
 
     mean: float = 0.0
     stddev: float = 0.0
@@ -55,7 +55,7 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, values: list[float]) -> Spread:
-        """Those of ``values``; zeros where there are none."""
+        """Return the spread of ``values``; zeros if there are none."""
         if not values:
             return cls()
         mean = math.fsum(values) / len(values)
@@ -89,9 +89,9 @@ class _Window:
 
 
 class TopicStatisticsCounter:
-    """Counts the messages of one topic and gives a report whenever a publisher's window ends.
+    """Counts the messages of one topic and returns a report whenever a publisher's window is over.
 
-    A message is counted in the thread of its connection; each publisher has but one.
+    A message is counted in the thread of its connection; each publisher has only one.
     """
 
     def __init__(self, limits: WindowLimits) -> None:
@@ -99,11 +99,11 @@ class TopicStatisticsCounter:
         self._windows: dict[str, _Window] = {}
 
     def count(self, message: Message, header: Header, size: int, now: int) -> Report | None:
-        """Count one message of ``size`` bytes that came at ``now`` (ns); the report, where it ends a window."""
+        """Count one message of ``size`` bytes that arrived at ``now`` (ns); return the report if this completes a window."""
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
         if window is None or now < window.start:
-            # The first, or simulated time that jumped back.
+            # This is the first message, or simulated time jumped back.
             window = self._windows[publisher] = _Window(now)
 
         window.delivered += 1
@@ -117,7 +117,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A stamp of zero is none.
+            # A stamp of zero means that none is set.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 

@@ -1,4 +1,4 @@
-"""Subscriber as rospy has it: bytes become messages here, in the worker that has read them.
+"""The Subscriber of rospy: it deserializes messages here, in the worker that has read them.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -32,16 +32,16 @@ _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
-"""Topics that are not counted: the counts themselves, and what their times come from."""
+"""Topics that are not counted: the statistics themselves, and the source of their times."""
 
 
 class Subscriber(Topic[_M_co]):
     """Calls ``callback(message)`` with each message of a topic.
 
-    ``callback_args`` is handed to the callback as second argument. ``queue_size``: while the callback is
-    busy, keep only so many messages, the newest (None: all, in order). ``buff_size`` is accepted and not
-    needed: freshness does not depend on it. Subscribers of one topic in a process share the connections;
-    they keep as many messages as the largest queue_size. One that comes later to a latched topic gets
+    ``callback_args`` is passed to the callback as second argument. ``queue_size``: while the callback is
+    busy, keep only this many of the newest messages (None: all, in order). ``buff_size`` is accepted for compatibility:
+    queue_size alone determines which messages are kept. Subscribers of one topic in a process share the connections;
+    they keep as many messages as the largest queue_size. One that joins a latched topic later receives
     its last message before the constructor returns. Raise ValueError on a bad name or class,
     ROSException on a bad size.
     """
@@ -80,7 +80,8 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
+            # Read the links after joining: the message of a link opened meanwhile may be delivered twice, but is not
+            # lost.
             links = state.links
         self.impl = state
 
@@ -94,7 +95,7 @@ class Subscriber(Topic[_M_co]):
             state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
-        """Stop listening; the connections end with the last Subscriber of the topic in this process."""
+        """Stop receiving; the connections are closed with the last Subscriber of the topic in this process."""
         super().unregister()
         self.callback = self.callback_args = None
 
@@ -102,7 +103,7 @@ class Subscriber(Topic[_M_co]):
 def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
     """Return the next message of ``topic``; ``timeout`` in seconds, or a Duration.
 
-    Raise ROSException after ``timeout``, ROSInterruptException where the node shuts down.
+    Raise ROSException after ``timeout``, ROSInterruptException if the node shuts down.
     """
     session = current_session()
     if session.is_fork_without_node:
@@ -130,14 +131,14 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
 
 
 class _Callback(NamedTuple):
-    """A subscriber's function with the argument that it wants beside the message."""
+    """A subscriber's function with its additional argument."""
 
     function: Callable[..., object]
     args: object
 
 
 class _Receiver(NamedTuple):
-    """A message class, whether it can be read from a memoryview (genpy's cannot), and who wants it."""
+    """A message class, whether it can be read from a memoryview (genpy's cannot), and the callbacks for it."""
 
     data_class: type[Message]
     takes_memoryview: bool
@@ -145,7 +146,7 @@ class _Receiver(NamedTuple):
 
 
 class SubscribedTopic(SharedTopic):
-    """One subscribed topic of the process: what its Subscribers share."""
+    """A topic subscribed to by this process; its Subscribers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         super().__init__(session, topic, data_class)
@@ -167,26 +168,26 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def connections(self) -> list[Connection]:
-        """The links to publishers, as rospy shows them."""
+        """The links to publishers, in rospy's form."""
         return [connection_to_publisher(link, self.resolved_name) for link in self.links]
 
     def get_stats(self) -> tuple[str, list[tuple[object, ...]]]:
-        """Return the row of the Slave API's getBusStats."""
+        """Return the topic's row of the Slave API's getBusStats."""
         return self.resolved_name, [
             (c.id, c.stat_bytes, c.stat_num_msg, -1, not c.done) for c in self.connections
         ]
 
     def get_num_connections(self) -> int:
-        """Return how many links there are."""
+        """Return the number of links."""
         return len(self.links)
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Return whether the node with this Slave API is connected."""
+        """Return whether the node with this Slave API URI is connected."""
         return any(link.uri == endpoint_id for link in self.links)
 
     @property
     def callbacks(self) -> list[tuple[Callable[..., object], object]]:
-        """The functions that get the messages, each with its callback_args."""
+        """The functions that receive the messages, each with its callback_args."""
         own = [(each.callback, each.callback_args) for each in self._handles if each.callback is not None]
         return own + list(self._added)
 
@@ -210,12 +211,12 @@ class SubscribedTopic(SharedTopic):
             del self._session.subscribed[self.resolved_name]
             if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
-            # Started before another thread can subscribe to the topic again.
+            # Start this before another thread can subscribe to the topic again.
             wait = self._session.start(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Call ``cb``, too, immediately with the last message of a latched topic; rosbridge uses this."""
+        """Add the callback ``cb``, and call it immediately with the last message of a latched topic; rosbridge uses this."""
         callback = _Callback(cb, cb_args)
         with self._session.lock:
             self._added.append(callback)
@@ -224,7 +225,7 @@ class SubscribedTopic(SharedTopic):
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Call ``cb`` no more, which add_callback or a Subscriber was given. Raise KeyError."""
+        """Remove the callback ``cb``, which add_callback or a Subscriber has added. Raise KeyError."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)
@@ -233,7 +234,7 @@ class SubscribedTopic(SharedTopic):
             self._update()
 
     def set_queue_size(self, queue_size: int | None) -> None:
-        """Keep so many messages, as a Subscriber's ``queue_size`` has it."""
+        """Set the number of messages to keep, like a Subscriber's ``queue_size``."""
         with self._session.lock:
             for handle in self._handles:
                 handle._newest = max(0, queue_size or 0)
@@ -241,11 +242,11 @@ class SubscribedTopic(SharedTopic):
             self._update()
 
     def set_buff_size(self, buff_size: int) -> None:
-        """Record the size, which has no effect: as a Subscriber's ``buff_size``."""
+        """Record the size, which has no effect, like a Subscriber's ``buff_size``."""
         self.buff_size = buff_size
 
     def register(self) -> None:
-        """Register with the master, once."""
+        """Register with the master, only once."""
         with self._session.lock:
             node = self._session.node
             if self._registered or not self._handles or not node or self._session.is_shutdown():
@@ -272,7 +273,7 @@ class SubscribedTopic(SharedTopic):
         return 0 if 0 in sizes else max(sizes, default=0)
 
     def _look_for_statistics(self) -> None:
-        """Count what comes where the parameter says so. In a worker: no Subscriber waits for the answer."""
+        """Count the received messages if the parameter is set. In a worker, so that no Subscriber waits for the master."""
         try:
             is_on = self._session.master.get_param("/enable_statistics")
         except (MasterUnreachableError, RpcError):
@@ -283,7 +284,7 @@ class SubscribedTopic(SharedTopic):
             self._statistics = StatisticsPublisher(self.resolved_name)
 
     def _update(self) -> None:
-        """Group the callbacks by class, so that a message is deserialised once for all of a class."""
+        """Group the callbacks by class, so that a message is deserialized once per class."""
         if self.subscription:
             self.subscription.newest = self._newest()
         by_class: dict[type[Message], list[_Callback]] = {}
@@ -299,7 +300,7 @@ class SubscribedTopic(SharedTopic):
         )
 
     def replay(self, data_class: type[Message], callback: _Callback, links: tuple[InLink, ...]) -> None:
-        """Give a callback, which has joined, the last message of each latched publisher."""
+        """Call a newly added callback with the last message of each latched publisher."""
         receivers = (_Receiver(data_class, False, (callback,)),)
         for link in links:
             frame = link.latched
@@ -308,7 +309,8 @@ class SubscribedTopic(SharedTopic):
             self._deliver(frame, link.header, receivers)
             newest = link.latched
             if newest is not None and newest is not frame:
-                # It came meanwhile, and may have been delivered before the older one: rather twice than not last.
+                # A newer message arrived meanwhile and may have been delivered before the older one: deliver it
+                # again, as the last one.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
@@ -348,9 +350,10 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         else:
             callback.function(message, callback.args)
     except BaseException as error:
-        # As in rospy, sys.exit() in the thread of a link ends nothing; where Subscriber() was called it ends the program.
+        # As in rospy, sys.exit() has no effect in a link's thread; inside the call of Subscriber() it exits the
+        # program.
         if is_callers_thread and not isinstance(error, Exception):
             raise
-        # While a shutdown hook releases what the callback uses, an error of it says nothing.
+        # While a shutdown hook releases resources of the callback, its errors mean nothing.
         if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

@@ -1,4 +1,4 @@
-"""Time as a node sees it: Time, Duration, sleep, Rate and Timer, on wall or simulated time.
+"""The time functions of a node: Time, Duration, sleep, Rate and Timer, on wall or simulated time.
 
 Source: http://wiki.ros.org/rospy/Overview/Time.
 """
@@ -33,13 +33,13 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back to ``time`` seconds before a sleep's start; a KeyboardInterrupt, too, as in rospy."""
+    """Simulated time jumped back to ``time`` seconds before a sleep's start; as in rospy, this is also a KeyboardInterrupt."""
 
 
 class Duration(times.Duration):
-    """A span of time, ``secs`` and ``nsecs``; may be negative."""
+    """A time span, ``secs`` and ``nsecs``; may be negative."""
 
-    # What is pickled has to be found by other ROS 1 programs, and what they have pickled by this one.
+    # Pickles must be loadable by other ROS 1 programs, and theirs by this one.
     __module__ = "rospy.rostime"
 
     __slots__: list[str] = []
@@ -86,29 +86,28 @@ def get_time() -> float:
 
 
 def is_wallclock() -> bool:
-    """Return whether the node's time is the machine's, not a simulated one."""
+    """Return whether the node uses the machine's time, not a simulated one."""
     return not isinstance(current_session().clock, SimulatedClock)
 
 
 def sleep(duration: float | times.Duration) -> None:
-    """Sleep for ``duration`` seconds; not at all where that is negative.
+    """Sleep for ``duration`` seconds; not at all if that is negative.
 
-    Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that polls
-    is_shutdown(), by returning. Raise ROSTimeMovedBackwardsException if
-    simulated time jumps back to before the sleep's start.
+    If the node shuts down meanwhile, it raises ROSInterruptException, or in a thread that polls is_shutdown() it returns
+    early. Raise ROSTimeMovedBackwardsException if simulated time jumps back to before the sleep's start.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
     _sleep(nanoseconds)
 
 
 class Rate:
-    """Keeps a loop at ``hz`` turns a second: ``sleep()`` makes up for what the loop's own work took.
+    """Keeps a loop at ``hz`` iterations per second: ``sleep()`` subtracts the time that the loop's own work took.
 
-    ``last_time`` is when this turn started, ``sleep_dur`` how long a turn is; a program may change either.
+    ``last_time`` is the start of this period, ``sleep_dur`` its length; a program may change either.
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        """``reset``: start again where simulated time jumps back, instead of raising.
+        """Take ``reset``: whether to start again, instead of raising, if simulated time jumps back.
 
         Raise ZeroDivisionError on a rate of 0, ROSInitException before init_node.
         """
@@ -117,15 +116,15 @@ class Rate:
         self._reset = reset
 
     def remaining(self) -> Duration:
-        """Return what is left of this turn."""
+        """Return the remaining time of this period."""
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
-        """Sleep until the turn is over. Raise as :func:`sleep` does."""
+        """Sleep until the period is over. Raise as :func:`sleep` does."""
         self._sleep(None)
 
     def _sleep(self, stop: threading.Event | None) -> None:
-        """Sleep until the turn is over, or ``stop`` is set."""
+        """Sleep until the period is over, or ``stop`` is set."""
         now = current_session().clock.now()
         try:
             _sleep(self._left(now), stop)
@@ -136,12 +135,12 @@ class Rate:
             return
         period = self.sleep_dur.to_nsec()
         started = self.last_time.to_nsec() + period
-        # Far behind, as after a pause: do not rush through the turns that were missed.
+        # Far behind, as after a pause: skip the missed periods.
         now = current_session().clock.now()
         self.last_time = _time(now if now - started > 2 * period else started)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
-        """Return what is left of this turn at a time; called by a program's subclass that sleeps in another way."""
+        """Return the remaining time of this period at a given time; called by programs' subclasses that sleep differently."""
         return Duration(0, self._left(curr_time.to_nsec()))
 
     def _left(self, now: int) -> int:
@@ -152,9 +151,9 @@ class Rate:
 
 
 class TimerEvent:
-    """The argument of a Timer's callback: expected and real times of this call and of the one before.
+    """The argument of a Timer's callback: expected and real times of this call and of the previous one.
 
-    ``last_duration`` is in seconds; everything of a call before is None the first time.
+    ``last_duration`` is in seconds; the fields of the previous call are None the first time.
     """
 
     def __init__(
@@ -175,8 +174,8 @@ class TimerEvent:
 class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
-    ``reset``: start again where simulated time jumps back; else that ends the timer with
-    ROSTimeMovedBackwardsException. An error of the callback ends it, too.
+    ``reset``: start again if simulated time jumps back; otherwise the timer stops with
+    ROSTimeMovedBackwardsException. An error of the callback stops it, too.
     """
 
     def __init__(
@@ -197,7 +196,7 @@ class Timer(threading.Thread):
 
     @property
     def _shutdown(self) -> bool:
-        """Return whether it was shut down; programs read it of rospy's, and set it."""
+        """Return whether the timer was shut down. Programs read and set this attribute of rospy's Timer."""
         return self._ended.is_set()
 
     @_shutdown.setter
@@ -206,7 +205,7 @@ class Timer(threading.Thread):
             self._ended.set()
 
     def shutdown(self) -> None:
-        """Stop calling back."""
+        """Stop calling the callback."""
         self._ended.set()
 
     def run(self) -> None:
@@ -238,12 +237,12 @@ class Timer(threading.Thread):
 
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
-    """Sleep until ``stop`` is set, quietly; without it, until the node shuts down."""
+    """Sleep; a set ``stop`` ends this without an exception. Without ``stop``, a shutdown of the node interrupts it."""
     if nanoseconds <= 0:
         return
     session = current_session()
     if session.is_fork_without_node and isinstance(session.clock, SimulatedClock):
-        # Only the parent follows /clock: the sleep would never end.
+        # Only the parent follows /clock: the sleep would never return.
         raise ROSInitException(session.why_fork_has_no_effect("simulated time"))
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()

@@ -24,7 +24,7 @@ _M_co = TypeVar("_M_co", bound=protocols.Message, covariant=True)
 
 
 class AnyMsg(Message):
-    """A message of any type: its bytes, and in ``_connection_header`` the publisher's description."""
+    """A message of any type: its bytes, and the publisher's description in ``_connection_header``."""
 
     _md5sum = ANY
     _type = ANY
@@ -40,13 +40,13 @@ class AnyMsg(Message):
         self._buff: bytes | None = None
 
     def serialize(self, buff: protocols.Writer) -> None:
-        """Write the bytes that were received."""
+        """Write the received bytes."""
         if self._buff is None:
             raise ROSException("AnyMsg is not initialized")
         buff.write(self._buff)
 
     def deserialize(self, str: protocols.Buffer) -> AnyMsg:
-        """Take the bytes."""
+        """Store the bytes."""
         self._buff = bytes(str)
         return self
 
@@ -54,7 +54,7 @@ class AnyMsg(Message):
 class Topic(Generic[_M_co]):
     """The common part of Publisher and Subscriber: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
 
-    ``impl`` is what all handles of the topic in this process share, None once unregistered.
+    ``impl`` is shared by all handles of the topic in this process, and None once unregistered.
     """
 
     impl: SharedTopic | None
@@ -78,13 +78,13 @@ class Topic(Generic[_M_co]):
         self.reg_type = reg_type
 
     def get_num_connections(self) -> int:
-        """Return how many nodes are connected: subscribers of a Publisher, publishers of a Subscriber."""
+        """Return the number of connected nodes: subscribers of a Publisher, publishers of a Subscriber."""
         return self.impl.get_num_connections() if self.impl else 0
 
     def unregister(self) -> None:
-        """Stop; the topic's connections end with its last handle in this process. Idempotent.
+        """Unregister; the topic's connections are closed with its last handle in this process. Idempotent.
 
-        As with rospy the handle then keeps its ``name`` only.
+        As in rospy, the handle then keeps only its ``name``.
         """
         with self._session.lock:
             shared, self.impl = self.impl, None
@@ -94,7 +94,7 @@ class Topic(Generic[_M_co]):
 
 
 class SharedTopic:
-    """The common part of the handles of one topic in this process: rospy's ``impl``, which user code reads."""
+    """The object shared by the handles of one topic in this process: rospy's ``impl``, which user code reads."""
 
     _handles: Collection[Topic[Any]]
 
@@ -106,17 +106,17 @@ class SharedTopic:
 
     @property
     def ref_count(self) -> int:
-        """How many handles there are."""
+        """The number of handles."""
         return len(self._handles)
 
     @property
     def closed(self) -> bool:
-        """Whether the last handle was unregistered."""
+        """True if the last handle was unregistered."""
         return not self._handles
 
     @property
     def connections(self) -> list[Connection]:
-        """The links to the other ends, as rospy shows them."""
+        """The links to the other nodes, in rospy's form."""
         raise NotImplementedError
 
     def get_stats_info(self) -> list[tuple[object, ...]]:
@@ -128,11 +128,11 @@ class SharedTopic:
         ]
 
     def leave(self, handle: Any) -> None:
-        """One handle less; the last ends the topic."""
+        """Release one handle. Unregister the topic when the last handle is released."""
         raise NotImplementedError
 
     def get_num_connections(self) -> int:
-        """Return how many links there are."""
+        """Return the number of links."""
         raise NotImplementedError
 
     def has_connections(self) -> bool:
@@ -140,12 +140,12 @@ class SharedTopic:
         return bool(self.get_num_connections())
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Return whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""
+        """Return whether there is a link to a node: ``endpoint_id`` is a subscriber's name, or a publisher's URI."""
         raise NotImplementedError
 
 
 def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:
-    """Wait for a registration; a master that says no is logged, as in rospy, and the program goes on."""
+    """Wait for a registration; as in rospy, a refusal by the master is only logged."""
     try:
         wait()
     except MasterUnreachableError as error:
@@ -156,7 +156,7 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
 
 
 def unregister_from_master(wait: Callable[[], object]) -> None:
-    """Wait for an unregistration; a master that does not answer is notified later, or has forgotten it."""
+    """Wait for an unregistration; a master that does not answer is notified later, or has lost the registration."""
     try:
         wait()
     except (MasterUnreachableError, RpcError) as error:

@@ -1,4 +1,4 @@
-"""Publisher and Subscriber as rospy has them, and which topics there are.
+"""The Publisher and Subscriber of rospy, and the list of published topics.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -23,7 +23,7 @@ __all__ = [
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """[topic, type] of each published topic at or below ``namespace``. Raise ROSException."""
+    """Return [topic, type] of each published topic at or below ``namespace``. Raise ROSException."""
     try:
         return [list(pair) for pair in current_session().master.get_published_topics(namespace or "")]
     except (MasterUnreachableError, RpcError) as error:

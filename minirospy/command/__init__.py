@@ -1,1 +1,1 @@
-"""What every command is made of: its parser, its verbs, its errors and exit statuses."""
+"""The parts of every command: its parser, its verbs, its errors and exit statuses."""

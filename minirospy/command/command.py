@@ -1,15 +1,15 @@
-"""The common part of all commands: reading arguments, being a node of the graph, errors and exit statuses.
+"""The common part of all commands: parsing arguments, running as a node, errors and exit statuses.
 
-A command is a typed function that raises; `main(argv)` hands it to :func:`run`, which turns what was
-raised into one line on stderr and an exit status:
+A command is a typed function that raises; `main(argv)` passes it to :func:`run`, which converts exceptions to one line on
+stderr and an exit status:
 
 ====== =====================================================================
 status when
 ====== =====================================================================
-0      done; a stream, a wait or a question ended by Ctrl-C or a closed pipe
-1      it could not be done: no master, an unknown name, a peer that fails
+0      success; a stream, a wait or a prompt ended by Ctrl-C or a closed pipe
+1      failure: no master, an unknown name, a peer that fails
 2      usage error: unknown option, missing argument
-130    work that Ctrl-C ended half done: INTERRUPTED
+130    unfinished work interrupted by Ctrl-C: INTERRUPTED
 ====== =====================================================================
 """
 
@@ -68,13 +68,13 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
+"""The shell's status for a program that SIGINT has ended: `catkin_make && roslaunch ...` stops."""
 
 
 class RosText(NamedTuple):
-    """The text that ROS prints about an error, and its exit status.
+    """ROS's message for an error, and its exit status.
 
-    ``text`` may name ``{name}`` and ``{uri}`` of the error.
+    ``text`` may contain ``{name}`` and ``{uri}`` of the error.
     """
 
     text: str
@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error for which ROS has words that depend on more than the error: ``ros`` are printed first."""
+    """An error whose ROS message depends on more than the error: ``ros`` is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -90,13 +90,13 @@ class WordedError(MinirospyError):
 
 
 Wording = Mapping[str, RosText]
-"""Kind of a NotFoundError, ``no answer from`` + kind of a NodeUnreachableError, or ``master`` -> ROS's words."""
+"""ROS's messages by kind of a NotFoundError, ``no answer from`` + kind of a NodeUnreachableError, or ``master``."""
 
 NO_MASTER = RosText("ERROR: Unable to communicate with master!")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return what ROS prints about an error; an empty text where it has none."""
+    """Return ROS's message for an error; its text is empty if ROS has none."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):
@@ -125,10 +125,10 @@ def run(
     *,
     heeds_interrupts: bool = True,
 ) -> int:
-    """Run ``body`` and return the exit status, at Ctrl-C ``interrupted``.
+    """Run ``body`` and return the exit status, ``interrupted`` after Ctrl-C.
 
-    A named error becomes ``name: ERROR: text`` on stderr, after ROS's words for it. ``heeds_interrupts``: whether
-    SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
+    A named error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``: end at
+    SIGINT even if the signal was ignored at the start, unless ``interrupted`` is nonzero.
     """
     _open_streams()
     if not os.path.isdir(_PACKAGE):
@@ -151,11 +151,11 @@ def run(
         wrong = error.object[error.start : error.end]
         return complain(name, UsageError(f"the argument {wrong!r} is not UTF-8 text"), 2)
     except BrokenPipeError:
-        # The reader (`| head`) has gone.
+        # The reader of stdout (`| head`) has exited.
         _flush()
         return 0
     except OSError as error:
-        # A disk that is full, a folder that may not be written: the file's name, and the system's words.
+        # For example a full disk or a missing permission: print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
@@ -163,9 +163,9 @@ def run(
 
 
 def _offer_overlay() -> None:
-    """Let this process and those that it starts import rospy also if no `.pth` file is read: `pip install --target`.
+    """Make rospy importable in this process and its children even if no `.pth` file is read: `pip install --target`.
 
-    At the end of the path, where the `.pth` file adds it, too.
+    The folder is appended to the path, as by the `.pth` file.
     """
     overlay = os.path.join(_PACKAGE, "overlay")
     if overlay in sys.path:
@@ -176,7 +176,7 @@ def _offer_overlay() -> None:
 
 
 def _heed_break() -> None:
-    """On Windows, end at Ctrl-Break as at Ctrl-C: it is what a launcher sends, and else ends a process without its clean-up."""
+    """On Windows, end at Ctrl-Break as at Ctrl-C: launchers send it, and by default it ends a process without cleanup."""
     import signal
     import threading
 
@@ -189,9 +189,9 @@ def _heed_break() -> None:
 
 
 def _heed_interrupts() -> None:
-    """End at SIGINT also if a script has started the command with `&`: the shell has it ignored there.
+    """End at SIGINT even if a script has started the command with `&`, for which the shell sets the signal to be ignored.
 
-    As in ROS, whose commands are nodes and install their own handlers. A build keeps what its shell says.
+    ROS's commands do so as well: they are nodes and install their own handlers. A build keeps the shell's setting.
     """
     import signal
     import threading
@@ -204,10 +204,10 @@ def _heed_interrupts() -> None:
 
 
 def _open_streams() -> None:
-    """Open the standard streams that are missing, and let all of them print everything.
+    """Open missing standard streams, and make all of them able to print any string.
 
-    One that was closed (`rostopic list >&-`, a Windows program without a console) would be None; an output that
-    cannot encode what a robot says (a pipe in Windows' code page) gets it as escapes.
+    A closed stream (`rostopic list >&-`, a Windows program without a console) would be None. An output that cannot encode a
+    character (a pipe with a Windows code page) gets escapes instead.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -217,31 +217,31 @@ def _open_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if type(stream) is io.TextIOWrapper and stream.isatty():
-            # What a robot says is shown on a terminal, and never obeyed by it.
+            # Strings from robots are shown on a terminal; their control sequences must not be executed.
             setattr(sys, name, SafeTerminal.around(stream))
 
 
 def warn(what: str, name: str = "") -> None:
-    """Print one line on stderr, after all that was printed before; it also says where ``name`` is not legal."""
+    """Print one line on stderr after flushing stdout; add the reason if ``name`` is not legal."""
     from minirospy.introspect.graph import why_illegal
 
     why = why_illegal(name) if name else ""
     sys.stdout.flush()
-    # One write: a thread may warn while others print.
+    # Use one write: other threads may print at the same time.
     print(escaped(f"WARNING: {what}{why and f'; {why}'}\n", "\n"), end="", file=sys.stderr)
 
 
 def warn_unpublished(graph: Graph, topic: str) -> None:
-    """Warn that a topic is not known to the master, and name similar ones."""
+    """Warn that the master does not know a topic, and print similar names."""
     warn(f"topic [{topic}] does not appear to be published yet", topic)
     hint_near(topic, graph.state().publishers)
 
 
 def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
-    """Warn that nobody subscribes to ``topic`` where one that is nearly the same is in ``subscribed``.
+    """Warn that ``topic`` has no subscribers if ``subscribed`` contains a name that is almost equal.
 
-    A publisher may come first, so only what looks like a slip of the keyboard is reported: /robot2/scan is not one
-    where /robot1/scan has subscribers.
+    A publisher may start first, so only a likely typing error is reported: /robot2/scan is not one if /robot1/scan has
+    subscribers.
     """
     others = [each for each in subscribed if _without_digits(each) != _without_digits(topic)]
     if near := did_you_mean(topic, others, only_slips=True):
@@ -253,7 +253,7 @@ def _without_digits(name: str) -> str:
 
 
 def hint_near(name: str, known: Iterable[str]) -> None:
-    """Print the names similar to ``name`` on stderr, below the warning that it is awaited."""
+    """Print names similar to ``name`` on stderr, below the warning that the command waits for it."""
     near = did_you_mean(name, (each for each in known if each != name))
     if near:
         print(escaped(f"{near.removeprefix('; ')}\n", "\n"), end="", file=sys.stderr)
@@ -261,9 +261,9 @@ def hint_near(name: str, known: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
-    """Yield the node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
+    """Yield the node of a command that listens or publishes; unregister it even if `kill` ends the command.
 
-    ``arguments``: what a launch file gives it as a node: `__name:=`, `__ns:=`, `__master:=`.
+    ``arguments``: the arguments that a launch file passes to nodes: `__name:=`, `__ns:=`, `__master:=`.
     """
     import signal
 
@@ -276,7 +276,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
         host=special.get("__hostname") or special.get("__ip", ""),
         namespace=special.get("__ns", ""),
     )
-    # As by Ctrl-C.
+    # Raise KeyboardInterrupt, as for Ctrl-C.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with ToolNode(environment, tool, name=special.get("__name", ""), ros_time=ros_time) as node:
@@ -288,7 +288,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
 
 
 def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -> int:
-    """Print an error on stderr, after all that was printed before: ROS's text, then ours. Return ``status``."""
+    """Print an error on stderr after flushing stdout: first ROS's message, then minirospy's. Return ``status``."""
     _flush()
     if ros_text:
         print(escaped(ros_text, "\n\t"), file=sys.stderr)
@@ -297,7 +297,7 @@ def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -
 
 
 def _flush() -> None:
-    """Print what waits; where that cannot be, it is dropped, also from the interpreter's own flush at its end."""
+    """Flush stdout; if that fails, discard the output, also for the interpreter's own flush at exit."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,8 +1,7 @@
-"""The parsing of a command line: an argument parser whose usage, help and errors are printed as ROS prints them.
+"""Command-line parsing: an argument parser whose usage, help and errors are printed as ROS prints them.
 
-Most of ROS's commands are built on optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own
-tests match these lines, so a :class:`Parser` that is given ROS's usage prints exactly them; what minirospy adds follows
-on separate lines.
+Most of ROS's commands use optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own tests match these
+lines, so a :class:`Parser` that is given ROS's usage prints exactly them; minirospy's additions follow on separate lines.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ _OWN_OPTIONS = "Options of minirospy"
 
 
 class CommandLineError(UsageError):
-    """A command line that a parser refused; ``ros_text`` is what ROS prints about it, usage included."""
+    """A command line that a parser rejected; ``ros_text`` is ROS's message, including the usage."""
 
     def __init__(self, text: str, ros_text: str = "") -> None:
         super().__init__(text)
@@ -46,7 +45,7 @@ class CommandLineError(UsageError):
 
 
 class Misuse(UsageError):
-    """Arguments that parse, and do not suit each other; ``ros`` is ROS's text about it.
+    """Arguments that parse but are invalid or do not fit together; ``ros`` is ROS's message.
 
     A command's function raises it; its parser adds the usage.
     """
@@ -57,7 +56,7 @@ class Misuse(UsageError):
 
 
 class _Help(argparse.HelpFormatter):
-    """Help as wide as the terminal; argparse gets the width from shutil, whose import costs more than its own."""
+    """Help as wide as the terminal; argparse gets the width from shutil, whose import takes longer than argparse's own."""
 
     def __init__(self, prog: str, *args: int, **kwargs: Any) -> None:
         try:
@@ -68,7 +67,7 @@ class _Help(argparse.HelpFormatter):
 
 
 class _Accepted(argparse.Action):
-    """An option that is accepted for compatibility and leaves nothing behind."""
+    """An option that is accepted for compatibility and stores nothing."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, nargs: int | str = 0, **kwargs: Any) -> None:
         super().__init__(option_strings, dest, nargs=nargs, **{**kwargs, "default": argparse.SUPPRESS})
@@ -78,13 +77,13 @@ class _Accepted(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose error ends with what to type for help.
+    """An argument parser whose errors end with the command that prints the help.
 
-    ``ros_usage`` is ROS's usage text; with it options and positional arguments may alternate, as with optparse, and
-    help and errors have optparse's form. ``missing`` and ``surplus`` are ROS's texts about an argument that is missing
-    or one too many, ``missing`` perhaps by the argument's name; ``about`` and ``ros_epilog`` are ROS's texts above and
-    below the options. ``ros_argparse``: the program's name in ROS's errors where ROS itself uses argparse; help and
-    errors then have argparse's form.
+    ``ros_usage`` is ROS's usage; with it options and positional arguments may alternate, as with optparse, and help and
+    errors have
+    optparse's form. ``missing`` and ``surplus`` are ROS's messages for a missing or a surplus argument; ``missing`` may be
+    a dict by argument name. ``about`` and ``ros_epilog`` are ROS's texts above and below the options. ``ros_argparse``: the
+    program's name in ROS's errors if ROS itself uses argparse; help and errors then have argparse's form.
     """
 
     def __init__(
@@ -117,8 +116,8 @@ class Parser(argparse.ArgumentParser):
     def add_argument(self, *names: str, completer: str = "", **kwargs: Any) -> argparse.Action:
         """Add an argument as argparse does.
 
-        ``completer`` is the name of a function of minirospy.cli.completion.completers, which is imported only when
-        Tab is pressed.
+        ``completer`` is the name of a function of minirospy.cli.completion.completers, which is imported only for tab
+        completion.
         """
         action = super().add_argument(*names, **kwargs)
         if completer:
@@ -133,13 +132,13 @@ class Parser(argparse.ArgumentParser):
         group: argparse._ArgumentGroup | None = None,
         **kwargs: Any,
     ) -> None:
-        """Add an option of ROS's that has no effect here; ``nargs`` is 0 unless given."""
+        """Add an option of ROS that has no effect here; ``nargs`` is 0 unless given."""
         action = (group or self).add_argument(*names, action="accepted", help=help, **kwargs)
         if action.nargs != 0:
             attach_completer(action, completer)
 
     def own_options(self) -> argparse._ArgumentGroup:
-        """Return the group of the options that ROS's command does not have: they are printed after ROS's help."""
+        """Return the group of options that ROS's command does not have; they are printed after ROS's help."""
         for group in self._action_groups:
             if group.title == _OWN_OPTIONS:
                 return group
@@ -148,7 +147,7 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, ready for the command's function. Raise CommandLineError."""
+        """Return the arguments by name, as the command's function takes them. Raise CommandLineError."""
         parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
         return vars(parsed)
 
@@ -161,7 +160,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_intermixed_args(args, namespace)
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Raise the CommandLineError of ``message``; ``ros`` is ROS's text where it differs."""
+        """Raise CommandLineError with ``message``; ``ros`` is ROS's message if it differs."""
         ros_text = ""
         if self._ros_argparse:
             ros_text = f"{self.format_usage()}{self._ros_argparse}: error: {ros or _without_hint(message)}"
@@ -180,9 +179,9 @@ class Parser(argparse.ArgumentParser):
         return f"Usage: {self.ros_usage}"
 
     def _check_options(self, args: Sequence[str] | None) -> None:
-        """Report a long option that does not exist before a missing argument: that may be what it has swallowed."""
+        """Report an unknown long option before a missing argument: the option may have consumed the argument."""
         if any(action.nargs == argparse.REMAINDER for action in self._actions):
-            return  # some of the options are another program's
+            return  # the remaining options are for another program
         for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
             option = word.partition("=")[0]
             if option.startswith("--") and not any(
@@ -195,7 +194,7 @@ class Parser(argparse.ArgumentParser):
                 )
 
     def _ros_message(self, message: str) -> str:
-        """Return what optparse, or ROS's command, says where argparse says ``message``."""
+        """Return the message of optparse, or of ROS's command, for argparse's ``message``."""
         import re
 
         if match := re.match(r"unrecognized arguments: (-\S)", message):
@@ -227,7 +226,7 @@ class Parser(argparse.ArgumentParser):
     # --- help in optparse's form
 
     def _ros_argparse_help(self) -> str:
-        """Return the help as argparse prints it, with ROS's text above the arguments, and ours at the end."""
+        """Return the help as argparse prints it, with ROS's text above the arguments and minirospy's at the end."""
         own, self.description = self.description, self._about
         try:
             return super().format_help() + ("\n" + _filled(own) if own else "")
@@ -235,7 +234,7 @@ class Parser(argparse.ArgumentParser):
             self.description = own
 
     def _ros_help(self) -> str:
-        """Return ROS's help, exactly; then what minirospy has besides."""
+        """Return ROS's help byte for byte, then minirospy's additions."""
         groups = [group for group in self._action_groups if group.title != _OWN_OPTIONS]
         options = [action for group in groups for action in group._group_actions if action.option_strings]
         parts = [f"{self.usage_line()}\n"]
@@ -259,16 +258,16 @@ class Parser(argparse.ArgumentParser):
 
 
 class AssignmentParser(Parser):
-    """Takes NAME:=VALUE from among the words, as a launch file's arguments are given."""
+    """A parser that accepts NAME:=VALUE between the other arguments, as for a launch file."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, what is assigned as ``args``. Raise CommandLineError."""
+        """Return the arguments by name, with the assignments as ``args``. Raise CommandLineError."""
         plain, assigned = split_assignments(words)
         return {**super().parse(plain), "args": assigned}
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the words without NAME:=VALUE, and those by name; without special names such as __ns, which a node reads."""
+    """Return the other arguments, and the values by name; drop special names such as __ns, which nodes read."""
     return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 
@@ -285,17 +284,17 @@ def integer(name: str) -> Callable[[str], int]:
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:
-    """Set what completes the values of an argument, by name: see :meth:`Parser.add_argument`."""
+    """Set the completer of an argument, by name: see :meth:`Parser.add_argument`."""
     setattr(action, _COMPLETER, completer)
 
 
 def completer_of(action: argparse.Action) -> str:
-    """Return the name of the function that completes an argument; empty if nothing is attached."""
+    """Return the name of an argument's completer; empty if it has none."""
     return str(getattr(action, _COMPLETER, ""))
 
 
 def _without_hint(message: str) -> str:
-    """Return argparse's own words of ``message``, without the suggestions that follow them."""
+    """Return argparse's own part of ``message``, without the suggestions after it."""
     return message.partition("; did you mean ")[0]
 
 
@@ -312,7 +311,7 @@ def _filled(text: str) -> str:
 
 
 def _ros_options(title: str, actions: Iterable[argparse.Action]) -> str:
-    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help beside or below."""
+    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help next to or below each."""
     rows = []
     for action in actions:
         if action.help == argparse.SUPPRESS:

@@ -1,7 +1,7 @@
-"""The parts of a command: a parser and a typed function; and families of such verbs under one name.
+"""Commands, each a parser and a typed function, and families of such verbs under one name.
 
-The function's parameters are called as the parser's arguments: `Command.run` passes them by name. So a parser can be
-had without running its command, and the function be called without a command line.
+The function's parameters have the names of the parser's arguments: `Command.run` passes them by name. So the parser is
+available without running the command, and the function can be called without a command line.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
 
 
 class Command(NamedTuple):
-    """A command without verbs. ``interrupted`` is the exit status at Ctrl-C, ``misuse_status`` that of a usage error."""
+    """A command without verbs. ``interrupted`` is the exit status after Ctrl-C, ``misuse_status`` that of a usage error."""
 
     name: str
     parser: Callable[[], Parser]
@@ -46,10 +46,10 @@ class Command(NamedTuple):
 
 
 class Verb(NamedTuple):
-    """One verb of a family: its name, one line of help, its parser, and the function that is given what it parsed.
+    """One verb of a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
 
-    In a family that is a node, the function takes ``arguments``, the remapping arguments, besides. ``wording`` has ROS's
-    words for errors of this verb.
+    In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` has ROS's
+    messages for errors of this verb.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Verb(NamedTuple):
 
 
 def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB") -> Verb:
-    """Return a verb that is in another module, imported when the verb is used: the others of its family start without it."""
+    """Return a verb whose module is imported when the verb is used, so that the family's other verbs start without it."""
 
     def verb() -> Verb:
         found: Verb = getattr(import_module(module), attribute)
@@ -79,11 +79,11 @@ class HelpStatus(NamedTuple):
 
 
 class Family(NamedTuple):
-    """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is.
+    """A command and its verbs. ``headline`` describes the command, ``footer`` refers to further help.
 
     A verb may be a family itself. ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic"
-    args="pub ..."/>`), with `__name:=` and remappings among its words. ``interrupted``: the exit status at Ctrl-C.
-    ``wording``: ROS's words for errors. ``shows_help_on_error``: an unknown verb prints the help on stdout, too.
+    args="pub ..."/>`), with `__name:=` and remappings among its arguments. ``interrupted``: the exit status after Ctrl-C.
+    ``wording``: ROS's messages for errors. ``shows_help_on_error``: an unknown verb prints the help on stdout, too.
     """
 
     name: str
@@ -98,20 +98,20 @@ class Family(NamedTuple):
     shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the verb that was typed; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the given verb; return the exit status as :func:`minirospy.command.command.run` does."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 
     def verb_name(self, verb: Verb | Family) -> str:
-        """Return what is typed for a verb."""
+        """Return a verb's full name as typed by the user."""
         return verb.name.removeprefix(f"{self.name} ")
 
     def find(self, name: str) -> Verb | Family | None:
-        """Return the verb that is called ``name``."""
+        """Return the verb called ``name``."""
         return next((verb for verb in self.verbs if self.verb_name(verb) == name), None)
 
     def help(self) -> str:
-        """Return what `-h` prints."""
+        """Return the output of `-h`."""
         lines = [self.headline, ""] if self.headline else []
         lines.append("Commands:")
         lines += [f"\t{self.name} {self.verb_name(verb)}\t{verb.summary}" for verb in self.verbs]
@@ -153,7 +153,7 @@ class Family(NamedTuple):
 def _call(
     parser: Parser, body: Callable[..., int | None], words: Sequence[str], **others: object
 ) -> int | None:
-    """Parse ``words`` and call ``body`` with what they say."""
+    """Parse ``words`` and call ``body`` with the arguments."""
     options = parser.parse(words)
     try:
         return body(**options, **others)

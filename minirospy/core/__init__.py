@@ -1,1 +1,1 @@
-"""The pure rooms: bytes, specs and tables in, values and actions out; no socket, loop or thread."""
+"""The pure packages: bytes, specs and tables in, values and actions out; no sockets, event loops or threads."""

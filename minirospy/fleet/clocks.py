@@ -1,4 +1,4 @@
-"""How far a peer's clock is from ours, by its answers, and how long messages take. Pure. Times in nanoseconds."""
+"""Estimate a peer's clock offset from its answers, and measure message delays. Pure. Times in nanoseconds."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 __all__ = ["ClockOffset", "Delay", "Ping", "offset_of"]
 
-_SHARE = 0.1
-"""What one message counts in the mean delay."""
+_SHARE = 0.1  # weight of a new message in the mean delay
 
 
 class Ping(NamedTuple):
-    """A request that we sent and whose answer we received by our clock, and the peer's time in its answer."""
+    """A request and its answer: when it was sent and received, by the local clock, and the peer's time in the answer."""
 
     sent: int
     theirs: int
@@ -21,7 +20,7 @@ class Ping(NamedTuple):
 
 
 class ClockOffset(NamedTuple):
-    """What to subtract from the peer's times to get ours, and the round trip: the offset is right within its half."""
+    """Subtract ``offset`` from the peer's times to get local times. The offset is exact to half the round trip."""
 
     offset: int
     round_trip: int
@@ -29,14 +28,14 @@ class ClockOffset(NamedTuple):
 
 @dataclass
 class Delay:
-    """The delays of a topic's messages: the mean, in which new ones count more, and the longest."""
+    """The delays of a topic's messages: an exponentially weighted mean, and the maximum."""
 
     mean: float = 0.0
     longest: int = 0
     count: int = 0
 
     def add(self, delay: int) -> None:
-        """Count a message; an offset that is not exact may give a delay below zero, which is none."""
+        """Record a message's delay; a negative one, which comes from an inexact offset, counts as 0."""
         delay = max(0, delay)
         self.mean = delay if not self.count else self.mean + _SHARE * (delay - self.mean)
         self.longest = max(self.longest, delay)
@@ -44,7 +43,7 @@ class Delay:
 
 
 def offset_of(pings: Iterable[Ping]) -> ClockOffset | None:
-    """Return the peer's offset by the fastest answer, which waited least; None without an answer."""
+    """Return the peer's offset, from the answer with the shortest round trip; None without an answer."""
     best = min(pings, key=lambda ping: ping.received - ping.sent, default=None)
     if best is None:
         return None

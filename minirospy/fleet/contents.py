@@ -1,7 +1,7 @@
-"""What the fleet has, by the tokens that are there: robots, their gateways, topics and services. Pure.
+"""The contents of the fleet, from its liveliness tokens: robots, their gateways, topics and services. Pure.
 
-Tokens come and go one by one and in any order, those of a robot before its claim too. What is too much, or not of the form of
-:mod:`minirospy.fleet.keys`, is left out and counted.
+Tokens arrive and disappear one by one and in any order; a robot's other tokens may come before its claim. Tokens
+that exceed the limits, or do not have the form of :mod:`minirospy.fleet.keys`, are ignored and counted.
 """
 
 from __future__ import annotations
@@ -20,15 +20,13 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000
-"""Topics, and as many services, that one gateway may announce."""
-MAX_TOKENS = 200_000
-"""Topics and services of all gateways together: some 100 MiB."""
+MAX_NAMES = 2_000  # topics that one gateway may announce, and the same number of services
+MAX_TOKENS = 200_000  # topics and services of all gateways together: some 100 MiB
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that others see. ``duplicates``: claims to its name that do not count."""
+    """A robot that is visible to others. ``duplicates``: other claims to its name, which are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -37,7 +35,7 @@ class Robot:
 
 
 class Refused(NamedTuple):
-    """A gateway that is not shown: ``holder`` has the name, or had it until a moment ago."""
+    """A gateway that is not shown. ``holder``: the claim that holds the name, or held it until recently."""
 
     claim: Claim
     holder: Claim | None
@@ -46,8 +44,7 @@ class Refused(NamedTuple):
 @dataclass(eq=False)
 class _Gateway:
     claim: Claim | None = None
-    order: int = 0
-    """When the claim was seen: later claims have larger numbers."""
+    order: int = 0  # order in which claims were seen: later ones have larger numbers
     topics: dict[str, TopicToken] = field(default_factory=dict)
     services: dict[str, ServiceToken] = field(default_factory=dict)
 
@@ -57,17 +54,15 @@ class _Gateway:
 
 
 class FleetContents:
-    """The tokens that are there."""
+    """The tokens that exist now."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
-        """``allows(robot)``: which robots are of interest. ``clock`` returns seconds that never go back."""
+        """``allows(robot)`` returns whether a robot is of interest. ``clock`` returns monotonic seconds."""
         self.holders = Holders(clock)
         self.waiting: tuple[Refused, ...] = ()
-        """The gateways that :meth:`robots` has left out, because another one has their name."""
-        self.refused = 0
-        """How many tokens were left out."""
-        self.refusal = ""
-        """Why the last of these was."""
+        """The gateways that :meth:`robots` left out because another one holds their name."""
+        self.refused = 0  # tokens that were ignored
+        self.refusal = ""  # reason for the last of these
         self._count = 0
         self._allows = allows
         self._orders = itertools.count()
@@ -88,7 +83,7 @@ class FleetContents:
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
             if gateway.claim not in (None, token):
-                # A gateway declares one claim as long as it runs: the second one is another peer's.
+                # A gateway declares one claim while it runs: a second, different claim comes from another peer.
                 return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
             changed = gateway.claim is None
             if changed:
@@ -97,7 +92,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Not one whose only name was left out: nothing would remove it.
+        # Do not store a gateway whose only name was refused: nothing would remove it.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed
@@ -112,7 +107,7 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # A topic whose flags have changed has a new token already when the old one goes.
+        # If a topic's flags change, its new token arrives before the old one is removed.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False
@@ -133,11 +128,11 @@ class FleetContents:
 
     @property
     def gateways(self) -> set[str]:
-        """The gateways that have tokens."""
+        """Return the gateways that have tokens."""
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return the robots by name, each as the gateway that holds its name announces it; ``lost`` ones do not count."""
+        """Return the robots by name, each as announced by the gateway that holds its name; ignore ``lost`` gateways."""
         there = [
             (gateway.order, gateway.claim)
             for gateway in self._gateways.values()

@@ -1,4 +1,4 @@
-"""The full texts of message types, from packages, publishers and peers; a peer's is checked against its md5sum."""
+"""The full definitions of message types, from packages, publishers and peers; a peer's is checked against its md5sum."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 _SECONDS = 10.0
-MAX_CHARACTERS = 64 << 20  # of all texts that are kept; those of ROS's own packages have 3 million together
-MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # at a time; one that is not answered takes _SECONDS
+MAX_CHARACTERS = 64 << 20  # in all cached definitions; those of ROS's own packages have 3 million
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered one times out after _SECONDS
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
 def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full text. Raise DefinitionError if it is not that of the md5sum, or not one at all."""
+    """Return the specs in a full definition. Raise DefinitionError if it is invalid or does not have this md5sum."""
     specs, found = checked_text(name, text)
     if found != md5sum:
         raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
@@ -36,7 +36,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """The types that this gateway knows. Makes no class of them: messages stay bytes."""
+    """The types that this gateway knows. Generates no message classes: messages stay bytes."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -44,13 +44,13 @@ class Definitions:
         self._known: dict[tuple[str, str], str] = {}
         self._known_characters = 0
         self._finding: dict[tuple[str, str, str], asyncio.Task[str]] = {}
-        """The queries that are under way, by type, md5sum and gateway."""
+        """The running queries, by type, md5sum and gateway."""
         self._shares: WeakValueDictionary[str, asyncio.Semaphore] = WeakValueDictionary()
         self._querying = asyncio.Semaphore(MAX_QUERIES)
         self._rewriters: dict[tuple[str, str], FrameRewriter | None] = {}
 
     async def close(self) -> None:
-        """End what is under way."""
+        """Cancel the running queries."""
         tasks = list(self._finding.values())
         for task in tasks:
             task.cancel()
@@ -58,7 +58,7 @@ class Definitions:
         await self.texts.close()
 
     def learn(self, name: str, md5sum: str, text: str) -> None:
-        """Keep the text that a publisher's connection header has."""
+        """Store the definition from a publisher's connection header."""
         if not text or (name, md5sum) in self._known or len(self._known) >= _MOST:
             return
         if self._known_characters + len(text) <= MAX_CHARACTERS:
@@ -66,12 +66,12 @@ class Definitions:
             self._known_characters += len(text)
 
     async def md5sum(self, name: str) -> str:
-        """Return the md5sum of an installed type, "" where it is not installed."""
+        """Return the md5sum of an installed type, "" if it is not installed."""
         found = await self.texts.installed(name)
         return found.md5sum if found else ""
 
     async def text(self, name: str, md5sum: str) -> str:
-        """Return the text that this gateway has of a type, "" without one."""
+        """Return the locally known definition of a type, "" if there is none."""
         if (name, md5sum) not in self._known:
             installed = await self.texts.installed(name)
             if installed is None or installed.md5sum != md5sum:
@@ -80,10 +80,13 @@ class Definitions:
         return self._known.get((name, md5sum), "")
 
     async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
-        """Return a type, with its text where it is known here or to a gateway ("": none); without it messages pass, too."""
+        """Return a type, with its definition if it is known here or to ``gateway`` ("" for none).
+
+        Messages pass without one, too.
+        """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Each gateway is queried for itself: one that answers nothing delays no other one's topics.
+            # Each gateway is queried separately, so one that does not answer delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -93,7 +96,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return what rewrites the frame ids of a type; None if it has none, or its text is not known."""
+        """Return the rewriter for a type's frame ids; None if the type has none, or its definition is not known."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)
@@ -113,7 +116,7 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Its own share first: a gateway that answers nothing leaves the places of the others free.
+            # Acquire the gateway's own share first: a gateway that does not answer cannot use up all query slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]

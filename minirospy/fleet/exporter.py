@@ -1,4 +1,4 @@
-"""A robot's side: its graph is announced, topics that somebody wants are sent, messages and calls for it are passed on."""
+"""The robot half of a gateway: announces the robot's graph, sends topics that have readers, and delivers messages and calls."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 _MAX_WANTED, _MAX_READERS = 10_000, 1_000
-"""Topics that readers may want, and readers of each, which peers choose."""
+"""Topics that readers may request, and readers per topic; peers choose both."""
 
 
 class Exporter:
-    """Shows one robot's graph to the fleet. All on the node's loop."""
+    """Shows one robot's graph to the fleet. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of robots whose topics are here as their copies."""
+        """``hidden``: names of other robots whose topics are imported here, and not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -80,7 +80,7 @@ class Exporter:
         self._declared: list[Deferred] = []
 
     async def start(self) -> None:
-        """Announce the robot until :meth:`close`. Raise MasterUnreachableError, RpcError."""
+        """Announce the robot until :meth:`close`. Raise MasterUnreachableError or RpcError."""
         await self.look()
         network, ends = self._network, f"{self.claim.name}/{self.claim.gateway}"
         self._declared = [
@@ -97,7 +97,7 @@ class Exporter:
         )
 
     async def close(self) -> None:
-        """Withdraw all. Idempotent."""
+        """Withdraw all announcements. Idempotent."""
         watching, self._watching = self._watching, None
         if watching:
             watching.cancel()
@@ -113,7 +113,7 @@ class Exporter:
         self.outbound, self.inbound = {}, {}
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
+        """Announce the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
         changed = await self.graph.look()
         self._announce()
         await self._adjust()
@@ -124,7 +124,7 @@ class Exporter:
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
         keys |= {service_key(each) for each in self.graph.services.values()}
-        # New ones first: a topic whose flags have changed is never without a token.
+        # Declare new tokens before old ones are removed: a topic whose flags have changed always has a token.
         for key in keys - self._tokens.keys():
             self._tokens[key] = self._network.declare_token(key)
         for key in self._tokens.keys() - keys:
@@ -181,8 +181,8 @@ class Exporter:
             )
 
     async def _adjust(self) -> None:
-        """Open and close what is sent, and what is published here, as the graph and the wants are."""
-        # Closing waits for the master: other calls of this method run meanwhile, and change both tables.
+        """Open and close outbound and inbound topics to match the graph and the readers' requests."""
+        # Closing awaits the master: other calls of this method run meanwhile and change both tables.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -215,7 +215,7 @@ class Exporter:
     # --- messages, calls and questions of others
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for what comes to a topic, which must be subscribed here."""
+        """Return the publisher for messages that arrive for a topic; the topic must have subscribers here."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:
@@ -230,7 +230,7 @@ class Exporter:
         return inbound
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Take a message for this robot. In a thread of Zenoh's."""
+        """Queue a message for this robot. Runs in a thread of Zenoh's."""
         parsed = parse_in(key)
         token = self.graph.topics.get(parsed[0]) if parsed else None
         if parsed is None or token is None or not token.is_subscribed:
@@ -243,7 +243,7 @@ class Exporter:
             )
 
     def _deliver(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
-        """Publish a message. In the receiver's thread."""
+        """Publish a message. Runs in the receiver's thread."""
         inbound = self.inbound.get(topic)
         if inbound is None or not inbound.publish(md5sum, body):
             run_on_loop(self._node, self._hold(topic, md5sum, writer, body))
@@ -275,7 +275,7 @@ class Exporter:
         return json.dumps(value, default=str).encode()
 
     def _allowed(self, name: str, tree: Mapping[str, object]) -> dict[str, object]:
-        """Return the part of a namespace that may be read."""
+        """Return the part of a namespace that clients may read."""
         found: dict[str, object] = {}
         for key, value in tree.items():
             full = f"{name.rstrip('/')}/{key}"

@@ -1,7 +1,7 @@
-"""Queues of messages that wait to be sent or delivered: fair between flows, newest first to survive. Pure.
+"""Fair queues of messages to send or deliver; a full flow drops its oldest messages. Pure.
 
-A flow is what belongs together: a topic at the sender, a robot's topic at the receiver. Each keeps its newest messages, and flows
-take turns, so one that floods loses only its own messages.
+A flow is the messages of one topic at the sender, or of one robot's topic at the receiver. Each flow keeps its
+newest messages, and flows are served round-robin, so one that floods loses only its own messages.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The messages of one flow that wait: at most ``most`` messages, and ``most_bytes`` where more than one waits."""
+    """The queued messages of one flow: at most ``most`` messages, and ``most_bytes`` unless there is only one message."""
 
     most: int
     most_bytes: int
@@ -29,7 +29,7 @@ class Flow(Generic[_T]):
 
 
 class FlowQueue(Generic[_T]):
-    """Flows that take turns. Not safe for threads: its owner has a lock."""
+    """Flows that are served round-robin. Not thread-safe: its owner has a lock."""
 
     def __init__(self) -> None:
         self._ready: OrderedDict[Flow[_T], None] = OrderedDict()
@@ -38,7 +38,7 @@ class FlowQueue(Generic[_T]):
         return len(self._ready)
 
     def add(self, flow: Flow[_T], item: _T, size: int) -> int:
-        """Append a message; return how many of the flow's oldest gave way."""
+        """Append a message; return how many of the flow's oldest messages were dropped."""
         flow.waiting.append((size, item))
         flow.waiting_bytes += size
         dropped = 0
@@ -52,7 +52,7 @@ class FlowQueue(Generic[_T]):
         return dropped
 
     def pop(self) -> tuple[Flow[_T], _T] | None:
-        """Return the next message, of the flow whose turn it is; None if none waits."""
+        """Return the next message and its flow, round-robin; None if the queue is empty."""
         while self._ready:
             flow, _ = self._ready.popitem(last=False)
             if not flow.waiting:
@@ -67,7 +67,7 @@ class FlowQueue(Generic[_T]):
         return None
 
     def forget(self, flow: Flow[_T]) -> None:
-        """Drop what waits of a flow that has ended."""
+        """Drop the queued messages of a closed flow."""
         flow.waiting.clear()
         flow.waiting_bytes = 0
         self._ready.pop(flow, None)

@@ -1,7 +1,7 @@
-"""Frame ids with a robot's prefix, changed in the bytes of messages: ``base_link`` <-> ``robot1/base_link``. Pure.
+"""Add and remove a robot's prefix in the frame ids of serialized messages: ``base_link`` <-> ``robot1/base_link``. Pure.
 
-Frame ids are ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. What comes after the last of them is
-copied as it is, so an image costs one copy.
+Frame ids are the ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. The bytes after the last of
+them are copied unchanged, so an image costs one copy.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """Fixed bytes."""
+    """A number of fixed bytes to skip."""
 
     size: int
 
 
 class _Text(NamedTuple):
-    """A string; ``is_frame``: it is a frame id."""
+    """A string field; ``is_frame``: it is a frame id."""
 
     is_frame: bool
 
 
 class _Array(NamedTuple):
-    """So many times ``steps``; ``length`` None: as many as the number in front says."""
+    """An array: ``steps`` for each element; ``length`` is None if the message contains the length."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -46,30 +46,30 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Raise what ``lookup`` raises, DefinitionError."""
+        """Raise DefinitionError, or an error from ``lookup``."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property
     def has_frames(self) -> bool:
-        """Return whether messages of the type have frame ids at all."""
+        """Return whether messages of the type contain frame ids."""
         return bool(self._steps)
 
     def rewritten(self, data: bytes | memoryview, change: Callable[[bytes], bytes]) -> bytes:
-        """Return a message with ``change`` of each frame id. Raise DeserializationError if it ends too early."""
+        """Return a message with ``change`` applied to each frame id. Raise DeserializationError if the message is too short."""
         data = bytes(data)
         if not self._steps:
             return data
         pieces: list[bytes] = []
         try:
             copied, _ = _run(self._steps, data, 0, 0, change, pieces)
-        except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
+        except (struct.error, OverflowError) as error:  # OverflowError: an offset that does not fit 32 bits
             raise DeserializationError("the message ends too early") from error
         pieces.append(data[copied:])
         return b"".join(pieces)
 
 
 def prefixed(prefix: str) -> Callable[[bytes], bytes]:
-    """Return the change of ``base_link`` into ``robot1/base_link``; what has the prefix, and the empty id, stay."""
+    """Return a function that changes ``base_link`` into ``robot1/base_link``; prefixed and empty ids stay unchanged."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:
@@ -80,7 +80,7 @@ def prefixed(prefix: str) -> Callable[[bytes], bytes]:
 
 
 def stripped(prefix: str) -> Callable[[bytes], bytes]:
-    """Return the change of ``robot1/base_link`` into ``base_link``; other ids stay."""
+    """Return a function that changes ``robot1/base_link`` into ``base_link``; other ids stay unchanged."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:
@@ -146,7 +146,7 @@ def _run(
     change: Callable[[bytes], bytes],
     pieces: list[bytes],
 ) -> tuple[int, int]:
-    """Walk over ``data`` from ``at``; return up to where ``pieces`` has its copy, and where the steps end."""
+    """Process ``data`` from ``at``; return the offset up to which ``pieces`` has a copy, and the offset after the steps."""
     for step in steps:
         if isinstance(step, _Skip):
             at += step.size
@@ -168,7 +168,7 @@ def _run(
                 case ():
                     pass
                 case inner:
-                    # Each has a length of four bytes at least.
+                    # Each element has a length prefix of four bytes, so it takes at least four bytes.
                     if count * 4 > len(data) - at or count > _MAX_ELEMENTS:
                         raise DeserializationError(f"an array of {count} elements is longer than the message")
                     for _ in range(count):

@@ -1,4 +1,4 @@
-"""A gateway: one session of Zenoh, a robot's side, a control room's side, or both."""
+"""A gateway: one Zenoh session with a robot half, a control room half, or both."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class GatewayOptions:
-    """``name``: of the robot, "" for a control room alone. ``imports``: whether the robots of the fleet are shown here.
+    """``name``: the robot's name, "" for only a control room. ``imports``: whether to show the fleet's robots here.
 
-    ``ros1_namespace``: of the keys of zenoh-bridge-ros1 that are passed, too, "" for none.
-    ``clock`` returns the time in ns, ``host`` tells machines apart ("" for this one's own): tests have others.
+    ``ros1_namespace``: the namespace of the keys of zenoh-bridge-ros1 to pass as well, "" for none.
+    ``clock`` returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
     """
 
     name: str = ""
@@ -52,10 +52,10 @@ class GatewayOptions:
 
 
 class Gateway:
-    """Passes topics and services between a master and the fleet. On the loop of its node."""
+    """Passes topics and services between a master and the fleet. Runs on its node's loop."""
 
     def __init__(self, node: Node, options: GatewayOptions) -> None:
-        """Raise BridgeError on a name that a robot may not have."""
+        """Raise BridgeError if the name is not legal for a robot."""
         if options.name and not is_robot_name(options.name):
             raise BridgeError(
                 f"[{options.name}] cannot be a robot's name: letters, digits and underscores, a letter first"
@@ -79,17 +79,17 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session, which waits for a router where one is to be there. Needs no started node. Raise BridgeError."""
+        """Open the session; wait for the router if one is configured. The node need not be started. Raise BridgeError."""
         if self.network is None:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet unless :meth:`connect` has, and pass on until :meth:`close`.
+        """Connect to the fleet unless :meth:`connect` has, and pass topics and services until :meth:`close`.
 
-        Raise BridgeError, MasterUnreachableError, RpcError, ROSInterruptException if the node is shut down before.
+        Raise BridgeError, MasterUnreachableError or RpcError, or ROSInterruptException if the node is shut down before that.
         """
         options = self.options
-        # A thousand robots have thousands of topics: a master that does not register them is one line.
+        # A thousand robots have thousands of topics: if the master fails to register them, log one line.
         self.node.registration_faults = RateLimitedLogger(self.node.log)
         await self._wait_for_network()
         network = self.network
@@ -171,7 +171,7 @@ class Gateway:
             self._receiver.close()
 
     def status(self) -> dict[str, object]:
-        """Return what this gateway is, and what it has passed; all of it numbers, texts and lists, for JSON."""
+        """Return this gateway's configuration and counters, in types that JSON can represent."""
         found: dict[str, object] = {
             "name": self.options.name,
             "gateway": self.id,
@@ -229,7 +229,7 @@ class Gateway:
         return found
 
     async def _wait_for_network(self) -> None:
-        """Open the session, unless the node is shut down before there is one."""
+        """Open the session. Raise ROSInterruptException if the node is shut down first."""
         opening = asyncio.ensure_future(self.connect())
         ending = asyncio.ensure_future(self.node.spin())
         try:
@@ -243,7 +243,7 @@ class Gateway:
             await asyncio.gather(opening, ending, return_exceptions=True)
 
     def _hidden(self) -> list[str]:
-        """Return the names of the robots whose topics are here as their copies."""
+        """Return the names of the robots whose topics are imported here."""
         return self.importer.names if self.importer else []
 
     async def _pong(self, _: str, __: bytes) -> bytes:
@@ -263,7 +263,7 @@ class Gateway:
         return text.encode()
 
     def _spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
-        """Run a coroutine until :meth:`close`; what it raises is logged."""
+        """Run a coroutine as a task until :meth:`close`; log its exception."""
 
         async def guarded() -> None:
             try:
@@ -276,7 +276,7 @@ class Gateway:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # A task that is cancelled before its first step has not started the work.
+        # A task that is cancelled before its first step has not started the coroutine: close it.
         task.add_done_callback(lambda _: work.close())
         return task
 

@@ -1,8 +1,8 @@
-"""Which gateway speaks for a robot if several claim its name: the one that was seen here first, or the operator's choice. Pure.
+"""Choose the gateway that represents a robot if several claim its name: the first one seen, or the operator's choice. Pure.
 
-No clock of a peer decides. A machine that holds a name keeps it until it has been gone for :data:`HOLD_SECONDS`, so that
-another machine cannot take the name while a link is down for a moment. A gateway of the same machine, such as one that was
-started again, follows immediately.
+Peers' clocks do not decide. A machine that holds a name keeps it until it has been gone for :data:`HOLD_SECONDS`, so that
+another machine cannot claim the name during a short loss of the link. A gateway on the same machine, such as one that was
+restarted, replaces it immediately.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # Zenoh's default lease: a link that is silent for longer is lost
-MAX_HOLDS = 5_000  # names of robots that are gone, kept for HOLD_SECONDS; peers choose names
+HOLD_SECONDS = 10.0  # Zenoh's default lease: a link that is silent for longer is closed
+MAX_HOLDS = 5_000  # names of robots that have left, kept for HOLD_SECONDS; peers choose names
 
 
 @dataclass
 class _Hold:
     claim: Claim
     left: float | None = None
-    """When the gateway left, in seconds of the clock; None while it is there."""
+    """When the gateway left, in seconds of the clock; None while it is present."""
 
 
 class Holders:
-    """Chooses among the claims to each name, and remembers which one was chosen."""
+    """Chooses among the claims to each name, and remembers the choice."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """``clock`` returns seconds that never go back."""
+        """``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
-        """The machine that the operator has chosen for a robot, by the robot's name."""
+        """The machine that the operator has chosen for each robot, by the robot's name."""
         self._clock = clock
         self._holds: dict[str, _Hold] = {}
         self._given_up: set[Claim] = set()
 
     def give_up(self, claim: Claim) -> None:
-        """Let another gateway of the same machine follow: this one does not answer, though its token is still there."""
+        """Release a claim to other gateways of its machine: its gateway does not answer, though its token still exists."""
         self._given_up.add(claim)
 
     def holder(self, name: str) -> Claim | None:
@@ -46,7 +46,7 @@ class Holders:
         return hold.claim if hold else None
 
     def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
-        """Return the claim that counts, of those that are there in the order in which they were seen; None if none may."""
+        """Return the claim to use from those present, in the order in which they were seen; None if no claim is allowed."""
         present = [claim for claim in claims if claim not in self._given_up] or list(claims)
         machine = self.machines.get(name)
         if machine:
@@ -69,7 +69,7 @@ class Holders:
         return self._hold(name, present)
 
     def forget(self, present: Collection[str]) -> None:
-        """Forget the names whose holders have left for good; ``present``: the names that gateways still claim."""
+        """Forget the names whose holders left more than HOLD_SECONDS ago; ``present``: the names that are still claimed."""
         now = self._clock()
         for name in self._holds.keys() - present:
             hold = self._holds[name]
@@ -83,7 +83,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return in how many seconds the first of these names is free; None if none of them is held by one that has left."""
+        """Return the seconds until the first of these names is free; None if no holder of them has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names
@@ -99,7 +99,7 @@ class Holders:
 
 
 def parse_machines(value: object) -> dict[str, str]:
-    """Return the operator's choices in a parameter's value, machines by names of robots; leave out what is none."""
+    """Return the operator's choices from a parameter's value, machines by robot name; ignore invalid entries."""
     if not isinstance(value, dict):
         return {}
     return {str(name): machine for name, machine in value.items() if is_machine(machine)}

@@ -1,4 +1,4 @@
-"""A robot's topic in the local graph: published here while somebody subscribes, and the other way round."""
+"""A robot's topic in the local graph: published while it has subscribers here, offered while it has publishers here."""
 
 from __future__ import annotations
 
@@ -48,14 +48,12 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-MAX_REGISTERING = (
-    50  # topics that are registered at a time: each is a call of the master, on a connection of its own
-)
+MAX_REGISTERING = 50  # topics registered at a time: each is a call to the master, on its own connection
 
 
 @dataclass
 class Shared:
-    """What all imported topics use."""
+    """The objects that all imported topics share."""
 
     node: Node
     network: FleetNetwork
@@ -73,10 +71,10 @@ class Shared:
 
 
 class ImportedTopic:
-    """One topic of one robot. On the loop, but for messages."""
+    """One topic of one robot. Runs on the loop, except for messages."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
-        """``offset()``: how far the robot's clock is from ours, where that has been measured."""
+        """``offset()`` returns the offset of the robot's clock, None before it has been measured."""
         self.token = token
         is_global = token.has_frames and token.topic in _FRAME_TOPICS
         self.name = token.topic if is_global else f"/{token.robot}{token.topic}"
@@ -100,22 +98,22 @@ class ImportedTopic:
 
     @property
     def is_open(self) -> bool:
-        """Return whether messages are passed from the robot."""
+        """Return whether messages from the robot are being passed."""
         return bool(self._wanted)
 
     @property
     def needs_snapshot(self) -> bool:
-        """Return whether only the local graph says if others publish the topic: this gateway does so itself."""
+        """Return whether only the local graph shows that others publish the topic, because this gateway publishes it itself."""
         return self.token.is_subscribed and self.token.is_published and not self._is_global
 
     @property
     def dropped(self) -> int:
-        """Messages from the robot that gave way to newer ones here, because the local subscribers were slower."""
+        """Return how many messages from the robot were dropped here because the local subscribers were slower."""
         return self._flow.dropped
 
     @property
     def outflow(self) -> Outflow | None:
-        """What goes to the robot."""
+        """Return the flow of messages to the robot."""
         return self._outflow
 
     def start(self) -> None:
@@ -123,7 +121,7 @@ class ImportedTopic:
         self._shared.spawn(self._open())
 
     def update(self, token: TopicToken) -> bool:
-        """Take over a token that has changed; False if the topic has to be made again."""
+        """Apply a changed token; return False if the topic must be closed and created again."""
         before, self.token = self.token, token
         if token == before:
             return True
@@ -140,7 +138,7 @@ class ImportedTopic:
         return True
 
     def look(self, snapshot: Snapshot | None) -> None:
-        """Follow the local graph."""
+        """Update from the local graph."""
         if self._is_closed:
             return
         if self.needs_snapshot and snapshot is not None:
@@ -174,7 +172,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # So many at a time: the master answers a thousand robots' eight thousand calls one by one.
+            # Limited: the master answers the 8,000 calls for a thousand robots one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await asyncio.wait([handle._registration])
@@ -200,7 +198,7 @@ class ImportedTopic:
     # --- from the robot
 
     def _links_changed(self) -> None:
-        """Want the topic while others than this node subscribe to it here."""
+        """Request the topic from the robot while nodes other than this one subscribe to it here."""
         publisher = self._publisher
         if publisher is None or self._is_closed:
             return
@@ -218,7 +216,7 @@ class ImportedTopic:
         shared, token = self._shared, self.token
         ends = token.robot, token.gateway
         network = shared.network
-        # The token last: the robot sends as soon as it is there.
+        # Declare the token last: the robot starts sending as soon as it appears.
         self._wanted = [
             network.subscribe(out_key(*ends, token.md5sum, token.topic), self._arrived),
             network.subscribe(replay_key(*ends, token.md5sum, token.topic, shared.gateway), self._arrived),
@@ -234,11 +232,12 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # The robot sends it again to the next subscriber: what is kept here may be old by then.
+            # The robot sends its latched message again to the next subscriber; the copy kept here may be outdated by
+            # then.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Take a message. In a thread of Zenoh's."""
+        """Queue a message. Runs in a thread of Zenoh's."""
         if len(message) > _MAX_MESSAGE:
             self._misfits.error(
                 "a message on %s of %d bytes is left out: it is too large", self.name, len(message)
@@ -253,12 +252,12 @@ class ImportedTopic:
         self._publish(message)
 
     def _deliver(self, message: bytes, attachment: bytes) -> None:
-        """Publish a message here. In the receiver's thread."""
+        """Publish a message here. Runs in the receiver's thread."""
         stamp = parse_stamp(attachment)
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The number starts again where the robot has opened the topic again.
+            # The numbers restart if the robot has reopened the topic: do not count that as a loss.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -276,7 +275,7 @@ class ImportedTopic:
         except DeserializationError as error:
             self._misfits.error("a message on %s: %s", self.name, error)
         except ROSException:
-            return  # closed meanwhile
+            return  # closed during the await
 
     # --- to the robot
 
@@ -293,7 +292,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # All of it before the wait: meanwhile the topic may be subscribed to again, with another outflow.
+        # Clear all of it before the await: meanwhile the topic may be subscribed to again, with another outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None
@@ -305,7 +304,7 @@ class ImportedTopic:
             await subscription.close()
 
     def _offer(self) -> None:
-        """Offer the topic to the robot while others than this node publish it here."""
+        """Offer the topic to the robot while nodes other than this one publish it here."""
         subscription = self._subscription
         if subscription is None:
             return
@@ -330,7 +329,7 @@ class ImportedTopic:
         self._offer()
         token = self.token
         md5sum = header["md5sum"]
-        # So that a peer can request the text of a type that is installed nowhere else.
+        # Store the definition, so that a peer can request a type that is installed only here.
         self._shared.definitions.learn(token.type, md5sum, header.get("message_definition", ""))
         key = in_key(token.robot, token.gateway, md5sum, token.topic, self._shared.gateway)
         outflow.send(key, bytes(frame), always=header.get("latching") == "1")

@@ -1,4 +1,4 @@
-"""A control room's side: the robots of the fleet in the local graph, each under its name."""
+"""The control room half of a gateway: shows the fleet's robots in the local graph, each under its name."""
 
 from __future__ import annotations
 
@@ -33,29 +33,26 @@ if TYPE_CHECKING:
 __all__ = ["MACHINES", "ImportedRobot", "Importer"]
 
 MACHINES = "/fleet/machines"
-"""The parameter of the machines that the operator has chosen, by names of robots; `minirospy fleet takeover` sets it."""
+"""The parameter with the operator's choice of machine per robot name; `minirospy fleet takeover` sets it."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
 _LOOK_SECONDS = 1.0
-_AGAIN_SECONDS = 5.0
-"""After this a robot that could not be shown is tried again."""
+_AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
-_MAX_PING = 64  # bytes of an answer to a ping, which has 8
+_MAX_PING = 64  # bytes in an answer to a ping, which normally has 8
 _CALL_SECONDS = 3600.0
-_CHALLENGE_SECONDS = 2.0  # for a gateway to answer if another one of its machine claims its name
-TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # some 4 MB; links linger until then
-MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED that one robot may take
-NAMES_AT_ONCE = 100  # of a robot that are closed together: each is a task, and a call of the master
-MAX_LISTED = 5  # robots that one log line names
-LINES = 5  # log lines of one kind in ten seconds
+_CHALLENGE_SECONDS = 2.0  # for a gateway to answer after another one on its machine has claimed its name
+TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # names removed (some 4 MB) before a trim; delay, as links linger
+MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED that one robot may use
+NAMES_AT_ONCE = 100  # names of a robot that are closed at a time: each is a task, and a call to the master
+MAX_LISTED = 5  # robots named in one log line
+LINES = 5  # log lines of one kind per ten seconds
 _WARN_OFFSET = 100_000_000
-_AT_ONCE = 20
-"""Robots that are removed at a time."""
-_MAX_IMPORTED = 9_000
-"""Names that the importer registers: a master keeps 10,000 for a node."""
+_AT_ONCE = 20  # robots removed at a time
+_MAX_IMPORTED = 9_000  # names the importer registers: the master accepts at most 10,000 per node
 
 
 class ImportedRobot:
@@ -72,7 +69,7 @@ class ImportedRobot:
 
 
 class Importer:
-    """Shows the fleet's robots in the local graph. All on the node's loop, but for messages."""
+    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for messages."""
 
     def __init__(
         self,
@@ -87,7 +84,7 @@ class Importer:
         spawn: Callable[[Coroutine[object, object, None]], object],
         clock: Callable[[], int],
     ) -> None:
-        """``gateway``: the id of this gateway. ``own_name``: of the robot that it speaks for itself, "" for none."""
+        """``gateway``: the id of this gateway. ``own_name``: the name of the robot that it exports, "" for none."""
         self.robots: dict[str, ImportedRobot] = {}
         self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
         self._node = node
@@ -109,7 +106,7 @@ class Importer:
         self._clock = clock
         self._reconciling: asyncio.TimerHandle | None = None
         self._not_before = 0.0
-        """When the next look may be, in seconds of the loop's clock."""
+        """The earliest time of the next refresh, in seconds of the loop's clock."""
         self._is_reconciling = False
         self._is_full = False
         self._left_out = RateLimitedLogger(_log)
@@ -117,12 +114,11 @@ class Importer:
         self._comings = RateLimitedLogger(_log, LINES)
         self._rivals = RateLimitedLogger(_log, LINES)
         self._waiting: tuple[Refused, ...] = ()
-        """The gateways that were refused at the last look, so that each is named once."""
-        self._removed = 0
-        """Names that have been removed since memory was given back last."""
+        """The gateways that were refused at the last refresh, so that each is logged once."""
+        self._removed = 0  # names removed since memory was last returned to the system
         self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
-        """The machine of each robot that was shown last."""
+        """The machine of each robot when it was last shown."""
         self._challenging: set[str] = set()
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "showing the fleet's robots")
@@ -134,11 +130,11 @@ class Importer:
 
     @property
     def names(self) -> list[str]:
-        """The names of the robots that are shown."""
+        """Return the names of the robots that are shown."""
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`. Raise MasterUnreachableError, RpcError."""
+        """Show robots until :meth:`close`. Raise MasterUnreachableError or RpcError."""
         self._node.parameters.listeners.append(self._parameter_changed)
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
@@ -207,7 +203,7 @@ class Importer:
     # --- what is shown
 
     async def _reconcile(self) -> None:
-        """Show what the fleet has now."""
+        """Add, update and remove robots to match the fleet's contents."""
         if self._is_reconciling:
             self._reconciling = None
             self._soon(_SETTLE_SECONDS)
@@ -221,7 +217,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # While a thousand robots come, the loop has other work, too.
+            # While a thousand robots join, leave the loop time for other work.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -240,7 +236,7 @@ class Importer:
                 left.append(name)
         self._report_names(left, "left")
         for first in range(0, len(gone), _AT_ONCE):
-            # One of them that fails does not keep the others.
+            # return_exceptions: a failure of one does not affect the others.
             for error in await asyncio.gather(
                 *map(self._remove, gone[first : first + _AT_ONCE]), return_exceptions=True
             ):
@@ -258,7 +254,7 @@ class Importer:
         for name, robot in robots.items():
             known = self.robots.get(name)
             if known is None:
-                continue  # closed meanwhile
+                continue  # closed during the await
             known.robot = robot
             try:
                 await self._update(known)
@@ -267,7 +263,7 @@ class Importer:
                 self._soon(_AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:
-        """Log the robots that have joined or left, in one line."""
+        """Log the robots that have joined or left in one line."""
         if len(names) == 1:
             self._comings.info("robot [%s] has %s", names[0], what)
         elif names:
@@ -277,7 +273,7 @@ class Importer:
             self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
 
     def _report_machine(self, claim: Claim) -> None:
-        """Log that a robot's name has passed to another machine."""
+        """Log that a robot's name is now held by another machine."""
         before = self._machines.get(claim.name, claim.host)
         if before != claim.host:
             is_chosen = claim.name in self.contents.holders.machines
@@ -294,7 +290,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway that another one keeps from a name, once; check whether the other one of a machine still answers."""
+        """Log each gateway once that cannot use its name because another holds it; challenge a holder on the same machine."""
         known, self._waiting = set(self._waiting), self.contents.waiting
         for refused in self._waiting:
             claim, holder = refused
@@ -326,7 +322,7 @@ class Importer:
                 )
 
     def _challenge(self, refused: Refused) -> None:
-        """Ask the holder of a name whether it is there: its machine may have started its gateway again."""
+        """Ping the holder of a name: its gateway may have been restarted on the same machine."""
         name = refused.claim.name
         if name not in self._challenging:
             self._challenging.add(name)
@@ -397,7 +393,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Give the memory of names that have been removed back to the system, a while later: links linger until then."""
+        """Return the memory of removed names to the system after a delay, because links linger."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()
@@ -423,7 +419,8 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Zenoh ends a query with the token of the robot, which may stay for minutes.
+                # Zenoh ends a query when the robot's token disappears, which may take minutes: stop waiting when the
+                # robot has left.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")
@@ -453,7 +450,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph, where it matters: for topics that a robot both publishes and subscribes to."""
+        """Return the local graph if it is needed: if a robot both publishes and subscribes to some topic."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node._node.master)
         return None
@@ -464,7 +461,7 @@ class Importer:
                 topic.look(snapshot)
 
     async def _answering(self) -> list[str] | None:
-        """Query all gateways of the fleet; return those that answer, None if they cannot be queried."""
+        """Query all gateways of the fleet; return those that answer, None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)

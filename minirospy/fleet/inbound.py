@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to, and that others publish: published here while they do."""
+"""A topic that a robot subscribes to and others publish: published here while they publish it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MAX_OFFERS = 100
 
 
 async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes:
-    """Return the answer of a service of this master to another's request. Raise QueryFailed."""
+    """Call a service of this master for a remote client and return its response. Raise QueryFailed."""
     try:
         return await call_raw(node, token.service, token.md5sum, request)
     except ServiceException as error:
@@ -43,7 +43,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
-    """Run a coroutine on a node's loop, and wait: messages that come faster than the loop takes them stay in the receiver."""
+    """Run a coroutine on a node's loop and wait for it: if the loop is slower, messages queue in the receiver."""
     assert node._loop
     done = asyncio.run_coroutine_threadsafe(work, node._loop)
     with contextlib.suppress(Exception):
@@ -51,7 +51,7 @@ def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
 
 
 class InboundTopic:
-    """Publishes what writers send. Messages wait until the robot's subscribers are connected."""
+    """Publishes the writers' messages. Buffers them until the robot's subscribers are connected."""
 
     def __init__(
         self,
@@ -65,9 +65,9 @@ class InboundTopic:
         on_change: Callable[[], object] | None = None,
         stop_seconds: float = STOP_SECONDS,
     ) -> None:
-        """``headers``: fields for the connection header; ``on_change``: of :meth:`Node.advertise`.
+        """``headers``: extra fields for the connection header. ``on_change``: passed to :meth:`Node.advertise`.
 
-        After ``stop_seconds`` without a command a stream of velocities is followed by a zero; 0: it is not.
+        If a stream of velocities stops for ``stop_seconds``, a zero velocity is published; 0 disables this.
         """
         self.token = token
         self.passed = 0
@@ -92,7 +92,7 @@ class InboundTopic:
 
     @property
     def is_idle(self) -> bool:
-        """Return whether no writer offers the topic, nor has sent anything for a while."""
+        """Return whether no writer offers the topic and no message has arrived recently."""
         return not self._offers and time.monotonic() - self._last > _IDLE_SECONDS
 
     @property
@@ -102,7 +102,7 @@ class InboundTopic:
         return self._publisher is not None and any(peer != own for peer in self._publisher.subscribers)
 
     def offer_changed(self, offer: Offer, is_there: bool) -> None:
-        """Publish the topic while a writer offers it."""
+        """Record an offer or its withdrawal; publish the topic while a writer offers it."""
         self._last = time.monotonic()
         if not is_there:
             self._offers.discard(offer)
@@ -111,7 +111,7 @@ class InboundTopic:
             self._prepare(offer.md5sum, offer.writer)
 
     def publish(self, md5sum: str, body: bytes) -> bool:
-        """Publish a message; whether the topic is ready for it. From any thread."""
+        """Publish a message; return False if the topic is not ready for it. May be called from any thread."""
         publisher = self._publisher
         if publisher is None or not self._is_ready or md5sum != self._md5sum:
             return False
@@ -119,7 +119,7 @@ class InboundTopic:
         return True
 
     def keep(self, md5sum: str, writer: str, body: bytes) -> None:
-        """Keep a message that has come before the topic is ready. On the loop."""
+        """Buffer a message that arrived before the topic is ready. Runs on the loop."""
         if self.publish(md5sum, body):
             return
         self._prepare(md5sum, writer)
@@ -134,7 +134,7 @@ class InboundTopic:
         self._is_ready = False
         self._is_closed = True
         if self._stream:
-            with contextlib.suppress(ROSException):  # the node has ended
+            with contextlib.suppress(ROSException):  # the node is shut down
                 self._stream.close()
         if publisher:
             if self._on_change is not None and self._on_change in publisher.on_change:
@@ -142,7 +142,7 @@ class InboundTopic:
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
-        # The first writer decides, unless the type is known here: a topic has one type.
+        # A topic has one type: the first writer's, unless the type is already known here.
         if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
             return
         self._md5sum = md5sum
@@ -153,7 +153,7 @@ class InboundTopic:
         if self._strips_frames:
             self._rewriter = await self._definitions.rewriter(self.token.type, md5sum)
         if self._is_closed:
-            return  # while a peer was queried for the definition
+            return  # closed during the query for the definition
         is_latched = any(offer.is_latched for offer in self._offers)
 
         try:
@@ -174,7 +174,8 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher._wait_for_expected()
-        # What was held goes first: until then the receiver's thread hands over to `hold`, which is on this loop.
+        # Publish buffered messages first: until then the receiver's thread passes new ones to `keep`, which runs on
+        # this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

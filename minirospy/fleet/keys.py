@@ -1,23 +1,23 @@
-"""The keys of a fleet in Zenoh: what is announced, passed and requested under which key. Pure.
+"""The Zenoh keys of a fleet: what is announced, sent and queried under each key. Pure.
 
-Below the root, which wildcards of other programs do not match, each key names the robot and the gateway that speaks for it::
+Below the root, which other programs' wildcards do not match, each key names the robot and the gateway that represents it::
 
-    robot/NAME/GATEWAY/START/HOST                 token: a robot is there
-    control/NAME/GATEWAY/START/HOST               token: a control room is there
+    robot/NAME/GATEWAY/START/HOST                 token: a robot exists
+    control/NAME/GATEWAY/START/HOST               token: a control room exists
     topic/NAME/GATEWAY/TOPIC/TYPE/MD5/FLAGS       token: a topic of a robot; FLAGS of "p", "s", "l", "f"
     service/NAME/GATEWAY/SERVICE/TYPE/MD5         token: a service of a robot
     want/NAME/GATEWAY/TOPIC/READER                token: READER, a gateway, has subscribers of a topic
     offer/NAME/GATEWAY/TOPIC/WRITER/TYPE/MD5/FLAGS  token: WRITER has publishers of a topic that the robot subscribes to
-    out/NAME/GATEWAY/MD5/TOPIC                    messages of a robot
+    out/NAME/GATEWAY/MD5/TOPIC                    messages from a robot
     replay/NAME/GATEWAY/MD5/TOPIC/READER          its latched messages, for a READER that came later
     in/NAME/GATEWAY/MD5/TOPIC/WRITER              messages to a robot
     call/NAME/GATEWAY/SERVICE/MD5                 query: a service's request -> its response
-    definition/GATEWAY/TYPE/MD5                   query: the full text of a type
+    definition/GATEWAY/TYPE/MD5                   query: a type's full definition
     param/NAME/GATEWAY                            query: name -> value of a parameter
-    ping/GATEWAY, status/GATEWAY                  query: the clock; what the gateway has passed
+    ping/GATEWAY, status/GATEWAY                  query: the gateway's clock; its counters
 
-Tokens are those of Zenoh's liveliness: they end with the session that declared them. In names and types a slash is written
-``%``. Whatever does not have this form is ignored: parsers return None.
+Tokens are Zenoh's liveliness tokens: they end with the session that declared them. Slashes in names and types are written as
+``%``. Keys of any other form are ignored: parsers return None.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ __all__ = [
 ]
 
 ROOT = "@minirospy/1"
-"""The first chunk starts with ``@``: no ``**`` matches it. The second is the version of this table."""
+"""The first chunk starts with ``@``, so ``**`` does not match it. The second is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
-"""The md5sum of a topic that has subscribers only, of a type that is not installed."""
+"""The md5sum of a topic without publishers whose type is not installed."""
 
 _MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
@@ -82,9 +82,9 @@ _STAMP = struct.Struct("<Iq")
 
 
 class Claim(NamedTuple):
-    """A gateway's word that it speaks for a robot, since ``start`` (its own clock, ns), on a machine ``host``.
+    """A gateway's claim to represent a robot since ``start`` (ns, the gateway's clock), on the machine ``host``.
 
-    Neither is verified: nothing is decided by ``start``.
+    Neither field is verified; no decision depends on ``start``.
     """
 
     name: str
@@ -107,7 +107,7 @@ class TopicToken(NamedTuple):
     has_frames: bool = False
 
     def has_same_messages(self, other: TopicToken) -> bool:
-        """Return whether the topic of another token is published with the same messages: who wants one gets the other."""
+        """Return whether another token's topic carries the same messages, so that a subscriber to either receives both."""
         ends = other._replace(is_subscribed=self.is_subscribed, is_latched=self.is_latched)
         return self.is_published and ends == self
 
@@ -123,14 +123,14 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A reader that has subscribers of a topic."""
+    """A reader that has subscribers to a topic."""
 
     topic: str
     reader: str
 
 
 class Offer(NamedTuple):
-    """A writer that has publishers of a topic that the robot subscribes to."""
+    """A writer that has publishers of a topic to which the robot subscribes."""
 
     topic: str
     writer: str
@@ -140,24 +140,24 @@ class Offer(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """What goes with each message: its number on its topic, and when it was sent, by the sender's clock in ns."""
+    """A message's attachment: its number on its topic, and the time when it was sent, in ns of the sender's clock."""
 
     number: int
     nanoseconds: int
 
 
 def is_robot_name(name: str) -> bool:
-    """Return whether a robot may have this name: it becomes a namespace of ROS."""
+    """Return whether a name is legal for a robot: it becomes a ROS namespace."""
     return bool(_ROBOT.fullmatch(name))
 
 
 def is_machine(value: object) -> bool:
-    """Return whether a value identifies a machine, as the last part of a robot's token does."""
+    """Return whether a value is a valid machine id, the last part of a robot's token."""
     return isinstance(value, str) and bool(_GATEWAY.fullmatch(value))
 
 
 def is_md5(text: str) -> bool:
-    """Return whether a text is an md5sum."""
+    """Return whether a string is an md5sum."""
     return bool(_MD5.fullmatch(text))
 
 
@@ -167,13 +167,13 @@ def mangled(name: str) -> str:
 
 
 def unmangled(chunk: str) -> str | None:
-    """Return the global graph resource name of a chunk; None if it is not a legal one."""
+    """Return a chunk's global graph resource name; None if it is not legal."""
     name = chunk.replace("%", "/")
     return name if is_global_name(name) else None
 
 
 def is_global_name(name: str) -> bool:
-    """Return whether a text is a global graph resource name, not too long."""
+    """Return whether a string is a global graph resource name within the length limit."""
     return (
         len(name) <= _MAX_NAME
         and name.startswith("/")
@@ -187,12 +187,12 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's token, or a control room's (``kind`` "control"), whose name may be ``-``."""
+    """Return the key of a robot's or, with ``kind`` "control", a control room's token; a control room's name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 
 def parse_claim(key: str, kind: str = "robot") -> Claim | None:
-    """Return what a robot's or control room's token says."""
+    """Parse the key of a robot's or control room's token."""
     match _chunks(key, kind):
         case [name, gateway, start, host]:
             if not is_robot_name(name) and not (kind == "control" and name == "-"):
@@ -218,7 +218,7 @@ def topic_key(token: TopicToken) -> str:
 
 
 def parse_topic(key: str) -> TopicToken | None:
-    """Return what a topic's token says."""
+    """Parse the key of a topic's token."""
     match _chunks(key, "topic"):
         case [robot, gateway, topic, type_, md5sum, flags]:
             name = unmangled(topic)
@@ -249,7 +249,7 @@ def service_key(token: ServiceToken) -> str:
 
 
 def parse_service(key: str) -> ServiceToken | None:
-    """Return what a service's token says."""
+    """Parse the key of a service's token."""
     match _chunks(key, "service"):
         case [robot, gateway, service, type_, md5sum]:
             name = unmangled(service)
@@ -266,7 +266,7 @@ def want_key(robot: str, gateway: str, want: Want) -> str:
 
 
 def parse_want(key: str) -> Want | None:
-    """Return what a reader's token says."""
+    """Parse the key of a reader's token."""
     match _chunks(key, "want"):
         case [_, _, topic, reader]:
             name = unmangled(topic)
@@ -285,7 +285,7 @@ def offer_key(robot: str, gateway: str, offer: Offer) -> str:
 
 
 def parse_offer(key: str) -> Offer | None:
-    """Return what a writer's token says."""
+    """Parse the key of a writer's token."""
     match _chunks(key, "offer"):
         case [_, _, topic, writer, type_, md5sum, flags]:
             name = unmangled(topic)
@@ -300,22 +300,22 @@ def parse_offer(key: str) -> Offer | None:
 
 
 def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
-    """Return the key of a robot's messages."""
+    """Return the key of a robot's outgoing messages."""
     return f"{ROOT}/out/{robot}/{gateway}/{md5sum}/{mangled(topic)}"
 
 
 def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -> str:
-    """Return the key of latched messages for one reader."""
+    """Return the key of a topic's latched messages for one reader."""
     return f"{ROOT}/replay/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{reader}"
 
 
 def in_key(robot: str, gateway: str, md5sum: str, topic: str, writer: str) -> str:
-    """Return the key of messages to a robot."""
+    """Return the key of a writer's messages to a robot."""
     return f"{ROOT}/in/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{writer}"
 
 
 def parse_in(key: str) -> tuple[str, str, str] | None:
-    """Return topic, md5sum and writer of a message to a robot."""
+    """Parse the key of a message to a robot; return the topic, the md5sum and the writer."""
     match _chunks(key, "in"):
         case [_, _, md5sum, topic, writer]:
             name = unmangled(topic)
@@ -330,7 +330,7 @@ def call_key(robot: str, gateway: str, service: str, md5sum: str) -> str:
 
 
 def parse_call(key: str) -> tuple[str, str] | None:
-    """Return service and md5sum of a call."""
+    """Parse the key of a service call; return the service and the md5sum."""
     match _chunks(key, "call"):
         case [_, _, service, md5sum]:
             name = unmangled(service)
@@ -340,12 +340,12 @@ def parse_call(key: str) -> tuple[str, str] | None:
 
 
 def definition_key(gateway: str, type_: str, md5sum: str) -> str:
-    """Return the key of a type's full text."""
+    """Return the key of a type's full definition."""
     return f"{ROOT}/definition/{gateway}/{mangled(type_)}/{md5sum}"
 
 
 def parse_definition(key: str) -> tuple[str, str] | None:
-    """Return type and md5sum of a query for a full text."""
+    """Parse the key of a query for a full definition; return the type and the md5sum."""
     match _chunks(key, "definition"):
         case [_, type_, md5sum]:
             if _is_type(type_, md5sum) and md5sum != UNKNOWN_MD5:
@@ -354,17 +354,17 @@ def parse_definition(key: str) -> tuple[str, str] | None:
 
 
 def serialize_stamp(stamp: Stamp) -> bytes:
-    """Return what goes with a message."""
+    """Serialize a message's attachment."""
     return _STAMP.pack(stamp.number & 0xFFFFFFFF, stamp.nanoseconds)
 
 
 def parse_stamp(data: bytes) -> Stamp | None:
-    """Return what came with a message; None if it is not of ours."""
+    """Parse a message's attachment; return None if it is not from a minirospy gateway."""
     return Stamp._make(_STAMP.unpack(data)) if len(data) == _STAMP.size else None
 
 
 def _chunks(key: str, kind: str) -> list[str]:
-    """Return the chunks of a key after its kind; none where it is of another kind."""
+    """Return the chunks of a key after its kind; an empty list if the key is of another kind."""
     start = f"{ROOT}/{kind}/"
     return key[len(start) :].split("/") if key.startswith(start) else []
 

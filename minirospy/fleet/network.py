@@ -1,7 +1,7 @@
-"""Zenoh, behind one file: the session of a gateway, its tokens, messages and queries.
+"""The only module that calls Zenoh: a gateway's session, its tokens, messages and queries.
 
-Zenoh calls back in its own threads; what this file calls back with comes on the event loop, but for messages, which go
-to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a priority's (:mod:`sender`).
+Zenoh calls back in its own threads. This module calls its handlers on the event loop, except for messages, which go to a queue
+first. Zenoh's calls may block, so all of them run in one thread, in order, or in the thread of a priority (:mod:`sender`).
 """
 
 from __future__ import annotations
@@ -59,23 +59,22 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-MAX_TEXT = 16 << 20
-"""Bytes of a query or a reply that is read at most: a response of a service, a definition."""
-MAX_REPLIES = 10_000  # to one query: peers choose how many; a fleet has at most 5,000 gateways
-EARLY_SHARE = 0.9  # of its seconds: a query that ends before has not waited in vain, its link broke
+MAX_TEXT = 16 << 20  # bytes read of a query or a reply: a service's response or a definition
+MAX_REPLIES = 10_000  # to one query: peers choose the number; a fleet has at most 5,000 gateways
+EARLY_SHARE = 0.9  # of the timeout: a query without answers that ends before this has lost its link
 _RETRY_SECONDS = 1.0
 _LINGER_SECONDS = 2.0
 _QUERIES = 200
-"""Calls of services and parameters that are answered at the same time; more are refused."""
+"""Service calls and parameter queries answered concurrently; further ones are refused."""
 _CONTROL_QUERIES = 50
-"""The same of pings, reports and definitions, which calls that wait must not hold up."""
+"""Pings, status and definition queries answered concurrently; separate, so that blocked calls do not delay them."""
 
 
 # --- the network
 
 
 async def _remove_linger() -> None:
-    """Remove SO_LINGER from each link of Zenoh, long before its lease of 10 s ends."""
+    """Remove SO_LINGER from all Zenoh links periodically, well within their lease of 10 s."""
     remover = LingerRemover()
     while True:
         remover.look()
@@ -83,11 +82,11 @@ async def _remove_linger() -> None:
 
 
 class QueryFailed(MinirospyError):
-    """A query got no answer, or one that says why it failed."""
+    """A query got no answer, or an error as its answer."""
 
 
 class FleetNetwork:
-    """A session of Zenoh; made by :meth:`open`. Handlers are called on the loop that opened it."""
+    """A Zenoh session; created by :meth:`open`. Handlers are called on the loop that opened it."""
 
     def __init__(
         self, session: Session, loop: asyncio.AbstractEventLoop, *, has_many_links: bool = False
@@ -95,7 +94,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # One thread: what is declared first is known first on the other side.
+        # One thread keeps the order: peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(_QUERIES)
@@ -109,7 +108,7 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; ``waits``: until the other end is there. Raise BridgeError if the configuration is not right."""
+        """Open a session; with ``waits``, wait until a peer is connected. Raise BridgeError if the configuration is invalid."""
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
@@ -141,13 +140,13 @@ class FleetNetwork:
 
     @property
     def peers(self) -> int:
-        """The number of routers and gateways that this one is connected to."""
+        """Return the number of connected routers and gateways."""
         if self._is_closed:
             return 0
         return len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
 
     async def close(self) -> None:
-        """End the session, and all that it has declared. Idempotent."""
+        """Close the session with all its declarations. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -155,7 +154,7 @@ class FleetNetwork:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Of a link that is cut: the other end notices by itself.
+        # If the link is broken, undeclaring fails; the peer notices the loss by itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
@@ -163,11 +162,11 @@ class FleetNetwork:
     # --- tokens
 
     def declare_token(self, key: str) -> Deferred:
-        """Declare that something is there."""
+        """Declare a liveliness token."""
         return self._declare(lambda: self._session.liveliness().declare_token(key))
 
     def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Deferred:
-        """Call ``changed(key, is_there)`` for each token that is there, and whenever one comes or goes."""
+        """Call ``changed(key, is_there)`` for each existing token, and whenever one appears or disappears."""
         put = self._zenoh.SampleKind.PUT
 
         def arrived(sample: Sample) -> None:
@@ -180,7 +179,7 @@ class FleetNetwork:
         )
 
     async def tokens(self, pattern: str, seconds: float) -> list[str]:
-        """Return the keys of the tokens that are there."""
+        """Return the keys of the existing tokens."""
         found: list[str] = []
 
         def arrived(reply: Reply) -> bool:
@@ -198,9 +197,9 @@ class FleetNetwork:
     def subscribe(
         self, key: str, deliver: Callable[[str, bytes, bytes], object], *, from_others: bool = False
     ) -> Deferred:
-        """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block.
+        """Call ``deliver(key, message, attachment)`` for each message, in a thread of Zenoh's: it must not block.
 
-        ``from_others``: not with those of this session.
+        ``from_others``: ignore messages from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
 
@@ -218,7 +217,7 @@ class FleetNetwork:
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
     def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Deferred:
-        """Call ``changed(is_there)`` when another session subscribes to a key, and when none does any more."""
+        """Call ``changed(is_there)`` when the first other session subscribes to a key, and when the last one unsubscribes."""
 
         def declare() -> Declared:
             publisher = self._session.declare_publisher(key, **self._to_others)
@@ -232,7 +231,7 @@ class FleetNetwork:
         return self._declare(declare)
 
     def beacon(self, key: str) -> Beacon:
-        """Return what puts an empty message under a key to other sessions, that gives way to everything else."""
+        """Return a publisher of empty messages to other sessions, with the lowest priority."""
         zenoh = self._zenoh
         return Beacon(
             self._caller,
@@ -251,11 +250,11 @@ class FleetNetwork:
         return {"allowed_destination": self._zenoh.Locality.REMOTE}
 
     def outlet_to_others(self, key: str, priority: Priority) -> Outlet:
-        """Return the same that does not send to this session itself."""
+        """Return a publisher as :meth:`outlet` does, whose messages do not reach this session itself."""
         return self.outlet(key, priority, **self._to_others)
 
     def outlet(self, key: str, priority: Priority, **options: object) -> Outlet:
-        """Return a publisher, with more ``options`` of Zenoh's; may block, as its ``put``: for a priority's thread."""
+        """Return a publisher with Zenoh's ``options``. This and its ``put`` may block: call them in a priority's thread."""
         zenoh = self._zenoh
         priorities = {
             Priority.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
@@ -282,11 +281,12 @@ class FleetNetwork:
     ) -> Deferred:
         """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
 
-        ``is_control``: of the fleet itself: its handler waits for no node of a user. ``from_others``: not those of this session.
+        ``is_control``: the queries are the fleet's own, whose handler never waits for user nodes.
+        ``from_others``: ignore queries from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # A query of many keys gets the answers of each under its own.
+        # A query whose key has wildcards is answered under the key of each answerer.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -299,9 +299,9 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Return the first answer. Raise QueryFailed without any, or where it says why there is none.
+        """Return the first answer. Raise QueryFailed if there is none, or the answer is an error.
 
-        ``of_others``: of one that another session has, where several could answer.
+        ``of_others``: query only other sessions, the best match if there are several.
         """
         options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
         started = self._loop.time()
@@ -326,9 +326,9 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return the answers by their keys, ``most`` of at most ``size`` bytes; ``options`` of Zenoh's go before ours.
+        """Return the answers by key, at most ``most`` of at most ``size`` bytes; Zenoh's ``options`` override defaults.
 
-        Returns with the last one: what else answers the query, or never does, is not waited for.
+        Return as soon as ``most`` answers have arrived; do not wait for others.
         """
         found: dict[str, bytes | QueryFailed] = {}
 
@@ -357,7 +357,7 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default Zenoh keeps the answers back until the last one is there, or never comes.
+                    # By default Zenoh withholds all answers until the last one has arrived, or the timeout.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
@@ -371,7 +371,7 @@ class FleetNetwork:
     # --- within
 
     async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
-        """Start a query, and return when its last reply has arrived, or ``arrived`` returns that none is needed any more."""
+        """Start a query; return after its last reply, or as soon as ``arrived`` returns True."""
         if self._is_closed:
             raise QueryFailed("the gateway is closed")
         ended = asyncio.Event()
@@ -391,13 +391,13 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
+        """Return a handler that Zenoh calls in its own thread; by default Zenoh starts a thread for each handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Decided here: in a burst all tasks are created before the first of them runs.
+        # Check the limit here: in a burst, all tasks are created before the first of them runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
@@ -437,21 +437,21 @@ class FleetNetwork:
             query.drop()
 
     def _soon(self, function: Callable[..., object], *arguments: object) -> None:
-        """Call a function on the loop, from any thread."""
+        """Schedule a function on the loop, from any thread."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(function, *arguments)
 
 
 @dataclass(eq=False)
 class _Share:
-    """Queries of one kind that are being answered."""
+    """The concurrently answered queries of one kind, and their limit."""
 
     limit: int
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Deferred:
-    """Something that is declared in the background, and undeclared after that."""
+    """A Zenoh declaration that is made, and later undeclared, in the background."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]
@@ -463,7 +463,7 @@ class Deferred:
             caller.submit(self._declare, declare)
 
     def undeclare(self) -> None:
-        """Undeclare it, in the background. Idempotent."""
+        """Undeclare in the background. Idempotent."""
         with contextlib.suppress(RuntimeError):
             self._caller.submit(self._undeclare)
 
@@ -482,7 +482,7 @@ class Deferred:
 
 @dataclass(frozen=True)
 class _Together:
-    """Two things that are undeclared together."""
+    """Two declarations that are undeclared together."""
 
     first: Declared
     second: Declared
@@ -493,7 +493,7 @@ class _Together:
 
 
 class Beacon:
-    """A publisher of empty messages; made by :meth:`FleetNetwork.beacon`."""
+    """A publisher of empty messages; created by :meth:`FleetNetwork.beacon`."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Outlet], fault: type[Exception]
@@ -510,14 +510,14 @@ class Beacon:
         self._declared = Deferred(caller, opened, fault)
 
     def put(self) -> None:
-        """Put one, in the background; none while the one before waits."""
+        """Put an empty message in the background; skip it while the previous one is pending."""
         if not self._is_waiting:
             self._is_waiting = True
             with contextlib.suppress(RuntimeError):
                 self._caller.submit(self._put)
 
     def undeclare(self) -> None:
-        """Undeclare it, in the background. Idempotent."""
+        """Undeclare the publisher in the background. Idempotent."""
         self._declared.undeclare()
 
     def _put(self) -> None:

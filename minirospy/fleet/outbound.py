@@ -1,4 +1,4 @@
-"""A topic of a robot that somebody wants: subscribed here, sent to the fleet."""
+"""A robot's topic that has readers in the fleet: subscribed to here, sent to the fleet."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages, and its latched ones again to each reader that comes later."""
+    """Sends a topic's messages to the fleet, and its latched messages again to each later reader."""
 
     def __init__(
         self,
@@ -38,9 +38,9 @@ class OutboundTopic:
         key: str = "",
         is_left_out: Callable[[Header], bool] = lambda _: False,
     ) -> None:
-        """``key``: that of its messages, "" for the fleet's own; with one the topic may have no publisher yet.
+        """``key``: the key of its messages, "" for the fleet's own; with a key the topic may have no publisher yet.
 
-        ``is_left_out(header)``: the publishers whose messages are not sent.
+        ``is_left_out(header)`` returns whether to ignore a publisher's messages.
         """
         self.token = token
         self.outflow = outflow
@@ -67,7 +67,7 @@ class OutboundTopic:
         self.outflow.close()
 
     def replay(self, key: str) -> None:
-        """Send the latched messages again, under the key of a reader that has come later."""
+        """Send the latched messages again, under the key of a later reader."""
         self._forget_disconnected()
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)

@@ -1,8 +1,8 @@
-"""Which gateways answer, whatever Zenoh's tokens show: tokens of robots that are lost together may stay for minutes.
+"""Find gateways that no longer answer: the Zenoh tokens of robots that are lost together may remain for minutes.
 
-One query goes to all gateways, regularly, and a moment after a robot has left. One that has answered before, and does not
-twice, is lost until it answers again. One that has never answered, as where its access rights forbid it, is left alone.
-All on the node's loop.
+All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has answered before, and then
+misses two queries, is lost until it answers again. One that has never answered, for example because its access rights forbid
+it, is never considered lost. Runs on the node's loop.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Awaitable, Callable, Collection
 __all__ = ["Presence"]
 
 _REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
-"""From one check to the next; the second while a gateway is lost, which may be there again."""
+"""Interval between checks, and the shorter one while a gateway is lost, because it may have come back."""
 _SETTLE_SECONDS = 2.0
-"""Robots that are lost together leave one by one."""
+"""Wait after a robot has left: robots that are lost together disappear one by one."""
 _ROUNDS, _ROUND_SECONDS = 2, 5.0
 
 
 class Presence:
-    """Knows the gateways that do not answer."""
+    """Tracks the gateways that do not answer."""
 
     def __init__(
         self,
@@ -28,10 +28,10 @@ class Presence:
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query`` all; it returns those that answered in time, None if none could be queried.
+        """``query()`` queries all gateways and returns those that answered in time, None if it could not be sent.
 
-        ``gateways``: those that have tokens.
-        ``changed`` is called when one is lost, or there again.
+        ``gateways()`` returns those that have tokens.
+        ``changed()`` is called when a gateway is lost or has come back.
         """
         self.lost: frozenset[str] = frozenset()
         self._query = query
@@ -45,11 +45,11 @@ class Presence:
         self._answered.add(gateway)
 
     def check_soon(self) -> None:
-        """Check all a moment later: a robot has left."""
+        """Check all gateways soon, because a robot has left."""
         self._soon.set()
 
     async def watch(self) -> None:
-        """Check regularly, and soon after :meth:`check_soon`."""
+        """Check at regular intervals, and soon after :meth:`check_soon`."""
         while True:
             pause = _LOST_SECONDS if self.lost else _REGULAR_SECONDS
             waiting = asyncio.ensure_future(self._soon.wait())

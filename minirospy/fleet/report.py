@@ -1,4 +1,4 @@
-"""What `minirospy fleet status` prints: lines of what gateways answer. Pure; answers are a peer's, and checked."""
+"""Format the output of `minirospy fleet status` from the gateways' answers. Pure; answers are untrusted and checked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_LEVELS = 50
 
 @dataclass(frozen=True)
 class Answer:
-    """A gateway that is there: its claim, its answer ({} without one), and its clock."""
+    """A gateway that is present: its claim, its answer ({} if none), and its clock."""
 
     claim: Claim
     status: Json
@@ -26,7 +26,7 @@ class Answer:
 
 
 def parse_answer(data: bytes) -> Json:
-    """Return a gateway's status; {} where it is not one."""
+    """Return a gateway's status; {} if the data is not valid."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError):
@@ -35,14 +35,14 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a value of JSON is nested no deeper than so many levels: what writes it again recurses."""
+    """Return whether a JSON value is nested at most ``levels`` deep: the JSON encoder recurses."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return the lines for a person: robots, then control rooms with what is passed to each."""
+    """Return the human-readable lines: robots, then control rooms with what each receives."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -55,7 +55,7 @@ def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
 
 
 def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
-    """Return the same for programs."""
+    """Return the same data as JSON."""
 
     def described(answer: Answer, shown: bool) -> dict[str, object]:
         clock = answer.clock
@@ -79,7 +79,7 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
 
 
 def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
-    """Return whether a control room shows a gateway's robot; True if no control room shows one of this name."""
+    """Return whether a control room shows a gateway's robot; True if no control room shows a robot of this name."""
     shown = {
         _text(robot, "gateway")
         for control in controls
@@ -188,7 +188,7 @@ def _milliseconds(table: Json, key: str) -> str:
 
 
 def _text(table: Json, key: str) -> str:
-    # JSON may have half a surrogate pair, which no terminal takes.
+    # JSON may contain an unpaired surrogate, which a terminal cannot encode.
     return escaped(str(table.get(key, "?"))[:200].encode(errors="replace").decode())
 
 

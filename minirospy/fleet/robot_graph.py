@@ -1,4 +1,4 @@
-"""The graph of a gateway's own master: topics and services with ends other than gateways, and their types."""
+"""The graph of a gateway's master: topics and services that nodes other than gateways use, and their types."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ __all__ = ["RobotGraph"]
 _log = logging.getLogger(__name__)
 _MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
-"""After this the graph is announced without what is still queried for."""
+"""Timeout, after which the graph is announced without the types that are still unknown."""
 
 
 class RobotGraph:
-    """What a gateway announces of its master's graph. All on the node's loop."""
+    """The part of its master's graph that a gateway announces. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -41,12 +41,12 @@ class RobotGraph:
         hidden: Callable[[], Collection[str]],
         gateways: Callable[[Snapshot], Collection[str]] | None = None,
     ) -> None:
-        """``hidden``: names of robots whose topics are here as their copies. ``gateways``: nodes that count as this one."""
+        """``hidden``: names of robots whose topics are imported here. ``gateways``: nodes to treat as this gateway."""
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}
         self.services: dict[str, ServiceToken] = {}
         self.service_names: set[str] = set()
-        """All services of others, those that are not announced, too."""
+        """The services of all other nodes, including those that are not announced."""
         self._node = node
         self._definitions = definitions
         self._claim = claim
@@ -58,12 +58,12 @@ class RobotGraph:
         self._services = NodeQueries(self._service, reporter)
 
     async def close(self) -> None:
-        """End the queries. Idempotent."""
+        """Cancel the running queries. Idempotent."""
         await self._publishers.close()
         await self._services.close()
 
     async def look(self) -> bool:
-        """Read the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
+        """Read the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
         snapshot = await fetch(self._node._node.master)
         hidden, own = self._hidden(), {self._node.name}
         if self._gateways:
@@ -91,7 +91,7 @@ class RobotGraph:
         return changed
 
     async def watch(self, look: Callable[[], Awaitable[bool]]) -> None:
-        """Call ``look`` again and again: often while it returns that something has changed."""
+        """Poll ``look`` repeatedly, more often while it reports changes."""
         pause = _MIN_REFRESH_INTERVAL
         while True:
             await asyncio.sleep(pause)
@@ -139,7 +139,7 @@ class RobotGraph:
         )
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
-        """Learn from a publisher its type, and whether it latches."""
+        """Query a publisher for its type, and whether it latches."""
         header = await self._definitions.texts._header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")

@@ -5,10 +5,12 @@ Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ro
     HEX/MD5/NAMESPACE/NAME                               messages of a topic; queries of a service
     ros1_discovery_info/*/KIND/HEX/MD5/NAMESPACE/NAME    a beacon: some bridge has such a resource
 
-HEX is the name of the type, two hexadecimal digits a byte; NAME has no slash in front; NAMESPACE is ``*``, which meets every
-other, unless bridges are kept apart. KIND is pub, sub or srv; cl is for clients of services, which no bridge announces. A beacon
-is empty, and is put every second. While a bridge receives its own key from another, it may stop its own beacons: they say that
-somebody has the resource, not who, nor how many.
+HEX is the type name, as two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches every
+other, unless bridges are kept apart. KIND is pub, sub or srv; cl is for clients of services, which no bridge announces. A
+beacon
+is empty, and is put every second. While a bridge receives its own key from another, it may stop its own beacons: a beacon
+shows
+that some bridge has the resource, but not which one, nor how many.
 """
 
 from __future__ import annotations
@@ -39,13 +41,13 @@ __all__ = [
 ]
 
 EVERY_NAMESPACE = "*"
-PERIOD = 1.0
-"""Seconds from one beacon of a resource to the next."""
+PERIOD = 1.0  # seconds between beacons of a resource
 LOST_SECONDS = 5.0
-"""Without a beacon for so long a resource is lost: when a bridge ends, another that was silent needs up to three periods. The
-bridge itself needs 3 to 6 s."""
+"""Seconds without a beacon after which a resource is lost. When a bridge exits, another one that was silent needs up to three
+periods to resume. The bridge itself takes 3 to 6 s.
+"""
 MAX_RESOURCES = 9_000
-"""Resources of others that are known: a master keeps 10,000 names of a node."""
+"""Remote resources to track: the master accepts at most 10,000 names per node."""
 
 _ROOT = "ros1_discovery_info"
 _KINDS = ("pub", "sub", "srv", "cl")
@@ -57,7 +59,7 @@ _NAMESPACE = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 
 
 class Resource(NamedTuple):
-    """A topic that others publish ("pub") or subscribe to ("sub"), a service that they offer ("srv")."""
+    """A topic that other bridges publish ("pub") or subscribe to ("sub"), or a service that they offer ("srv")."""
 
     kind: str
     name: str
@@ -66,23 +68,23 @@ class Resource(NamedTuple):
 
 
 class SharedTopic(NamedTuple):
-    """A topic of one type. ``token``: its ends here. ``is_offered``: others publish it; ``is_wanted``: they subscribe."""
+    """A topic with one type. ``token``: its local use. ``is_offered``: others publish it; ``is_wanted``: others subscribe."""
 
     token: TopicToken
     is_offered: bool = False
     is_wanted: bool = False
 
     def has_type_of(self, other: TopicToken) -> bool:
-        """Return whether another token is of the same type."""
+        """Return whether another token has the same type."""
         return (self.token.type, self.token.md5sum) == (other.type, other.md5sum)
 
 
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return the topics of here and elsewhere by name; and by name, why others' are left out: they have another type.
+    """Return the local and remote topics by name, and the reasons why remote ones of another type are ignored, by name.
 
-    The type of here counts; of several that exist only elsewhere, the one that was first.
+    The local type wins; of several types that exist only remotely, the first.
     """
     found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
     conflicts = {}
@@ -101,7 +103,7 @@ def shared_topics(
 
 
 def parse_namespace(text: str) -> str:
-    """Return a namespace of keys. Raise BridgeError if it is not one chunk of a key."""
+    """Return a namespace for keys. Raise BridgeError if it is not a single chunk."""
     if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
         raise BridgeError(
             f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
@@ -121,12 +123,12 @@ def beacon_key(resource: Resource, namespace: str) -> str:
 
 
 def beacon_pattern(namespace: str) -> str:
-    """Return what matches the beacons that bridges of a namespace receive."""
+    """Return the key expression of the beacons that bridges of a namespace receive."""
     return f"{_ROOT}/*/*/*/*/{namespace}/*/**"
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return the resource of a beacon; None if it has no type, as a subscriber of any. Raise BridgeError with the reason."""
+    """Return a beacon's resource; None if it has no type, as for a subscriber to any type. Raise BridgeError if it is invalid."""
     if len(key) > _MAX_KEY:
         raise BridgeError(f"its key has {len(key)} characters")
     chunks = key.split("/", 6)
@@ -158,10 +160,10 @@ class _Beacon:
 
 
 class Beacons:
-    """When to put the beacons of what is here: each period, but not while others put the same."""
+    """Schedules the beacons of local resources: one per period, but none while others send the same beacon."""
 
     def __init__(self, random: Callable[[], float]) -> None:
-        """``random()`` returns a number from 0 to below 1."""
+        """``random()`` returns a number in [0, 1)."""
         self._random = random
         self._beacons: dict[str, _Beacon] = {}
 
@@ -169,18 +171,18 @@ class Beacons:
         return len(self._beacons)
 
     def update(self, keys: Iterable[str], now: float) -> None:
-        """Take over the keys of what is here now; the new ones are due."""
+        """Set the keys of the local resources; new ones are due immediately."""
         before = self._beacons
         self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
 
     def received(self, key: str) -> None:
-        """Record a beacon of another."""
+        """Record a beacon from another bridge."""
         beacon = self._beacons.get(key)
         if beacon:
             beacon.is_received = True
 
     def due(self, now: float) -> list[str]:
-        """Return the keys to put at a time in seconds."""
+        """Return the keys to put at ``now``, in seconds."""
         found = []
         for key, beacon in self._beacons.items():
             if beacon.due > now:
@@ -188,11 +190,11 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # One of those that put it goes on: which one is left to chance.
+                # Random, so that one of the bridges that put this beacon goes on.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:
-                # So that not all that were silent start together.
+                # Resume after a random delay, so that the silent bridges do not all start together.
                 beacon.is_resuming = True
                 beacon.due = now + self._random() * PERIOD
             else:
@@ -203,7 +205,7 @@ class Beacons:
 
 
 class Sightings:
-    """The resources of others whose beacons have come recently."""
+    """The remote resources whose beacons have arrived recently."""
 
     def __init__(self) -> None:
         self._seen: dict[Resource, float] = {}
@@ -220,11 +222,11 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Keep all for ``seconds`` longer, counted from ``now`` at most."""
+        """Extend the life of all resources by ``seconds``, up to a full life from ``now``."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:
-        """Forget what has had no beacon for too long; return whether there was any."""
+        """Forget the resources whose last beacon is too old; return whether there were any."""
         lost = [resource for resource, at in self._seen.items() if now - at > LOST_SECONDS]
         for resource in lost:
             del self._seen[resource]

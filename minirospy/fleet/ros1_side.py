@@ -1,4 +1,4 @@
-"""The side of zenoh-bridge-ros1: robots that run it see this master's topics and services, and this master theirs.
+"""The zenoh-bridge-ros1 half of a gateway: robots with that bridge share topics and services with this master.
 
 Names are not changed.
 """
@@ -50,10 +50,9 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""Each gateway of these keys subscribes to this topic, before all others: so those of one master know each other."""
+"""Each gateway that uses these keys subscribes to this topic first, so that gateways on one master detect each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
-_BRIDGE = "/ros1_to_zenoh_bridge"
-"""How the nodes of zenoh-bridge-ros1 itself are called by default."""
+_BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default names of zenoh-bridge-ros1's own nodes
 _AGGREGATE = "/rosout_agg"
 _BEAT_SECONDS = 0.2
 _CALL_SECONDS = 3600.0
@@ -62,7 +61,7 @@ _MAX_ERROR = 2_000
 
 
 class Ros1Side:
-    """Passes topics and services between a master and these keys. All on the node's loop, but for messages and beacons."""
+    """Passes topics and services between a master and these keys. Runs on the node's loop, except for messages and beacons."""
 
     def __init__(
         self,
@@ -77,13 +76,12 @@ class Ros1Side:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of robots whose topics are here as their copies. ``namespace``: that of the keys."""
-        # /rosout_agg has what /rosout has: passed as well, each line would come back to where it was logged.
+        """``hidden``: names of robots whose topics are imported here. ``namespace``: the namespace of the keys."""
+        # /rosout_agg repeats /rosout: if both were passed, each line would return to the master that logged it.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace
-        self.refused = 0
-        """How many beacons were left out."""
+        self.refused = 0  # beacons that were ignored
         self.topics: dict[str, Ros1Topic] = {}
         self.services: dict[str, tuple[Resource, RawService]] = {}
         self.graph = RobotGraph(
@@ -95,7 +93,7 @@ class Ros1Side:
         self._shared = Shared(node, network, definitions, sender, receiver, rules, namespace, spawn)
         self._answered: dict[ServiceToken, Deferred] = {}
         self._outlets: dict[str, Beacon] = {}
-        # Beacons come in Zenoh's threads.
+        # Beacons arrive in Zenoh's threads.
         self._lock = threading.Lock()
         self._beacons = Beacons(random.random)
         self._sightings = Sightings()
@@ -111,7 +109,7 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Pass until :meth:`close`. Raise BridgeError, MasterUnreachableError, RpcError."""
+        """Pass topics and services until :meth:`close`. Raise BridgeError, MasterUnreachableError or RpcError."""
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()
         if self._others:
@@ -129,7 +127,7 @@ class Ros1Side:
         ]
 
     async def close(self) -> None:
-        """Withdraw all. Idempotent."""
+        """Withdraw all announcements. Idempotent."""
         tasks, self._tasks = self._tasks, []
         for task in tasks:
             task.cancel()
@@ -149,15 +147,15 @@ class Ros1Side:
             await marker.close()
 
     async def look(self) -> bool:
-        """Announce the graph as it is now; return whether it has changed. Raise MasterUnreachableError, RpcError."""
+        """Announce the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
         changed = await self.graph.look()
-        # What is announced can be used already: a bridge calls and sends as soon as it receives a beacon.
+        # Open topics and services before announcing them: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()
         self._announce()
         return changed
 
     def status(self) -> dict[str, object]:
-        """Return what is passed, for JSON."""
+        """Return counters and resources, for JSON."""
         with self._lock:
             seen, announced = len(list(self._sightings)), len(self._beacons)
         return {
@@ -185,7 +183,7 @@ class Ros1Side:
     # --- what is here
 
     def _gateways(self, snapshot: Snapshot) -> set[str]:
-        """Return the nodes on this master that pass these keys: what they publish and subscribe to is not announced again."""
+        """Return this master's other gateways for these keys: what they publish and subscribe to is not announced again."""
         ends = (snapshot.publishers, snapshot.subscribers, snapshot.services)
         bridges = {
             node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
@@ -220,7 +218,7 @@ class Ros1Side:
             self._beacons.update(keys, time.monotonic())
 
     async def _beat(self) -> None:
-        """Put the beacons that are due, and follow those of others."""
+        """Put the beacons that are due, and update from the beacons of others."""
         expected = time.monotonic()
         while True:
             now = time.monotonic()
@@ -228,7 +226,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process did not run: the beacons of that time have not been delivered yet.
+                    # The process was paused: the beacons of that time have not been delivered yet.
                     self._sightings.extend(late, now)
                 has_news = self._sightings.forget_lost(now) or self._has_news
             for key in due:
@@ -240,7 +238,7 @@ class Ros1Side:
     # --- what others have
 
     def _beacon_arrived(self, key: str, _: bytes, __: bytes) -> None:
-        """Take a beacon. In a thread of Zenoh's."""
+        """Record a beacon. Runs in a thread of Zenoh's."""
         try:
             resource = parse_beacon(key)
             with self._lock:
@@ -258,7 +256,7 @@ class Ros1Side:
         return is_shown and self._rules.services(resource.name)
 
     async def _adjust(self) -> None:
-        """Pass what is here and there, as the graph and the beacons are."""
+        """Open and close topics and services to match the graph and the beacons."""
         async with self._adjusting:
             with self._lock:
                 remote, self._has_news = list(self._sightings), False
@@ -284,7 +282,7 @@ class Ros1Side:
             key = data_key(token.type, token.md5sum, token.service, self.namespace)
             self._answered[token] = self._network.answer(key, self._answerer(token), from_others=True)
 
-        # A master has one service of a name: that of this robot's own nodes.
+        # A master has one service per name: a service of a local node takes precedence.
         there = {each.name: each for each in reversed(remote) if each.kind == "srv"}
         for name, (resource, offered) in list(self.services.items()):
             if there.get(name) != resource or name in self.graph.service_names:
@@ -315,9 +313,9 @@ class Ros1Side:
 
 
 def _error_in(resource: Resource, answer: bytes) -> str:
-    """Return the text of a call's error, "" for a response: the bridge answers with either, and nothing tells them apart.
+    """Return the error text of a call's answer, "" for a response. The bridge sends either, and does not mark which.
 
-    Where the type is installed here: what is not a response of it, to the last byte, and is text.
+    If the type is installed here, an answer is an error if it is text and is not exactly one serialized response.
     """
     from minirospy.core.idl.load import get_service_class
 

@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 __all__ = ["MARK", "Ros1Topic", "Shared"]
 
 MARK = "ros1_keys"
-"""A field in the connection header of what a gateway publishes from these keys: no gateway passes it on to them."""
+"""A connection header field of publishers that a gateway creates for these keys; no gateway passes them back to the keys."""
 
 _REPLAY_SECONDS = 0.5
-"""From a subscriber's first beacon to the latched messages for it: its bridge may subscribe to the key after that."""
+"""Delay from a subscriber's first beacon to its latched messages: its bridge may subscribe to the key after the beacon."""
 _WRITER = ""
 
 
 @dataclass
 class Shared:
-    """What all topics use."""
+    """The objects that all topics share."""
 
     node: Node
     network: FleetNetwork
@@ -45,7 +45,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic of one type. On the loop, but for messages."""
+    """One topic with one type. Runs on the loop, except for messages."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -62,7 +62,7 @@ class Ros1Topic:
         self._is_closed = False
 
     async def update(self, topic: SharedTopic) -> None:
-        """Follow who is there: here, and elsewhere."""
+        """Update from the local and remote use of the topic."""
         before, self._topic = self._topic, topic
         self.token = topic.token
         if topic.is_wanted and not before.is_wanted and self.outbound:
@@ -82,7 +82,7 @@ class Ros1Topic:
             await outbound.close()
 
     async def close(self) -> None:
-        """Stop passing. Idempotent."""
+        """Stop passing messages. Idempotent."""
         self._is_closed = True
         if self._replaying:
             self._replaying.cancel()
@@ -102,11 +102,11 @@ class Ros1Topic:
         return self._topic.is_wanted or (self.token.is_published and self._is_matched)
 
     def _adjust(self) -> None:
-        """Open what is needed now, and end what needs no wait."""
+        """Open what is needed now, and close what can be closed without an await."""
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Zenoh itself says whether anybody reads: a bridge that is silent has no beacon, another program has none at all.
+        # Let Zenoh report readers: a silent bridge sends no beacons, and other programs never do.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:
@@ -160,11 +160,11 @@ class Ros1Topic:
         return self.inbound
 
     def _arrived(self, _: str, message: bytes, __: bytes) -> None:
-        """Take a message. In a thread of Zenoh's."""
+        """Queue a message. Runs in a thread of Zenoh's."""
         self._shared.receiver.add(self._flow, self._deliver, message, b"")
 
     def _deliver(self, message: bytes, _: bytes) -> None:
-        """Publish a message. In the receiver's thread."""
+        """Publish a message. Runs in the receiver's thread."""
         inbound = self.inbound
         if inbound is None or not inbound.publish(self.token.md5sum, message):
             run_on_loop(self._shared.node, self._hold(message))

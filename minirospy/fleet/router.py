@@ -1,4 +1,4 @@
-"""A router of the fleet: a session of Zenoh that passes on, until Ctrl-C or SIGTERM."""
+"""A router of the fleet: a Zenoh session that forwards traffic until Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TICK_SECONDS = 0.5
 
 
 def run_router(options: NetworkOptions, report: Callable[[str], object]) -> int:
-    """Run a router; ``report`` gets the line that says where it listens. Return the exit status. Raise BridgeError."""
+    """Run a router and return its exit status; call ``report`` with the line that names its endpoints. Raise BridgeError."""
     loop = new_event_loop()
     try:
         return loop.run_until_complete(_run(options, report))
@@ -36,7 +36,7 @@ async def _run(options: NetworkOptions, report: Callable[[str], object]) -> int:
     try:
         network = await FleetNetwork.open(options)
         report(f"router of the fleet at {', '.join(options.listen) or options.config}")
-        # On Windows a signal is noticed when the loop next wakes up.
+        # On Windows Python handles a signal only when the loop next wakes up.
         while not ended.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), _TICK_SECONDS)

@@ -1,4 +1,4 @@
-"""Which topics and services a gateway passes on, how often, and in which priority. Pure."""
+"""Which topics and services a gateway passes, at which rate and priority. Pure."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
 class Priority(IntEnum):
-    """A priority. Each has its own queue and thread, so that a slow message does not delay one of a higher priority."""
+    """A sending priority. Each has its own queue and thread, so that a slow message does not delay one of a higher priority."""
 
     TELEOP = 0
     DATA = 1
@@ -62,7 +62,7 @@ STOP_SECONDS = 0.5  # without a command before a zero is published; two commands
 
 @dataclass(frozen=True)
 class GatewayRules:
-    """What a gateway may pass on, and how.
+    """The topics and services that a gateway may pass, with rates and priorities.
 
     ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches counts.
     """
@@ -74,11 +74,10 @@ class GatewayRules:
     rates: Sequence[tuple[str, float]] = ()
     priorities: Sequence[tuple[str, Priority]] = ()
     has_frames: bool = False
-    stop_seconds: float = STOP_SECONDS
-    """A stream of velocities that comes here and ends is followed by a zero after this; 0: it is not."""
+    stop_seconds: float = STOP_SECONDS  # without a command before a zero velocity; 0 disables this
 
     def rate(self, topic: str) -> float:
-        """Return the most messages a second of a topic; 0 if it is not limited."""
+        """Return a topic's maximum rate in Hz; 0 if it is not limited."""
         return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
 
     def priority(self, topic: str, type_: str) -> Priority:
@@ -89,7 +88,7 @@ class GatewayRules:
 
 @dataclass(frozen=True)
 class Export:
-    """A topic with ends that are not gateways."""
+    """A topic that nodes other than gateways use."""
 
     topic: str
     type: str
@@ -98,17 +97,18 @@ class Export:
 
 
 class Throttle:
-    """Lets at most so many messages a second pass, evenly spaced; 0: all."""
+    """Limits messages to a rate in Hz, evenly spaced; 0 means unlimited."""
 
     def __init__(self, hertz: float) -> None:
         self._period = 1.0 / hertz if hertz else 0.0
         self._next = 0.0
 
     def allows(self, now: float) -> bool:
-        """Return whether a message may pass at a time in seconds, which does not go back."""
+        """Return whether a message may pass at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # From the time that was due, so that 30 Hz become 10 Hz and not 7.5; not from far back after a pause.
+        # Add the period to the due time, not to now, so that 30 Hz become 10 Hz and not 7.5; after a pause, restart
+        # from now.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period
@@ -116,14 +116,14 @@ class Throttle:
 
 
 def priority_of_type(type_: str) -> Priority:
-    """Return the priority of a type, for a topic that no rule names."""
+    """Return the default priority of a type, for topics without a rule."""
     if type_ in _TELEOP_TYPES:
         return Priority.TELEOP
     return Priority.BULK if type_ in _BULK_TYPES else Priority.DATA
 
 
 def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
-    """Return patterns and rates of words such as ``/camera/*=5``. Raise BridgeError."""
+    """Parse arguments such as ``/camera/*=5`` into patterns and rates. Raise BridgeError."""
     found = []
     for word in words:
         pattern, text = _halves(word, "--rate", "/camera/*=5")
@@ -138,7 +138,7 @@ def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
 
 
 def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
-    """Return patterns and priorities of words such as ``/arm/*=teleop``. Raise BridgeError."""
+    """Parse arguments such as ``/arm/*=teleop`` into patterns and priorities. Raise BridgeError."""
     names = {priority.name.lower(): priority for priority in Priority}
     found = []
     for word in words:
@@ -152,9 +152,9 @@ def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
 def exported_topics(
     snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
 ) -> dict[str, Export]:
-    """Return the topics that a robot shows to others: those with an end that is not a gateway's, of a known type.
+    """Return the topics that a robot announces: those of a known type that nodes other than gateways use.
 
-    ``own``: the nodes of gateways. ``hidden``: namespaces of what came from other robots, which is not shown again.
+    ``own``: the nodes of gateways. ``hidden``: namespaces of other robots' topics, which are not announced again.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     found = {}
@@ -172,9 +172,9 @@ def exported_topics(
 def exported_services(
     snapshot: Snapshot, own: Collection[str], allows: NameFilter, hidden: Iterable[str] = ()
 ) -> dict[str, tuple[str, ...]]:
-    """Return the services that a robot shows to others, with their nodes.
+    """Return the services that a robot announces, with their nodes.
 
-    The two services of each node's loggers are left out, unless a pattern was given.
+    Each node's two logger services are left out, unless a pattern was given.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     every = allows == NameFilter()
@@ -189,7 +189,7 @@ def exported_services(
 
 
 def is_logger_service(service: str) -> bool:
-    """Return whether a service is one of the two that each node has for its loggers."""
+    """Return whether a service is one of the two logger services that each node has."""
     return service.endswith(_LOGGER_SERVICES)
 
 

@@ -1,4 +1,4 @@
-"""Messages on their way into Zenoh, and out of it: threads with queues, so that neither side ever waits on the loop."""
+"""Threads with queues that pass messages to and from Zenoh, so that neither direction waits for the loop."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 _MAX_OUTLETS = 64
-"""Publishers of Zenoh that a flow keeps: its own, and those of readers that got latched messages, least recent first to go."""
+"""Zenoh publishers that a flow caches: its own, and those for replays of latched messages; the least recent is dropped."""
 
 
 class _Worker:
-    """A thread that takes from a queue; made when there is something to do."""
+    """A thread that processes a queue; started when the queue is not empty."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -35,7 +35,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """End the thread; one that Zenoh keeps waiting is left to end by itself. Idempotent."""
+        """Stop the thread; if it is blocked in Zenoh, do not wait for it. Idempotent."""
         with self._condition:
             self._is_closed = True
             self._condition.notify_all()
@@ -43,7 +43,7 @@ class _Worker:
             self._thread.join(_CLOSE_SECONDS)
 
     def _wake(self) -> None:
-        """Have the thread look at the queue. With the lock held."""
+        """Start or wake the thread. The caller holds the lock."""
         if self._thread is None and not self._is_closed:
             self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
             self._thread.start()
@@ -54,7 +54,7 @@ class _Worker:
 
 
 class Outflow:
-    """A topic's messages to the fleet; made by :meth:`Sender.flow`. ``send`` may be called from any thread."""
+    """The queue of a topic's messages to the fleet; created by :meth:`Sender.flow`. ``send`` may be called from any thread."""
 
     def __init__(self, worker: _PriorityWorker, priority: Priority, hertz: float, is_bare: bool) -> None:
         self.priority = priority
@@ -68,28 +68,28 @@ class Outflow:
 
     @property
     def sent(self) -> int:
-        """How many messages Zenoh has taken."""
+        """Return how many messages were passed to Zenoh."""
         return self._flow.passed
 
     @property
     def sent_bytes(self) -> int:
-        """The size of these messages."""
+        """Return the size of these messages in bytes."""
         return self._flow.passed_bytes
 
     @property
     def dropped(self) -> int:
-        """How many gave way to newer ones, because the network was slower."""
+        """Return how many messages were dropped for newer ones because the network was slower."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
-        """Queue a message; ``always``: whatever the rate."""
+        """Queue a message; with ``always``, regardless of the rate limit."""
         if not always and not self._throttle.allows(time.monotonic()):
             self.throttled += 1
             return
         self._worker.add(self, key, message)
 
     def close(self) -> None:
-        """Drop what waits, and undeclare the publishers."""
+        """Drop queued messages, and undeclare the publishers."""
         self._worker.end(self)
 
 
@@ -154,28 +154,28 @@ class _PriorityWorker(_Worker):
 
 
 class Sender:
-    """Sends messages, each priority in its own thread: a large one that takes a second does not hold up a command."""
+    """Sends messages, each priority in its own thread, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """``clock``: returns the time in ns that goes with each message."""
+        """``clock`` returns the time in ns that is attached to each message."""
         self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
-        """Return a topic's flow, of at most so many messages a second (0: all). ``is_bare``: for others, without stamps."""
+        """Return a flow for a topic, limited to ``hertz`` (0: unlimited). ``is_bare``: without stamps, for other programs."""
         return Outflow(self._priorities[priority], priority, hertz, is_bare)
 
     def close(self) -> None:
-        """End the threads. Idempotent."""
+        """Stop the threads. Idempotent."""
         for worker in self._priorities.values():
             worker.close()
 
 
 _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
-"""What delivers a message and its attachment, and these two."""
+"""The function that delivers a message, the message and its attachment."""
 
 
 class Flows:
-    """The flows of a receiver by key, at most so many: the least recently used one makes room. Safe for threads."""
+    """A receiver's flows by key, limited in number: the least recently used one is removed. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -183,7 +183,7 @@ class Flows:
         self._flows: dict[object, Flow[_Arrival]] = {}
 
     def of(self, key: object) -> Flow[_Arrival] | None:
-        """Return a key's flow; None if there are too many, and messages wait in each."""
+        """Return a key's flow; None if the limit is reached and every flow has queued messages."""
         with self._lock:
             flow = self._flows.pop(key, None)
             if flow is None:
@@ -198,9 +198,9 @@ class Flows:
 
 
 class Receiver(_Worker):
-    """Messages that have arrived, until they are published: fair between robots' topics.
+    """Queues arrived messages until they are published, round-robin between robots' topics.
 
-    Publishing may wait for a subscriber, some milliseconds; Zenoh's own thread would hold up all robots meanwhile.
+    Publishing may wait some milliseconds for a subscriber; in Zenoh's own thread that would delay all robots.
     """
 
     def __init__(self) -> None:
@@ -210,12 +210,12 @@ class Receiver(_Worker):
 
     @staticmethod
     def flow() -> Flow[_Arrival]:
-        """Return the flow of a robot's topic."""
+        """Return a new flow for a robot's topic."""
         return Flow(_INTAKE_MESSAGES, _INTAKE_BYTES)
 
     @staticmethod
     def flows(most: int) -> Flows:
-        """Return a table of flows."""
+        """Return a new table of flows."""
         return Flows(most)
 
     def add(
@@ -225,7 +225,7 @@ class Receiver(_Worker):
         message: bytes,
         attachment: bytes,
     ) -> None:
-        """Have ``deliver(message, attachment)`` called in the thread of the receiver."""
+        """Queue a call of ``deliver(message, attachment)`` in the receiver's thread."""
         with self._condition:
             if not self._is_closed:
                 self._queue.add(flow, (deliver, message, attachment), len(message))

@@ -1,7 +1,7 @@
-"""Velocities that come over the fleet, and stop coming: the robot's gateway publishes a zero after them, as the dashboard does.
+"""Stop robots whose velocity commands stop arriving over the fleet: publish a zero velocity, as the dashboard does.
 
-Only what is sent again and again is guarded: a single velocity stays, as in one graph. Nothing here needs the event loop; the
-zero is published by the guard's thread.
+Only streams of commands are guarded: a single velocity stays in effect, as within one graph. Works without the event loop: the
+guard's thread publishes the zero.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ __all__ = ["CommandStream", "at_rest"]
 _log = logging.getLogger(__name__)
 _TWIST = struct.Struct("<6d")
 _HEADER = 16
-"""Bytes of a header without its frame id: seq, stamp, the length of the frame id."""
+"""Bytes in a header without its frame id: seq, stamp and the length of the frame id."""
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the message that stops what a message drives; None if it drives nothing, or is broken."""
+    """Return the zero message for a command; None if the command is zero already, is not a command, or is invalid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -48,8 +48,7 @@ def at_rest(type_: str, body: bytes) -> bytes | None:
     return bytes(rest) if moves else None
 
 
-_Part = tuple[int, int, str]
-"""Where numbers start and end in a message, and their format."""
+_Part = tuple[int, int, str]  # start and end offset of numbers in a message, and their struct format
 
 
 def _twist(_: bytes) -> list[_Part]:
@@ -85,7 +84,7 @@ _FIELDS: dict[str, Callable[[bytes], list[_Part]]] = {
 
 
 class CommandStream:
-    """The commands of one topic, published in order with the zero that follows a stream of them. For any thread."""
+    """The commands of one topic, published in order, with a zero after a stream of them stops. Thread-safe."""
 
     def __init__(
         self,
@@ -104,13 +103,12 @@ class CommandStream:
         self._logger = RateLimitedLogger(_log)
         self._lock = threading.Lock()
         self._rest: bytes | None = None
-        # What stops the last command; None if that was none.
         self._last = -math.inf
         self._deadline = math.inf
 
     @staticmethod
     def guards(type_: str) -> bool:
-        """Return whether messages of a type drive something."""
+        """Return whether messages of a type are velocity commands."""
         return type_ in _FIELDS
 
     def publish(self, body: bytes) -> None:
@@ -122,31 +120,31 @@ class CommandStream:
             self._last, self._rest = now, rest
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
-                # Before it moves: what cannot be stopped is not driven.
+                # Arm the guard before publishing: never send a command that could not be stopped.
                 self._guard.arm(self._silent, self._deadline)
             else:
                 self._guard.disarm(self._silent)
             self._publish(body)
 
     def close(self) -> None:
-        """Stop what a stream drives. Idempotent."""
+        """Publish the zero if a stream is active. Idempotent."""
         self._guard.disarm(self._silent)
         with self._lock:
             self._stop()
 
     def _silent(self) -> None:
-        """Stop what is silent, in the guard's thread."""
+        """Publish the zero if the stream has stopped. Runs in the guard's thread."""
         with self._lock:
             if self._clock() < self._deadline:
-                return  # a command has come at this moment
-            with contextlib.suppress(ROSException):  # the node has ended
+                return  # a command has arrived just now
+            with contextlib.suppress(ROSException):  # the node is shut down
                 self._stop()
         self._logger.warning(
             "%s is stopped: no command came for %g s (fleet gateway --stop-after)", self._topic, self._seconds
         )
 
     def _stop(self) -> None:
-        """Publish a zero if a stream has ended with another command. With the lock."""
+        """Publish a zero if a stream has ended with a nonzero command. The caller holds the lock."""
         rest, is_stream = self._rest, self._deadline < math.inf
         self._rest, self._deadline = None, math.inf
         if rest is not None and is_stream:

@@ -1,4 +1,4 @@
-"""Bags to MCAP files and back, without loss: messages, times, connection headers."""
+"""Convert bags to MCAP files and back without loss of messages, times or connection headers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["check", "convert"]
 
 
 def check(source: str, target: str, *, compression: str, force: bool) -> None:
-    """Raise what :func:`convert` raises before it writes: UsageError, BagError, OSError."""
+    """Check the arguments of :func:`convert` before it writes. Raise UsageError, BagError or OSError."""
     if not target.endswith((".bag", ".mcap")):
         raise UsageError(f"{target} must end with .bag or .mcap")
     if os.path.exists(target) and not force:
@@ -33,10 +33,11 @@ def check(source: str, target: str, *, compression: str, force: bool) -> None:
 
 
 def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
-    """Write the messages of a bag or MCAP file into ``target``, an MCAP file if its name ends so; return how many.
+    """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap; return their number.
 
-    ``step`` is called with the bytes of messages that are done. ``force``: replace a file. A file that was not completed is
-    removed. Raise UsageError if ``target`` exists, BagError, OSError.
+    ``step`` is called with the bytes of messages processed so far. ``force``: overwrite an existing file. An incomplete
+    file is
+    removed. Raise UsageError if ``target`` exists, BagError, or OSError.
     """
     check(source, target, compression=compression, force=force)
 

@@ -1,6 +1,6 @@
-"""Bag files by their paths: open, copy, filter, compress, reindex; the message classes of what is in them.
+"""Bag files by path: open, copy, filter, compress and reindex them, and create their message classes.
 
-What the commands of rosbag do, without what they print.
+This is what the rosbag commands do, without their output.
 """
 
 from __future__ import annotations
@@ -49,38 +49,38 @@ __all__ = [
 ]
 
 Progress = Callable[[int], object]
-"""Called with the number of bytes that are done, again and again."""
+"""Called repeatedly with the number of bytes processed so far."""
 
 _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
 
 @contextlib.contextmanager
 def open_reader(path: str) -> Iterator[BagReader]:
-    """Yield a reader of a bag or an MCAP file. Raise BagError, OSError."""
+    """Yield a reader of a bag or an MCAP file. Raise BagError or OSError."""
     with open(path, "rb") as stream, contextlib.closing(open_bag_or_mcap(stream)) as reader:
         yield reader
 
 
 def version_of(path: str) -> int:
-    """Return a bag's version, 200 for 2.0, also if it has no index. Raise BagFormatError, OSError."""
+    """Return a bag's version, 200 for 2.0, even if it has no index. Raise BagFormatError or OSError."""
     with open(path, "rb") as stream:
         return read_version(stream)
 
 
 def is_mcap(path: str) -> bool:
-    """Return whether a file is an MCAP file, by its first bytes. Raise OSError."""
+    """Return whether a file starts as an MCAP file does. Raise OSError."""
     with open(path, "rb") as stream:
         return stream.read(len(MAGIC)) == MAGIC
 
 
 def data_size(reader: BagReader) -> int:
-    """Return the bytes of all chunks, decompressed; of a bag without chunks the size of the file."""
+    """Return the decompressed size of all chunks in bytes; for a bag without chunks, the size of the file."""
     headers = reader.chunk_headers().values()
     return sum(each.chunk.size for each in headers) or reader.size()
 
 
 def chunks_end(path: str) -> int:
-    """Return where the index of a bag of version 2.0 is; 0 if it has none. Raise OSError."""
+    """Return the offset of the index in a bag of version 2.0; 0 if it has none. Raise OSError."""
     try:
         with open_reader(path) as reader:
             return reader.index_position if isinstance(reader, ChunkedReader) else 0
@@ -89,14 +89,14 @@ def chunks_end(path: str) -> int:
 
 
 def backup_path(path: str) -> str:
-    """Return where the original of a bag is kept: ``a.orig.bag``."""
+    """Return the path of the backup of a bag: ``a.orig.bag``."""
     return "{}.orig{}".format(*os.path.splitext(path))
 
 
 def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], object]) -> type[Message]:
-    """Return the class of a connection's messages, made of the definition in the bag.
+    """Return the message class of a connection, generated from the definition in the bag.
 
-    ``warn`` is called with ROS's line where the definition does not fit the md5sum, or is invalid: then the class has no
+    If the definition is invalid or does not match the md5sum, call ``warn`` with ROS's message and return a class without
     fields. Raise DefinitionError if the type's name is not legal.
     """
     from minirospy.core.idl.load import class_from_text
@@ -117,9 +117,9 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
 
 
 def compress(source: str, target: str, compression: str, progress: Progress) -> None:
-    """Write a bag again with this compression of its chunks. Raise BagError, OSError.
+    """Copy a bag with another compression of its chunks. Raise BagError or OSError.
 
-    Each connection is kept. Where the source is damaged, what was before the damage is in the target.
+    All connections are kept. If the source is damaged, the target contains the messages before the damage.
     """
     copy_bag(source, target, lambda connection: connection, compression, progress)
 
@@ -131,7 +131,7 @@ def copy_bag(
     compression: str = compressions.NONE,
     progress: Progress = lambda done: None,
 ) -> None:
-    """Write a bag again, in the order of time, with its connections as ``change`` returns them. Raise BagError, OSError."""
+    """Copy a bag in time order, with each connection replaced by ``change(connection)``. Raise BagError or OSError."""
     with open_reader(source) as reader, new_bag(target, compression) as writer:
         numbers: dict[int, int] = {}
         connections = list(reader.connections.values())
@@ -148,7 +148,7 @@ def copy_bag(
 
 
 class Expression:
-    """A Python expression of `rosbag filter` with the variables topic, m and t. Raise ValueTextError if it does not parse."""
+    """A Python expression of `rosbag filter` over topic, m and t. Raise ValueTextError if it does not parse."""
 
     def __init__(self, text: str) -> None:
         try:
@@ -160,10 +160,10 @@ class Expression:
         self.text = text
         names = {each.id for each in ast.walk(tree) if isinstance(each, ast.Name)}
         self.needs_message = "m" in names or bool(names & _WHOLE_NAMESPACE)
-        """Whether the message itself is looked at; if not, none is deserialized."""
+        """True if the expression uses the message; if False, messages are not deserialized."""
 
     def __call__(self, topic: str, message: Message | None, time: Time) -> object:
-        """Return the value of the expression. Raise ValueTextError with the error that it raises."""
+        """Return the value of the expression. Raise ValueTextError if evaluating it fails."""
         try:
             return self._call(topic, message, time)
         except Exception as error:
@@ -173,7 +173,7 @@ class Expression:
 
 
 class FilterResult(NamedTuple):
-    """The numbers of messages that were kept and read."""
+    """The numbers of messages kept and read."""
 
     kept: int
     read: int
@@ -189,9 +189,9 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Write the messages for which ``keep`` is true into a new bag; ``on_shown`` is called with each value of ``show``.
+    """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
 
-    Raise BagError, OSError, ValueTextError, MessageException.
+    Raise BagError, OSError, ValueTextError or MessageException.
     """
     needs_message = keep.needs_message or (show is not None and show.needs_message)
     kept = read = done = 0
@@ -229,9 +229,9 @@ def filter_bag(
 
 
 def reindex(path: str, progress: Progress) -> list[str]:
-    """Make the index of a bag of version 2.0, or an MCAP file, again, in place; return what could not be recovered.
+    """Rebuild the index of a bag of version 2.0 or an MCAP file in place; return descriptions of unrecoverable parts.
 
-    Raise BagError, OSError.
+    Raise BagError or OSError.
     """
     is_other = is_mcap(path)
     with open(path, "r+b") as stream:
@@ -250,7 +250,7 @@ def reindex(path: str, progress: Progress) -> list[str]:
 
 
 def convert12(source: str, target: str, progress: Progress) -> None:
-    """Write a bag of version 1.2, with or without an index, as a bag of version 2.0. Raise BagError, OSError."""
+    """Convert a bag of version 1.2, with or without an index, to version 2.0. Raise BagError or OSError."""
     with open(source, "rb") as stream, new_bag(target, compressions.NONE) as writer:
         reader = unindexed_bag12(stream)
         for position in reader.scan():
@@ -264,7 +264,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if the name of a bag that is to be written is that of an MCAP file."""
+    """Raise UsageError if the name of an output bag is that of an MCAP file."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -273,9 +273,9 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield the writer of a new file; chunks are compressed in parallel. Errors and Ctrl-C leave a bag of what was written.
+    """Yield a writer of a new bag; chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
 
-    Raise UsageError if the name is that of an MCAP file, before anything is written.
+    Raise UsageError before writing if the name is that of an MCAP file.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:
@@ -298,7 +298,7 @@ def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
 
 @contextlib.contextmanager
 def naming_full_disk(path: str) -> Iterator[None]:
-    """Add the name of the file that is written to the OSError of a disk, or a quota, that is full."""
+    """Add the name of the output file to an OSError for a full disk or an exceeded quota."""
     try:
         yield
     except OSError as error:
@@ -313,7 +313,7 @@ def _add(writer: BagWriter, connection: Connection) -> int:
 
 
 def class_of_connection(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
-    """Return :func:`class_of` a connection. Raise BagFormatError."""
+    """Return the message class of a connection, see :func:`class_of`. Raise BagFormatError."""
     try:
         return class_of(connection.type, connection.md5sum, connection.definition, warn)
     except DefinitionError as error:

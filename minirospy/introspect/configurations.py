@@ -1,4 +1,4 @@
-"""Files of parameter values as dynparam and rqt_reconfigure write them: YAML, in ROS with the tag of a Python object."""
+"""Parameter files of dynparam and rqt_reconfigure: YAML, which ROS writes with the tag of a Python object."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ __all__ = ["configuration_documents", "parameter_values"]
 
 
 def configuration_documents(text: str) -> list[object]:
-    """Return the documents of a file; what ROS's dynparam has dumped, an object of Python, as a dict.
+    """Return the documents of a file; a Python object, as ROS's dynparam dumps it, becomes a dict.
 
-    Raise MinirospyError if it is not YAML, or unfolds to too much.
+    Raise MinirospyError if the file is not YAML, or its aliases expand to too much data.
     """
     import yaml
 
@@ -29,7 +29,7 @@ def configuration_documents(text: str) -> list[object]:
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:
-    """Return the values of a file by name, without the states of groups. Raise MinirospyError."""
+    """Return a file's values by name, without the states of groups. Raise MinirospyError."""
     values: dict[str, bool | int | float | str] = {}
     for document in configuration_documents(text):
         if not isinstance(document, dict):

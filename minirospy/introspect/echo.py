@@ -1,4 +1,4 @@
-"""The text of `rostopic echo` for a message, and the message of `rostopic pub`. Pure."""
+"""Format messages as `rostopic echo` does, and fill the message of `rostopic pub`. Pure."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ __all__ = ["Echo", "Filter", "elided", "fill_message"]
 
 
 class Filter:
-    """A Python expression over a message ``m`` and the name of its ``topic``, as the user typed it."""
+    """A Python expression over a message ``m`` and its ``topic``, as the user typed it."""
 
     def __init__(self, expression: str) -> None:
-        """Raise UsageError if it is not an expression."""
+        """Raise UsageError if the expression does not parse."""
         self._expression = expression
         try:
             self._code = compile(expression, "--filter", "eval")
@@ -36,18 +36,18 @@ class Filter:
     def __call__(self, message: Message, topic: str) -> bool:
         """Return whether the expression is true. Raise UsageError if it cannot be evaluated."""
         try:
-            # The user's own code on the user's own machine, as in ROS: no input of others gets here.
+            # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))
-        except Exception as error:  # whatever the user's expression raises is the user's to read
+        except Exception as error:  # the user's expression may raise anything: report it to the user
             raise UsageError(f"filter [{self._expression}]: {type(error).__name__}: {error}") from error
 
 
 class Echo:
-    """Turns the messages of a topic, or a field of them, into what is printed, each ending with a line feed.
+    """Formats the messages of a topic, or a field of them, as output lines, each ending with a line feed.
 
-    ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
-    such fields are shown. ``width``: of numbers. ``offset``: times as differences from ``now()``, which is
-    the time in nanoseconds. ``header_times``: a plot has the time in a message's header, if it has one, not of its reception.
+    ``plot``: comma-separated values, with a header line first. ``strings`` and ``arrays``: whether to show such fields.
+    ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns nanoseconds.
+    ``header_times``: in a plot, use the time in a message's header, if it has one, instead of the receive time.
     ``is_type_known``: whether ROS looks up the type of a field that is not a message, as it does for topics, not for bags.
     """
 
@@ -81,7 +81,7 @@ class Echo:
         self._header_written = False
 
     def message(self, received: Received) -> Message:
-        """Return the message in what was received. Raise NotFoundError if it has no such field."""
+        """Deserialize a message and return it or its field. Raise NotFoundError if it has no such field."""
         from minirospy.core.idl.load import get_message_class
 
         message = self._classes.read(received)
@@ -92,7 +92,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return what is printed of a message. Raise IndexError if the field's array is too short."""
+        """Return the output for a message. Raise IndexError if the field's array is too short."""
         value = field_value(message, self._steps)
         return self._row(value, received) if self._plot else self._block(value)
 
@@ -110,7 +110,7 @@ class Echo:
         return header + row + "\n"
 
     def _is_shown_whole(self, value: object) -> bool:
-        """Return whether a value is shown as it is: one of a bag's, whose type ROS looks up in messages alone."""
+        """Return whether to print a value unchanged: a bag's field that is not a message, whose type ROS does not look up."""
         return not self._is_type_known and not is_message(value)
 
     def _block(self, value: object) -> str:
@@ -119,7 +119,7 @@ class Echo:
         if self._is_shown_whole(value):
             return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"
 
-        # ROS shows a field char[] as the bytes that it is, and fails on one of uint8[].
+        # ROS prints a char[] field as bytes, and fails on uint8[].
         if isinstance(value, bytes) and not self._type.startswith("char"):
             value = list(value)
         if not (self._strings and self._arrays):
@@ -129,9 +129,9 @@ class Echo:
 
 
 def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
-    """Return a message of YAML values; ``now`` is the time, ``auto`` a stamped header (``nanoseconds``: what time it is).
+    """Return a message filled from YAML values; ``now`` stands for ``nanoseconds`` (or the time), ``auto`` for a stamped header.
 
-    Raise MessageException if they do not fit, with the names of the fields that there are.
+    Raise MessageException, with the names of the fields, if the values do not fit.
     """
     message = fill(cls(), values, words_of(time.time_ns() if nanoseconds is None else nanoseconds))
     serialize(message)
@@ -139,9 +139,9 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 
 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
-    """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays.
+    """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, "" if unknown.
 
-    As in ROS, messages in an array are shown whole, and the note of an array of fixed length has its ``[3``.
+    As in ROS, arrays of messages are not elided, and the placeholder of a fixed-length array contains its ``[3``.
     """
     if type_.endswith("]") or isinstance(value, list | tuple):
         values = cast("Sequence[object]", value)
@@ -158,7 +158,8 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A note is a text, for any type of field: the printed form of a field depends on its declared type.
+    # A placeholder is a string whatever the field's type, and the printed form of a field depends on its declared
+    # type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

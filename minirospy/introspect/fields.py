@@ -1,6 +1,6 @@
-"""A path to a field inside a message: ``pose/position/x``, ``points[0]/x``, ``ranges[1:3]``, ``points[:]/x``.
+"""Parse and follow paths to fields of messages: ``pose/position/x``, ``points[0]/x``, ``ranges[1:3]``, ``points[:]/x``.
 
-Pure: a path's text comes in, steps go out; a message and steps come in, a value goes out.
+Pure: parses a path into steps; applies steps to a message to get a value.
 Source: http://wiki.ros.org/rostopic#rostopic_echo.
 """
 
@@ -23,25 +23,25 @@ _TIMES = {
     "time": {"secs": "uint32", "nsecs": "uint32"},
     "duration": {"secs": "int32", "nsecs": "int32"},
 }
-"""The primitive types that have fields all the same."""
+"""The primitive types that have fields nevertheless."""
 
 
 class Step(NamedTuple):
-    """One part of a path: a field, and where it is an array, an index or a slice into it."""
+    """One part of a path: a field name and, for an array, an index or a slice."""
 
     name: str
     element: int | slice | None
 
 
 def parse_path(path: str) -> tuple[Step, ...]:
-    """Return the steps of a path; the empty path is the message itself. Raise UsageError."""
+    """Parse a path; the empty path refers to the message itself. Raise UsageError."""
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 
 def field_value(message: object, steps: tuple[Step, ...]) -> object:
-    """Return the value at a path; a slice of messages followed by a field gives a list of that field's values.
+    """Return the value at a path; for a slice of messages followed by a field, the list of that field's values.
 
-    Raise NotFoundError if a field is not there, IndexError where an array is too short.
+    Raise NotFoundError if a field does not exist, IndexError if an array is too short.
     """
     value: object = message
 

@@ -1,4 +1,4 @@
-"""The graph that the queries are about: a master, and the names as the caller sees them."""
+"""The graph that queries refer to: a master, and name resolution for the caller."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ __all__ = [
     "why_illegal",
 ]
 
-_LONGEST_NAME = 4096
-"""As the master has it."""
+_LONGEST_NAME = 4096  # characters, the master's limit
 
 
 class NodeAddress(NamedTuple):
@@ -39,7 +38,7 @@ class NodeAddress(NamedTuple):
 
 
 class Graph:
-    """A master, called in the name of ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
+    """A connection to a master as ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
 
     Every call raises MasterUnreachableError if no master answers.
     """
@@ -64,9 +63,9 @@ class Graph:
     def open(
         cls, tool: str, environ: Mapping[str, str] | None = None, arguments: names.Arguments | None = None
     ) -> Graph:
-        """Return the graph that the environment names, and the command line where ``arguments`` were taken out of it.
+        """Return the graph for the environment and, with ``arguments``, the command line's remappings.
 
-        Raise UsageError on a bad ROS_MASTER_URI.
+        Raise UsageError if ROS_MASTER_URI is invalid.
         """
         given = arguments or names.parse_arguments(())
         master_uri, namespace = master_and_namespace(
@@ -91,11 +90,11 @@ class Graph:
         return names.resolve(name, self._node_name, self._remappings)
 
     def state(self) -> SystemState:
-        """Return who publishes, subscribes and serves what."""
+        """Return the publishers, subscribers and services of all nodes."""
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API (one call a node); None if the master does not know it."""
+        """Return the URI of a node's Slave API, with one call per node; None if the master does not know the node."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
@@ -109,9 +108,9 @@ class Graph:
 
 
 def why_illegal(name: str) -> str:
-    """Return what is wrong with the global name of a topic or service; "" where nothing is.
+    """Return the reason why a topic's or service's global name is not legal; "" if it is legal.
 
-    rospy takes such names all the same, roscpp does not. The path of a field may follow a topic's: /points[0]/x.
+    rospy accepts such names nevertheless, roscpp does not. A field's path may follow a topic's name: /points[0]/x.
     """
     if len(name) > _LONGEST_NAME:
         return f"a name has {_LONGEST_NAME} characters at most"
@@ -120,7 +119,7 @@ def why_illegal(name: str) -> str:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Return whether a global name is ``namespace`` or lies below it; the root holds all."""
+    """Return whether a global name is ``namespace`` or is below it; every name is below the root."""
     return namespace in ("", "/") or name == namespace or name.startswith(namespace.rstrip("/") + "/")
 
 
@@ -132,11 +131,11 @@ def node_host(uri: str | None) -> str | None:
 
 
 def unknown_topic(graph: Graph, topic: str) -> NotFoundError:
-    """Return the error for a topic that nobody publishes or subscribes to, with the nearest that are there."""
+    """Return the error for a topic without publishers or subscribers, with similar names that exist."""
     state = graph.state()
     return NotFoundError("topic", topic, [*state.publishers, *state.subscribers])
 
 
 def unknown_service(graph: Graph, service: str) -> NotFoundError:
-    """Return the error for a service that nobody offers, with the nearest that are there."""
+    """Return the error for a service that does not exist, with similar names that exist."""
     return NotFoundError("service", service, graph.state().services)

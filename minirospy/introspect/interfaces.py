@@ -1,6 +1,6 @@
-"""Message and service types as their packages define them: names, texts and md5sums.
+"""Message and service types as packages define them: names, definitions and md5sums.
 
-Read from the definitions, so that a type is found before anything is built from it.
+Read from the definition files, so that a type is found before its package is built.
 Source: http://wiki.ros.org/rosmsg.
 """
 
@@ -21,19 +21,19 @@ _INDENT = "  "
 
 
 class Kind(Enum):
-    """The kind of a definition; the value is its folder and the ending of its name."""
+    """The kind of a definition; the value is both its folder and its file extension."""
 
     MESSAGE = "msg"
     SERVICE = "srv"
 
     @property
     def word(self) -> str:
-        """The kind in words."""
+        """Return the kind as a word."""
         return "message" if self is Kind.MESSAGE else "service"
 
 
 class Interfaces:
-    """The types of one kind in all packages. A definition that does not parse raises DefinitionError."""
+    """All types of one kind in all packages. Raises DefinitionError if a definition does not parse."""
 
     def __init__(self, packages: Packages, kind: Kind) -> None:
         self._packages = packages
@@ -41,7 +41,7 @@ class Interfaces:
         self._catalogue = Catalogue(packages.folders())
 
     def packages(self) -> list[str]:
-        """Return the sorted names of the packages that define any."""
+        """Return the sorted names of the packages that define such types."""
         return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:
@@ -58,9 +58,9 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that ``name`` means: itself where it has a package, else those of that bare name.
+        """Return the types that match ``name``: itself if it has a package, else all types of that name.
 
-        Raise NotFoundError with the nearest names where there is none.
+        Raise NotFoundError with similar names if there is none.
         """
         everything = self.all()
         by_itself = "/" not in name
@@ -74,11 +74,11 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """Return the definition of a type, as it is in its file. Raise NotFoundError."""
+        """Return the definition of a type as in its file. Raise NotFoundError."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """Return the constants and fields of a type, inner types unfolded. Raise NotFoundError."""
+        """Return the constants and fields of a type, with inner types expanded. Raise NotFoundError."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
@@ -99,7 +99,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """Return the sorted names of the types of a package, by its files; an action means seven messages."""
+        """Return the sorted type names of a package, from its files; an action defines seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}
@@ -109,7 +109,7 @@ class Interfaces:
 
 
 def describe(spec: MessageSpec | ServiceSpec, lookup: Lookup) -> str:
-    """Return a type as `rosmsg show` prints it: a line for each constant and field, inner types indented below."""
+    """Format a type as `rosmsg show` does: a line for each constant and field, inner types indented below."""
     if isinstance(spec, ServiceSpec):
         lines = [*_lines(spec.request, lookup, ""), "---", *_lines(spec.response, lookup, "")]
     else:

@@ -1,4 +1,4 @@
-"""The loggers of a node and their levels, as the node reports them.
+"""A node's loggers and their levels, queried from the node.
 
 Source: http://wiki.ros.org/rosconsole (the services get_loggers and set_logger_level of each node).
 """
@@ -22,16 +22,16 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 
 
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
-    """Logger -> level (in small letters) of a node (global name).
+    """Return the levels (lower case) of a node's loggers, by logger; ``node`` is a global name.
 
-    Raise NotFoundError, NodeUnreachableError, and MinirospyError if it has no service of its loggers.
+    Raise NotFoundError, NodeUnreachableError, or MinirospyError if the node has no logger services.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
     return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """Return the level of one logger. Raise as :func:`logger_levels`, and NotFoundError if the logger does not exist."""
+    """Return the level of one logger. Raise as :func:`logger_levels` does, and NotFoundError if the logger does not exist."""
     levels = logger_levels(graph, node)
     if logger not in levels:
         raise NotFoundError(f"logger of node {node}", logger, levels)
@@ -39,14 +39,14 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
-    """Set the level of a logger. Raise as :func:`logger_level`."""
-    # A node takes any name: an unknown one is reported only if it is looked up first.
+    """Set the level of a logger. Raise as :func:`logger_level` does."""
+    # A node accepts any logger name, so check first that the logger exists.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
 def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
-    """Return the response of a node's own service."""
+    """Call a node's own service and return the response."""
     name = find_node(graph, node).name
     try:
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))

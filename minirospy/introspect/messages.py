@@ -1,6 +1,6 @@
-"""Messages of a graph's types: classes by name or by what a publisher sent, filling from YAML, bytes.
+"""Message classes for the types of a graph, by name or connection header; fill from YAML, serialize, deserialize.
 
-Classes of types that are not installed are made from the definition in the publisher's connection header.
+Classes of types that are not installed are generated from the definition in the publisher's connection header.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ _M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
-    # What YAML reads otherwise than it looks.
+    # YAML parses such values as another type than they appear to have.
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
 
 
 class MessageClasses:
-    """Message classes for what publishers send; each is looked up or made once."""
+    """Message classes for publishers' messages; each is looked up or generated once."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header: the installed one where the md5sums agree.
+        """Return the class for a publisher's connection header: the installed one if the md5sums agree.
 
-        Raise NotFoundError if it is not installed and the publisher sent no definition, DefinitionError
-        where the definition does not parse.
+        Raise NotFoundError if it is not installed and the publisher sent no definition, or DefinitionError if the
+        definition does not parse.
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # Nobody means so many types: a publisher makes them up.
+                # So many types are not normal use: a publisher makes them up.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
 
     def read(self, received: Received) -> Message:
-        """Return the message in what was received. Raise DeserializationError, and as :meth:`for_header`."""
+        """Deserialize a received message. Raise DeserializationError, or as :meth:`for_header` does."""
         message = self.for_header(received.header)()
         message.deserialize(received.body)
         message._connection_header = received.header
@@ -72,13 +72,13 @@ class MessageClasses:
 
 
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
-    """``message`` with YAML values in its fields: one dictionary, or a value for each field in order.
+    """Fill the fields of ``message`` from YAML values, either one dictionary or a value per field in order; return it.
 
-    ``keys`` are words that represent a value, as ``now`` for a time. Raise MessageException.
+    ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise MessageException.
     """
     from minirospy.core.idl.message import fill_message_args
 
-    # No value at all is a message of default values.
+    # Without values the message keeps its defaults.
     try:
         fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
     except (MessageException, ValueError, TypeError, AttributeError) as error:
@@ -87,7 +87,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 
 def words_of(nanoseconds: int) -> dict[str, object]:
-    """Return the words that represent a value: ``now`` is the time, ``auto`` a stamped header."""
+    """Return the words that represent values: ``now`` is the time, ``auto`` a stamped header."""
     from minirospy.base.times import Time
     from minirospy.core.idl.load import get_message_class
 
@@ -97,12 +97,12 @@ def words_of(nanoseconds: int) -> dict[str, object]:
 
 
 def check(message: Message) -> None:
-    """Raise MessageException with the field's name where a value does not fit the definition."""
+    """Raise MessageException, with the field's name, if a value does not fit the definition."""
     serialize(message)
 
 
 def serialize(message: Message) -> bytes:
-    """Return the bytes of a message. Raise MessageException if a value does not fit its field."""
+    """Serialize a message. Raise MessageException if a value does not fit its field."""
     buffer = BytesIO()
     try:
         message.serialize(buffer)
@@ -112,7 +112,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return what is wrong with the ``values`` that were typed, on one line, and what the fields are."""
+    """Return a one-line error about the user's ``values``, with the fields of the message."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

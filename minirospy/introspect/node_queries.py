@@ -1,4 +1,4 @@
-"""What nodes alone know, such as the types of their services: the master does not, so each node is queried."""
+"""Query nodes for what the master does not know, such as the types of their services."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from minirospy.base.errors import MinirospyError, ServiceException
 __all__ = ["AT_ONCE", "NodeQueries"]
 
 AT_ONCE = 64
-"""Queries that run at a time: a node that hangs costs nothing but a connection."""
+"""Concurrent first queries: a node that hangs costs only a connection."""
 
 _AGAIN_AT_ONCE = 32
-"""Queries to what did not answer before that run at a time: next to the others, so that nothing new waits for them."""
+"""Concurrent retries; a separate limit, so that they do not delay first queries."""
 _QUERY_SECONDS = 5.0
-_AGAIN_SECONDS = 10.0
-"""After this what did not answer is queried again."""
+_AGAIN_SECONDS = 10.0  # before a node that did not answer is queried again
 _REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
-"""What refused at once is queried again sooner, since that costs little: a server that was killed may be started again. The pause
-grows with the number of those that failed: 500 dead nodes are queried every 10 s."""
+"""Pause after a refused query, base and increment per failed query. A refusal is cheap, and a server that was killed may be
+restarted soon, so it is retried sooner; 500 dead nodes are queried every 10 s.
+"""
 
 _Key = TypeVar("_Key")
 _Found = TypeVar("_Found")
 
 
 class NodeQueries(Generic[_Key, _Found]):
-    """Queries nodes once for each key, such as the name of a service with its nodes. On the loop.
+    """Queries nodes once per key, for example a service's name with its nodes. Runs on the loop.
 
-    What does not answer is queried again later, and keeps nothing else waiting.
+    Queries that fail are retried later, and do not delay others.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class NodeQueries(Generic[_Key, _Found]):
         *,
         arrived_late: Callable[[], object] = lambda: None,
     ) -> None:
-        """``arrived_late`` is called when an answer has come that :meth:`look` did not wait for."""
+        """``arrived_late`` is called when an answer has arrived after :meth:`look` returned."""
         self.found: dict[_Key, _Found] = {}
         self._query = query
         self._reporter = reporter
@@ -53,7 +53,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self._again = asyncio.Semaphore(_AGAIN_AT_ONCE)
 
     async def look(self, present: Collection[_Key], seconds: float) -> None:
-        """Query for what is new and forget what is absent; return when the new is found, or after ``seconds``."""
+        """Query new keys and forget absent ones; return when the new ones are answered, or after ``seconds``."""
         kept = self._present = set(present)
         self.found = {key: found for key, found in self.found.items() if key in kept}
         self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
@@ -82,16 +82,16 @@ class NodeQueries(Generic[_Key, _Found]):
             is_late = True
 
     async def close(self) -> None:
-        """End the queries. Idempotent."""
+        """Cancel the queries. Idempotent."""
         tasks = list(self._tasks.values())
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Those that had just ended report it only afterwards.
+        # Done callbacks of tasks that have just finished run only after this.
         self._tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query once; return whether there is an answer to what is still present."""
+        """Query once; return True if there is an answer and its key is still present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
@@ -102,7 +102,7 @@ class NodeQueries(Generic[_Key, _Found]):
             self._reporter.report(error)
             self._failed(key)
         else:
-            # What is absent by now is new when it is back.
+            # If the key is absent by now, it must be queried again when it returns.
             if key in self._present:
                 self.found[key] = found
                 return True

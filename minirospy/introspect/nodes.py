@@ -1,4 +1,4 @@
-"""Nodes: which there are, what they publish, serve and are connected to; pinging and stopping them.
+"""Nodes: list them, their topics, services and connections; ping and stop them.
 
 Source: http://wiki.ros.org/rosnode, http://wiki.ros.org/ROS/Slave_API.
 """
@@ -80,7 +80,7 @@ class Connections(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """The nodes that send to a node, and those that it sends to, by what is registered."""
+    """The nodes that send to a node, and those that receive from it, according to the master."""
 
     senders: list[str]
     receivers: list[str]
@@ -112,7 +112,7 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Return each node that publishes or subscribes, sorted, and the other ends of its topics."""
+    """Return the neighbours of each node that publishes or subscribes, sorted by node."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -128,7 +128,7 @@ def neighbours(state: SystemState) -> dict[str, Neighbours]:
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
-    """Return a node (global name) and its URI. Raise NotFoundError with the nearest names."""
+    """Return a node (global name) and its URI. Raise NotFoundError with similar names."""
     uri = graph.node_uri(name)
     if uri is None:
         raise NotFoundError("node", name, list_nodes(graph))
@@ -136,9 +136,9 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """Return what the master knows of a node (global name). Raise NotFoundError."""
+    """Return the master's information about a node (global name). Raise NotFoundError."""
     state = graph.state()
-    # Types as publishers registered them: of a topic that nobody publishes, rosnode says "unknown type".
+    # The types that publishers registered: for a topic without publishers rosnode prints "unknown type".
     types = dict(graph.master.get_published_topics())
 
     def topics(table: Mapping[str, list[str]]) -> list[TypedName]:
@@ -154,13 +154,13 @@ def node_detail(graph: Graph, name: str) -> NodeDetail:
 
 
 def node_connections(graph: Graph, node: NodeAddress) -> Connections:
-    """Return the process id and the connections of a node, from itself. Raise NodeUnreachableError."""
+    """Query a node for its process id and its connections. Raise NodeUnreachableError."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout=5.0)) as slave:
         return Connections(slave.get_pid(), slave.get_bus_info())
 
 
 def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
-    """Return the seconds that a call to a node takes. Raise NodeUnreachableError."""
+    """Return the duration of a call to a node in seconds. Raise NodeUnreachableError."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
         start = time.perf_counter()
         slave.get_pid()
@@ -168,7 +168,7 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 
 
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
-    """Request a node to shut down; without effect if it has exited already.
+    """Request a node to shut down; do nothing if it has already exited.
 
     Raise NodeUnreachableError if it does not answer in time.
     """
@@ -179,11 +179,11 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # one that exits immediately may not complete its answer
+            pass  # a node that exits immediately may not complete its answer
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
-    """Return whether a node did not answer because the name of its host cannot be resolved."""
+    """Return whether a node did not answer because its host name does not resolve."""
     return isinstance(getattr(error.__cause__, "__cause__", None), socket.gaierror)
 
 
@@ -195,7 +195,7 @@ def is_timeout(error: NodeUnreachableError) -> bool:
 def unreachable_nodes(
     graph: Graph, timeout: float = 3.0, on_error: Callable[[NodeUnreachableError], object] | None = None
 ) -> list[NodeAddress]:
-    """Return the registered nodes that do not answer; ``on_error`` is called with the error of each."""
+    """Return the registered nodes that do not answer; call ``on_error`` with the error of each."""
     found = []
     for node in graph.addresses(list_nodes(graph)):
         if node.uri is None:
@@ -210,19 +210,19 @@ def unreachable_nodes(
 
 
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
-    """Unregister everything that a node registered with the master; without effect on a newer node of its name.
+    """Unregister everything that a node registered with the master; a newer node of the same name is not affected.
 
-    ``state``: the master's, where the caller has it. Raise MasterUnreachableError.
+    ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError.
     """
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     state = state or graph.state()
     uri = node.uri or ""
-    # In the node's own name: the master removes only what the caller registered.
+    # Use the node's name as the caller_id: the master removes only the caller's own registrations.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # A topic is unregistered together with the node's URI, a service with its own. Where the name still has this URI
-        # after the services were looked up, none of them can be a newer node's.
+        # Topics are unregistered together with the node's URI, services with their own. If the name still has this
+        # URI after the services were looked up, none of them can belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -237,20 +237,20 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether nobody listens at a node's address any more, or another process.
+    """Return whether no process, or another process, listens at a node's address.
 
-    A node that does not answer in time may be alive: False.
+    Return False for a node that does not answer in time: it may be alive.
     """
     with contextlib.closing(_slave(graph, node, timeout)) as slave:
         try:
             return bool(slave.call("getName") != node.name)
         except RpcUnreachable as error:
-            # EOFError: what has the port now, such as a TCPROS server, hung up.
+            # EOFError: the server that uses the port now, such as a TCPROS server, closed the connection.
             return isinstance(error.__cause__, ConnectionError | EOFError)
         except RpcProtocolError:
             return True
         except RpcError:
-            # roscpp's nodes have no such method.
+            # roscpp's nodes do not implement getName.
             return False
 
 
@@ -282,7 +282,7 @@ def _slave(graph: Graph, node: NodeAddress, timeout: float) -> SlaveProxy:
 
 @contextlib.contextmanager
 def _named(node: NodeAddress) -> Iterator[None]:
-    """Faults of a call to ``node``, named after it."""
+    """Raise NodeUnreachableError with the node's name for errors of a call to it."""
     try:
         yield
     except RpcTimeout as error:

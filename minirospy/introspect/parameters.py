@@ -1,4 +1,4 @@
-"""The parameter server's values: read, set, delete, load from YAML and dump to it.
+"""Values on the parameter server: read, set, delete, load from YAML and dump as YAML.
 
 Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/ROS/Parameter%20Server%20API.
 """
@@ -30,13 +30,13 @@ _NAMESPACE_KEY = "_ns"
 
 
 class RootValueError(ValueTextError):
-    """The root of the parameters was given a value that is not a dictionary."""
+    """The root of the parameters was set to a value that is not a dictionary."""
 
 
 class ParameterFile(NamedTuple):
-    """One document of a parameter file: its values, and the namespace that they go into.
+    """One document of a parameter file: its values and their namespace.
 
-    ``own_namespace``: the document itself said so, by the key ``_ns``.
+    ``own_namespace``: the namespace is the document's own key ``_ns``.
     """
 
     namespace: str
@@ -51,7 +51,7 @@ def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def get_parameter(graph: Graph, name: str) -> object:
-    """Return the value of a parameter (global name); a namespace is a dictionary. Raise NotFoundError."""
+    """Return the value of a parameter (global name), a dictionary for a namespace. Raise NotFoundError."""
     try:
         return graph.master.get_param(name)
     except RpcRefused:
@@ -59,9 +59,9 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter; a dictionary sets each of its entries and keeps the others, as rosparam does.
+    """Set a parameter; a dictionary sets each of its entries and keeps existing ones, as rosparam does.
 
-    The single parameters that were set come back. Raise ValueTextError on what none can hold.
+    Return the individual parameters that were set. Raise ValueTextError if a value cannot be stored as a parameter.
     """
     if name == "/" and not isinstance(value, dict):
         raise ValueTextError(name, "the root holds parameters, it is not one: give a dictionary or a name")
@@ -73,9 +73,9 @@ def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, obj
 
 
 def delete_parameter(graph: Graph, name: str) -> None:
-    """Delete a parameter or namespace; the root is emptied. Raise NotFoundError."""
+    """Delete a parameter or namespace; deleting the root empties it. Raise NotFoundError."""
     if name == "/":
-        # The master's deleteParam refuses it.
+        # The master's deleteParam refuses the root.
         graph.master.set_param(name, {})
         return
     try:
@@ -85,9 +85,9 @@ def delete_parameter(graph: Graph, name: str) -> None:
 
 
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
-    """Return the documents of a parameter file named ``where``, to be set below ``namespace`` (global).
+    """Parse a parameter file named ``where``; return its documents, to be set below ``namespace`` (global).
 
-    Raise ValueTextError if it is not YAML, or there are values at the root without a name.
+    Raise ValueTextError if it is not YAML, or has unnamed values at the root.
     """
     files = []
     for document in parse_documents(text, where):
@@ -105,13 +105,13 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
 
 
 def dump_parameters(values: object) -> str:
-    """Values as the text of a parameter file."""
+    """Return values as the text of a parameter file."""
     text = format_value(values)
     return text if text.endswith("\n") else text + "\n"
 
 
 def flatten(name: str, value: object) -> Iterator[tuple[str, object]]:
-    """Yield each single parameter at or below ``name``, in the order that the values have."""
+    """Yield each individual parameter at or below ``name``, in the order of the values."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from flatten(_join(name, str(key)), inner)

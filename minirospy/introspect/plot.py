@@ -1,6 +1,6 @@
-"""Messages as rows of comma-separated values, as `rostopic echo -p` prints them for plotting tools.
+"""Format messages as rows of comma-separated values, as `rostopic echo -p` does for plotting tools.
 
-Pure. Arrays become columns with their index at the end; bytes are left out, since no plot wants them.
+Pure. Arrays become columns with the index at the end; bytes are left out, because they cannot be plotted.
 Source: http://wiki.ros.org/rostopic#rostopic_echo (-p).
 """
 
@@ -25,7 +25,7 @@ def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> 
 def plot_row(
     value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
-    """Return the line of values, with the message's time in front; ``origin`` (nanoseconds) is taken off times inside."""
+    """Return the line of values, starting with the message's time; ``origin`` (nanoseconds) is subtracted from times in it."""
     return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays, origin))
 
 
@@ -39,7 +39,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
         if strings:
             yield _Cell(name, value)
     elif hasattr(value, "to_nsec"):
-        # A point in time is seen from the origin; a duration is the same from everywhere.
+        # Subtract the origin from points in time, not from durations.
         yield _Cell(name, str(value.to_nsec() - (origin if hasattr(value, "to_time") else 0)))
     elif isinstance(value, list | tuple):
         if arrays:

@@ -1,4 +1,4 @@
-"""A message of default values as YAML: what TAB puts after `rostopic pub TOPIC TYPE`, and `rosmsg-proto` prints."""
+"""Format a message of default values as YAML, for tab completion after `rostopic pub TOPIC TYPE` and for `rosmsg-proto`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ __all__ = ["prototype"]
 
 _WIDE = 5
 _COLUMNS = 80
-_NO_BYTES = '!!binary ""'
-"""An empty uint8[], which is bytes and no list of numbers."""
+_NO_BYTES = '!!binary ""'  # an empty uint8[], which is bytes and not a list of numbers
 
 
 def prototype(
     spec: MessageSpec, catalogue: Catalogue, *, without: Collection[str] = (), empty_arrays: bool = False
 ) -> str:
-    """Return a message of default values as YAML, as `rosmsg-proto` writes it: to be changed and published.
+    """Return a message of default values as YAML, as `rosmsg-proto` writes it, for the user to edit and publish.
 
-    An array of no fixed length has one element, which shows what its elements are, or with ``empty_arrays``
-    none. ``without``: names of fields to leave out, also of inner messages.
+    An array of variable length has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
+    leave out, also in inner messages.
     """
     lines = _Yaml().lines(_Defaults(catalogue, without, empty_arrays).of(spec))
     return "\n".join(map(_wrapped, lines))
@@ -35,7 +34,7 @@ class _Defaults(NamedTuple):
     empty_arrays: bool
 
     def of(self, spec: MessageSpec) -> dict[str, object]:
-        """Return the values of a message's fields."""
+        """Return the default values of a message's fields."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
@@ -57,13 +56,13 @@ class _Defaults(NamedTuple):
 
 
 class _Yaml:
-    """Values as lines. From the first wide one on, all that holds no further braces is on one line: so it fits."""
+    """A YAML writer. From the first wide value on, innermost lists and dictionaries are on one line, as in `rosmsg-proto`."""
 
     def __init__(self) -> None:
         self._tight = False
 
     def lines(self, value: object) -> list[str]:
-        """Return the lines of a value, those of what it holds indented."""
+        """Return the lines of a value, with nested values indented."""
         inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
         if isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE:
             self._tight = True
@@ -93,7 +92,7 @@ def _flow(value: object) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """Return a line that is too wide goes on below, as YAML libraries write it: its next word after the last column."""
+    """Wrap a line that is too wide as YAML libraries do: before the first word that starts after the last column."""
     if len(line) <= _COLUMNS:
         return line
     # A dash before a key counts as indentation, one before a brace does not.

@@ -1,4 +1,4 @@
-"""The messages of `rostopic pub`: YAML values of a command line, a file or a stream become messages, at a rate.
+"""The messages of `rostopic pub`: convert YAML values from arguments, a file or a stream, and publish them at a rate.
 
 Source: http://wiki.ros.org/rostopic#rostopic_pub.
 """
@@ -23,10 +23,11 @@ __all__ = ["publish_all", "values_to_publish"]
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
 ) -> Iterator[list[object]]:
-    """Yield the YAML values of each message with ``fields``; at least one.
+    """Yield the YAML values of each message with ``fields``, at least one message.
 
-    ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raise
-    UsageError without values, NotFoundError if the file does not exist, ValueTextError on what is not YAML.
+    ``arguments`` are the values of one message; without them, read a file, or standard input as it arrives. Raise
+    UsageError without
+    values, NotFoundError if the file does not exist, or ValueTextError if the input is not YAML.
     """
     if arguments or (file is None and not fields):
         yield parse_arguments(arguments)
@@ -57,9 +58,9 @@ def publish_all(
     rate: float,
     on_message: Callable[[Message], object],
 ) -> None:
-    """Publish ``rate`` messages a second by the node's clock until they end or the node has to stop.
+    """Publish at ``rate`` Hz by the node's clock until there are no more messages or the node is stopped.
 
-    Where time jumps back (a simulation that starts again), it goes on from there.
+    If time jumps back (a simulation is restarted), continue from the new time.
     """
     start, sent = node.clock.now(), 0
 
@@ -67,7 +68,7 @@ def publish_all(
         on_message(message)
         publisher.publish(message)
         sent += 1
-        # From the start, not from the last message: pauses that come out too long do not add up.
+        # Measure from the start, not from the last message, so that errors of the pauses do not add up.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
 
         try:

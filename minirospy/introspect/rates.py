@@ -1,6 +1,6 @@
 """Rate, bandwidth and delay of a topic over a window of messages.
 
-Pure: arrival times (seconds) and sizes (bytes) come in, statistics go out.
+Pure: takes arrival times (seconds) and sizes (bytes), returns statistics.
 Source: http://wiki.ros.org/rostopic (hz, bw, delay).
 """
 
@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Messages that a window without a limit keeps: a long measurement must not eat the memory."""
+"""Maximum number of messages in a window without a limit, which bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Mean, extremes and standard deviation of some seconds, and how many messages they come from."""
+    """Mean, extremes and standard deviation of times in seconds, and the number of messages."""
 
     mean: float
     min: float
@@ -40,12 +40,12 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Messages a second, where the seconds lie between messages."""
+        """Return the rate in Hz, if the times are the periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 
 class Bandwidth(NamedTuple):
-    """Bytes a second, and the sizes of the messages that they come from."""
+    """Bytes per second, and the sizes of the messages."""
 
     rate: float
     mean: float
@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """The pauses between the latest messages (at most ``size`` of them; 0 for no limit)."""
+    """The periods between the latest messages (at most ``size``; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -64,17 +64,17 @@ class RateWindow:
         self._reported = 0
 
     def add(self, time: float) -> None:
-        """Count a message."""
+        """Record a message's arrival time."""
         self._arrived += 1
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
         elif self._last is not None:
-            # Time was set back: what was measured before says nothing of now.
+            # Time was set back: earlier measurements cannot be compared with later ones.
             self._pauses.clear()
         self._last = time
 
     def report(self) -> Spread | None:
-        """Return the statistics; None if nothing has come since the last report, or too little yet."""
+        """Return the statistics; None if no message has arrived since the last report, or too few in total."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -82,17 +82,17 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """The sizes of the latest messages (at most ``size`` of them)."""
+    """The sizes of the latest messages (at most ``size``)."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
 
     def add(self, time: float, size: int) -> None:
-        """Count a message of ``size`` bytes."""
+        """Record a message of ``size`` bytes."""
         self._messages.append((time, size))
 
     def report(self, now: float) -> Bandwidth | None:
-        """Return the statistics; None while fewer than two messages have come."""
+        """Return the statistics; None before the second message."""
         messages = list(self._messages)
         if len(messages) < 2:
             return None
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """The delays of the latest messages after their stamps (at most ``size`` of them; 0 for no limit)."""
+    """The delays between the latest messages' stamps and arrivals (at most ``size``; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
@@ -111,12 +111,12 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """Count a message stamped ``stamp``."""
+        """Record a message with the time ``stamp``."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
     def report(self) -> Spread | None:
-        """Return the statistics; None if nothing has come since the last report."""
+        """Return the statistics; None if no message has arrived since the last report."""
         if self._arrived == self._reported:
             return None
         self._reported = self._arrived
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """Return what `rostopic hz` prints once a second: of one topic two lines, of several a table."""
+    """Return what `rostopic hz` prints once a second: two lines for one topic, a table for several."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -142,7 +142,7 @@ def delay_text(report: Spread | None) -> str:
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return what `rostopic bw` prints once a second: of one topic two lines, of several a table; "" for nothing."""
+    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several; "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Return a number of bytes in the unit that suits the rate."""
+    """Format a number of bytes in the unit that fits the rate."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

@@ -1,4 +1,4 @@
-"""Services: which there are, of which type, who offers them; calling one.
+"""Services: list them, their types and providers; call them.
 
 Source: http://wiki.ros.org/rosservice, http://wiki.ros.org/ROS/TCPROS ("Services").
 """
@@ -47,14 +47,14 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and the nodes that offer it (the last one registered answers)."""
+    """A service and the nodes that provide it (the last one registered answers)."""
 
     name: str
     nodes: tuple[str, ...]
 
 
 class ServiceOffer(NamedTuple):
-    """A service's registration at the master: the node that offers it, and its URI."""
+    """A service's registration at the master: the node that provides it, and its URI."""
 
     node: str
     uri: str
@@ -71,7 +71,7 @@ def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
 
 
 def service_uri(graph: Graph, service: str) -> str:
-    """Return where a service is called (``rosrpc://host:port``). Raise NotFoundError."""
+    """Return the URI of a service (``rosrpc://host:port``). Raise NotFoundError."""
     try:
         return graph.master.lookup_service(service)
     except RpcRefused:
@@ -79,15 +79,15 @@ def service_uri(graph: Graph, service: str) -> str:
 
 
 def service_type(graph: Graph, service: str) -> str:
-    """Return the type of a service, as the node that offers it reports it.
+    """Return the type of a service, as reported by the node that provides it.
 
-    Raise NotFoundError, NodeUnreachableError.
+    Raise NotFoundError or NodeUnreachableError.
     """
     return _probe(graph, service, service_uri(graph, service))
 
 
 def service_offer(graph: Graph, service: str) -> ServiceOffer:
-    """Return who offers a service, and where. Raise NotFoundError."""
+    """Return the node that provides a service, and its URI. Raise NotFoundError."""
     nodes = graph.state().services.get(service)
     if not nodes:
         raise unknown_service(graph, service)
@@ -102,12 +102,12 @@ def service_arguments(type_: str) -> list[str]:
 
 
 def find_services_of_type(graph: Graph, type_: str) -> list[str]:
-    """Return the sorted names of the services of a type; a service that does not answer has none."""
+    """Return the sorted names of the services of a type; services that do not answer are left out."""
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
 def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
-    """Wait until a service is registered and answers; ``on_waiting`` is called once where it does not yet."""
+    """Wait until a service is registered and answers; call ``on_waiting`` once if it is not available yet."""
     if _probed_type(graph, service):
         return
     on_waiting()
@@ -118,8 +118,8 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
-    ``now`` represents the time, ``auto`` a stamped header, whose ``seq`` is 1, as of the first call of a proxy.
-    Raise NotFoundError if the type is not installed, MessageException where the values do not fit.
+    ``now`` stands for the time, ``auto`` for a stamped header, whose ``seq`` is 1, as in the first call of a proxy.
+    Raise NotFoundError if the type is not installed, MessageException if the values do not fit.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.core.idl.message import number_header
@@ -131,7 +131,7 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
-    """Return the response to a filled request. Raise NotFoundError, ServiceException with the handler's text."""
+    """Call a service and return the response. Raise NotFoundError, or ServiceException with the handler's text."""
     from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize
 
@@ -160,7 +160,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """Return a service's type; None if it is not there or does not answer."""
+    """Return a service's type; None if it does not exist or does not answer."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):
@@ -168,7 +168,7 @@ def _probed_type(graph: Graph, service: str) -> str | None:
 
 
 def service_header(graph: Graph, service: str, uri: str) -> Header:
-    """Return the connection header that a service at ``uri`` answers with. Raise NodeUnreachableError."""
+    """Return the connection header of the service at ``uri``. Raise NodeUnreachableError."""
     try:
         client = _connect(graph, service, uri, _ANY, probe=True)
     except (OSError, WireError) as error:
@@ -185,14 +185,14 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return `Connection refused` rather than `[Errno 111] Connection refused`; of a silent process what may stop it."""
+    """Return `Connection refused` instead of `[Errno 111] Connection refused`; for a timeout, the likely cause."""
     if isinstance(error, TimeoutError):
         return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)
 
 
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
-    # Imported here: listing needs none of it.
+    # Imported late: listing services does not need it.
     from minirospy.runtime.node.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

@@ -1,6 +1,6 @@
-"""The whole graph at a moment, and the difference between two moments.
+"""The whole graph at one time, and the difference between two times.
 
-Pure but for :func:`fetch`. Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
+Pure except for :func:`fetch`. Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _ANY = "*"
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Topics and services with their nodes, in the master's order, and the types of topics that are known."""
+    """Topics and services with their nodes, in the master's order, and the known types of topics."""
 
     publishers: Table = field(default_factory=dict)
     subscribers: Table = field(default_factory=dict)
@@ -27,11 +27,11 @@ class Snapshot:
 
     @property
     def topics(self) -> set[str]:
-        """The topics that have publishers or subscribers."""
+        """Return the topics that have publishers or subscribers."""
         return {*self.publishers, *self.subscribers}
 
     def filtered(self, topic: Callable[[str], bool], service: Callable[[str], bool]) -> Snapshot:
-        """Return the part of which the names are allowed."""
+        """Return the part whose topics and services pass the filters."""
         return Snapshot(
             {name: nodes for name, nodes in self.publishers.items() if topic(name)},
             {name: nodes for name, nodes in self.subscribers.items() if topic(name)},
@@ -42,9 +42,9 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Changes:
-    """From one moment to the next: entries that are new or differ, each whole, and names that are no more.
+    """The difference between two snapshots: new or changed entries, each complete, and removed names.
 
-    A topic that lost its last publisher but has subscribers is in ``publishers`` without nodes.
+    A topic that lost its last publisher but has subscribers is in ``publishers`` with no nodes.
     """
 
     publishers: Table
@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference; types do not count."""
+    """Return the difference; ignore changes of types."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the present graph; ``call(method, *arguments)`` calls the master. Raise as it does."""
+    """Return the current graph; ``call(method, *arguments)`` calls the master. Raise as ``call`` does."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -1,7 +1,7 @@
-"""Listening and publishing: a node of the tool's own, several in a process allowed.
+"""Listen and publish with a separate node for a tool; a process may have several.
 
-Bytes arrive in a worker of each connection; :class:`Inbox` hands them to the thread that reads, and holds the
-publishers back while that thread is busy (a slow terminal is not a growing memory).
+Bytes arrive in a worker per connection; :class:`Inbox` passes them to the reading thread, and blocks the workers while that
+thread is busy, so that a slow terminal does not make memory grow.
 """
 
 from __future__ import annotations
@@ -37,15 +37,14 @@ if TYPE_CHECKING:
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
 _POLL_SECONDS = 0.1
-_WAITING = 64
-"""Messages that may wait for the reader."""
+_WAITING = 64  # messages queued for the reader
 
 _SLICE = 0.05 if sys.platform == "win32" else 3600.0
-"""On Windows Ctrl-C does not end a wait of the main thread: there a wait is cut into slices."""
+"""On Windows Ctrl-C does not interrupt a wait of the main thread, so waits are split into short slices."""
 
 
 class Received(NamedTuple):
-    """A message as it came: its bytes, its publisher's connection header, when (since the epoch)."""
+    """A received message: its bytes, its publisher's connection header, and the receive time (since the epoch)."""
 
     body: bytes
     header: Header
@@ -53,15 +52,15 @@ class Received(NamedTuple):
 
     @property
     def time(self) -> float:
-        """When it came, in seconds since the epoch."""
+        """Return the receive time in seconds since the epoch."""
         return self.nanoseconds / 1e9
 
 
 class ToolNode:
     """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it has to stop.
 
-    ``clock`` gives the time of messages: the machine's time; with ``ros_time`` that of /clock where the parameter
-    /use_sim_time requests it, which ``simulated`` says then. Raise MasterUnreachableError if no master answers.
+    ``clock`` is the machine's time or, with ``ros_time`` and if the parameter /use_sim_time is set, the time from /clock;
+    ``simulated`` is True then. Raise MasterUnreachableError if no master answers.
     """
 
     def __init__(
@@ -103,7 +102,7 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep for this long, or until the node has to stop: True then. Raise what :meth:`measure` met."""
+        """Sleep for ``seconds`` or until the node has to stop, and return True then. Raise an error from :meth:`measure`."""
         end = time.monotonic() + seconds
         while not self.ended.is_set():
             rest = end - time.monotonic()
@@ -115,7 +114,7 @@ class ToolNode:
         return True
 
     def wait_for_time(self, seconds: float) -> None:
-        """Wait until /clock has given the time, for this long at most."""
+        """Wait until a time has arrived on /clock, for ``seconds`` at most."""
         end = time.monotonic() + seconds
         while not self.clock.now() and time.monotonic() < end and not self.wait(0.01):
             pass
@@ -123,11 +122,11 @@ class ToolNode:
     def listen(
         self, topic: str, deliver: Callable[[Frame, Header], None], *, tcp_nodelay: bool = False
     ) -> None:
-        """Call ``deliver(bytes, header)`` in a worker with each message of a topic, whatever its type.
+        """Call ``deliver(bytes, header)`` in a worker for each message of a topic of any type.
 
-        The bytes are valid during the call only. A node subscribes to a topic once: a later listener, as to the
-        /clock that the node itself follows, is called by the same worker; in this thread first, with the last message
-        of a latched publisher that has come already.
+        The bytes are valid only during the call. A node subscribes to a topic once: a later listener, for example to the
+        /clock that the node itself uses, is called by the same worker. Before that it is called in this thread with the
+        last message that has arrived from each latched publisher.
         """
         if topic in self._listeners:
             self._listeners[topic].add(deliver)
@@ -140,7 +139,7 @@ class ToolNode:
         self._loop.run(self._node.subscribe(subscription))
 
     def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
-        """Call ``add`` in a worker with each message of a topic; a fault of it is raised in :meth:`wait`."""
+        """Call ``add`` in a worker for each message of a topic; :meth:`wait` raises its exception."""
 
         def deliver(body: Frame, header: Header) -> None:
             try:
@@ -156,7 +155,7 @@ class ToolNode:
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
-        """Return the messages of a topic, to be read by one thread."""
+        """Subscribe to a topic and return its messages, for one reading thread."""
         inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
@@ -165,7 +164,7 @@ class ToolNode:
     def publisher(
         self, topic: str, message_class: type[Message], *, latch: bool, queue_size: int = 100
     ) -> TopicPublisher:
-        """Publish a topic of an installed message class from now on."""
+        """Advertise a topic of an installed message class."""
         type_ = InterfaceType.of(message_class)
         publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
         self._loop.run(self._node.advertise(publication))
@@ -176,7 +175,7 @@ class ToolNode:
         try:
             self.simulated = bool(master.get_param("/use_sim_time"))
         except RpcRefused:
-            return  # nobody set it
+            return  # the parameter is not set
         finally:
             master.close()
         if self.simulated:
@@ -198,16 +197,16 @@ class ToolNode:
 
 
 class _Listeners:
-    """The functions that get the messages of one topic, each message once."""
+    """The functions to call for each message of one topic, once per message."""
 
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
         self._lock = threading.Lock()
-        # The publisher's name -> its last message, of publishers that latch.
+        # Publisher's name -> its last message, for latched publishers.
         self._latched: dict[str, tuple[bytes, Header]] = {}
 
     def add(self, function: Callable[[Frame, Header], None]) -> None:
-        """Call ``function`` from now on, and immediately with the messages of latched publishers."""
+        """Call ``function`` immediately with latched messages, and then for each new message."""
         with self._lock:
             self._functions += (function,)
             latched = [*self._latched.values()]
@@ -215,8 +214,8 @@ class _Listeners:
             function(body, header)
 
     def deliver(self, body: Frame, header: Header) -> None:
-        """Call all with a message that has arrived (in a worker)."""
-        # A function that is added meanwhile gets this message from here or from add(), not from both.
+        """Call all functions with a new message (in a worker)."""
+        # A function that is added now gets this message either from here or from add(), not from both.
         with self._lock:
             functions = self._functions
             if header.get("latching") == "1":
@@ -226,7 +225,7 @@ class _Listeners:
 
 
 class Inbox:
-    """Messages between the workers that receive them and the one thread that reads them."""
+    """A queue between the workers that receive messages and the one thread that reads them."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -234,7 +233,7 @@ class Inbox:
         self._closed = threading.Event()
 
     def put(self, body: Frame, header: Header) -> None:
-        """Take a message; wait while too many are unread."""
+        """Queue a message; wait while too many are unread."""
         received = Received(bytes(body), header, self._clock.now())
         while not self._closed.is_set():
             try:
@@ -244,13 +243,13 @@ class Inbox:
             return
 
     def close(self) -> None:
-        """End the reading: what has come is still read."""
+        """End the reading after the queued messages."""
         if not self._closed.is_set():
             self._closed.set()
             try:
                 self._messages.put_nowait(None)
             except queue.Full:
-                pass  # the reader sees it when it has read what is there
+                pass  # the queue is full: the reader checks the flag when it has read all messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:
@@ -266,7 +265,7 @@ class Inbox:
 
 
 class TopicPublisher:
-    """Publishes messages on one topic, from one thread."""
+    """Publishes messages on one topic from one thread."""
 
     def __init__(self, publication: Publication) -> None:
         self._publication = publication
@@ -278,13 +277,13 @@ class TopicPublisher:
         return len(self._publication.links)
 
     def wait_for_subscriber(self, wait: Callable[[float], bool], seconds: float) -> None:
-        """Wait until a subscriber is connected, for this long at most, or until ``wait(step)`` returns True."""
+        """Wait until a subscriber is connected, ``seconds`` have passed, or ``wait(step)`` returns True."""
         end = time.monotonic() + seconds
         while not self.connections and time.monotonic() < end and not wait(0.02):
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message; its header is numbered. Raise MessageException if a value does not fit."""
+        """Send a message and number its header. Raise MessageException if a value does not fit."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
@@ -292,7 +291,7 @@ class TopicPublisher:
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
-    """Return the topic that ``name`` is, or is a field of, once it is published; ``on_waiting`` is called once."""
+    """Wait until ``name``, a topic or a field of one, is published; return it. Call ``on_waiting`` once if it has to wait."""
     field = find_topic(graph, name)
     if field is None:
         on_waiting()

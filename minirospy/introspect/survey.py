@@ -1,8 +1,8 @@
-"""The whole graph as its nodes report it: processes, types, connections, and the traffic between two moments.
+"""The whole graph as its nodes report it: processes, types, connections, and the traffic between two surveys.
 
-Of processes of this machine also what they cost.
+For local processes also their CPU and memory use.
 
-What nodes count themselves (getBusStats), so that nobody has to subscribe to measure a topic.
+Traffic comes from the nodes' own counters (getBusStats), so that measuring a topic needs no subscription.
 Source: http://wiki.ros.org/ROS/Slave_API (getBusStats, getBusInfo).
 """
 
@@ -24,7 +24,7 @@ __all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
 
 
 class Edge(NamedTuple):
-    """A connection by which a topic travels: the node that sends, and the node that receives."""
+    """A connection of a topic: the sending node and the receiving node."""
 
     sender: str
     topic: str
@@ -32,7 +32,7 @@ class Edge(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Messages and bytes that a connection has carried since it was opened."""
+    """Messages and bytes sent over a connection since it was opened."""
 
     messages: int
     bytes: int
@@ -40,7 +40,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """The graph at a moment (seconds of a monotonic clock). ``counts``: by process, connection and edge; ``loads``: by node."""
+    """The graph at one time (monotonic seconds). ``counts``: by process, connection and edge; ``loads``: by node."""
 
     seconds: float
     state: SystemState
@@ -51,7 +51,7 @@ class Survey:
 
 
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
-    """Query the master and all nodes, side by side; with ``processes`` their loads, too. Raise MasterUnreachableError."""
+    """Query the master and all nodes in parallel; with ``processes``, also measure loads. Raise MasterUnreachableError."""
     state = graph.state()
     answers = ask_nodes(graph, state, with_stats=True)
     host, port = host_port(graph.master.uri)
@@ -68,14 +68,14 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
 
 
 def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
-    """Return messages and bytes a second of each edge that was there at both moments."""
+    """Return messages and bytes per second of each edge that exists in both surveys."""
     if before is None or after.seconds <= before.seconds:
         return {}
     span = after.seconds - before.seconds
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp counts with 32 bits: what wraps around is left out.
+        # roscpp's counters have 32 bits: skip those that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))
@@ -84,7 +84,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Return a survey as JSON has it: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
+    """Return a survey for JSON: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
     held: dict[str, list[str]] = {}
     for service, nodes in now.state.services.items():
         for node in nodes:
@@ -144,7 +144,7 @@ def _topics(
 
 
 def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return what a node counted for each connection by which it sends; nothing if its rows are not as documented."""
+    """Return a node's counters for each outbound connection; {} if its rows are not as documented."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }

@@ -1,4 +1,4 @@
-"""The texts of `rosnode info` and `rostopic info`. Pure but for the addresses that are looked up in the graph."""
+"""The output of `rosnode info` and `rostopic info`. Pure except for addresses that are looked up in the graph."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DIRECTIONS = {"i": "inbound", "o": "outbound", "b": "bidirectional"}
 
 
 def node_text(detail: NodeDetail) -> str:
-    """Return what the master knows of a node."""
+    """Format the master's information about a node."""
 
     def section(title: str, rows: list[str]) -> str:
         return f"{title}: " + ("\n" + "\n".join(f" * {row}" for row in rows) if rows else "None") + "\n"
@@ -36,14 +36,14 @@ def node_text(detail: NodeDetail) -> str:
 
 
 def connections_text(graph: Graph, connections: Connections) -> str:
-    """Return what a node says of itself: process id and connections."""
+    """Format what a node reports about itself: process id and connections."""
     lines = [f"Pid: {connections.pid}"]
     if connections.links:
         names = {graph.node_uri(node): node for node in list_nodes(graph)}
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # An inbound connection names its publisher by URI.
+            # For an inbound connection the publisher is given by its URI.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",
@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """``outbound (port - host:port) [socket]``: the numbers are in the text that nodes send along."""
+    """Return ``outbound (port - host:port) [socket]``; the numbers are parsed from the text that nodes send."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

@@ -1,4 +1,4 @@
-"""Topics: which there are, of which type, who publishes and subscribes.
+"""Topics: list them, their types, publishers and subscribers.
 
 Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
 """
@@ -30,13 +30,13 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""What is printed for the type of a topic that nobody has named yet: its subscribers take any."""
+"""Printed for a topic whose type no node has declared: it has only subscribers to any type."""
 
 _ANY = "*"
 
 
 class TopicNodes(NamedTuple):
-    """A topic, its type, and the nodes on one side of it."""
+    """A topic, its type, and its publishers or its subscribers."""
 
     name: str
     type: str
@@ -44,14 +44,14 @@ class TopicNodes(NamedTuple):
 
 
 class TopicList(NamedTuple):
-    """The topics of a graph from both sides, in the master's order."""
+    """The topics of a graph with publishers and with subscribers, in the master's order."""
 
     published: list[TopicNodes]
     subscribed: list[TopicNodes]
 
 
 class TopicDetail(NamedTuple):
-    """A topic, its type, and who is connected to it."""
+    """A topic, its type, publishers and subscribers."""
 
     name: str
     type: str
@@ -60,7 +60,7 @@ class TopicDetail(NamedTuple):
 
 
 class TopicField(NamedTuple):
-    """A topic's name taken apart: the topic, its type, and the path of a field inside its messages."""
+    """A name split into the topic, its type, and the path of a field in its messages."""
 
     topic: str
     type: str
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """Return the topics of each host that has nodes on them, hosts sorted."""
+    """Return the topics by host, for hosts with nodes that use them, hosts sorted."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -110,7 +110,7 @@ def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
 
 
 def topic_detail(graph: Graph, topic: str) -> TopicDetail:
-    """Type, publishers and subscribers of a topic. Raise NotFoundError."""
+    """Return the type, publishers and subscribers of a topic. Raise NotFoundError."""
     state = graph.state()
     publishers, subscribers = state.publishers.get(topic, []), state.subscribers.get(topic, [])
     if not publishers and not subscribers:
@@ -124,15 +124,15 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 
 
 def find_topic(graph: Graph, name: str) -> TopicField | None:
-    """Return the topic that ``name`` (global) is, or is a field of: ``/pose/header/stamp``.
+    """Return the topic for ``name`` (global), which names a topic or a field of one: ``/pose/header/stamp``.
 
-    None if the topic does not exist, or its type is not known yet. A topic of the whole name comes
-    before a field of a shorter one.
+    Return None if the topic does not exist, or its type is not known yet. A topic with the whole name takes precedence over
+    a field of a topic with a shorter name.
     """
     types = {topic: type_ for topic, type_ in graph.master.get_topic_types().items() if type_ != _ANY}
     if name in types:
         return TopicField(name, types[name], "")
-    # `/a/b[0]` can be an element of the field b of /a, never of the topic /a/b itself.
+    # `/a/b[0]` can be an element of the field b of /a, but not of the topic /a/b.
     holders = [topic for topic in types if name.startswith(topic + "/")]
     if not holders:
         return None
@@ -148,7 +148,7 @@ def find_topics_of_type(graph: Graph, type_: str) -> list[str]:
 def topic_field_type(field: TopicField) -> str:
     """Return the type of a field of a topic's messages.
 
-    Raise NotFoundError if the message has no such field, or its type is not installed here.
+    Raise NotFoundError if the message has no such field, or its type is not installed.
     """
     from minirospy.core.idl.load import message_class
     from minirospy.introspect.fields import field_type
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Like :func:`find_topic`. Raise NotFoundError if there is none or its type is not known."""
+    """Return the topic as :func:`find_topic` does. Raise NotFoundError if there is none or its type is not known."""
     field = find_topic(graph, name)
     if field:
         return field

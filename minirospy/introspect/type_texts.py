@@ -1,4 +1,4 @@
-"""Full texts and md5sums of the types of topics and services: from installed packages, else from the publishers."""
+"""Full definitions and md5sums of topic and service types, from installed packages or else from publishers."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 _MAX_NAMES = 2_000
-"""Types that are remembered, also those that are not installed: a peer may name any number."""
-_AT_ONCE = 32
-"""Publishers that are queried at a time."""
+"""Cached types, including the names of types that are not installed: a peer may send any number."""
+_AT_ONCE = 32  # publishers queried concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:
-    """Return a message type of the installed packages; None if there is none, or it cannot be read."""
+    """Return an installed message type; None if it is not installed or cannot be read."""
     from minirospy.core.idl.load import get_message_class
 
     try:
@@ -37,7 +36,7 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type that a full text defines; None if it does not parse. No class is made: that takes a second."""
+    """Return the type for a full definition; None if it does not parse. Generates no class, which would take a second."""
     from minirospy.core.idl.load import checked_text
 
     try:
@@ -47,7 +46,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Message types by topic. Importing a type's module takes milliseconds: it is done in a worker, once."""
+    """Message types by topic. Importing a type's module takes milliseconds, so it is done once, in a worker."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -57,7 +56,7 @@ class TypeTexts:
     async def of_publishers(
         self, topics: Mapping[str, tuple[str, ...]], seconds: float
     ) -> dict[str, InterfaceType]:
-        """Return the types of these topics that one of their publishers names in time: each may stall."""
+        """Query the publishers of these topics; return the types that arrive within ``seconds``: a publisher may stall."""
         if not topics:
             return {}
         limit = asyncio.Semaphore(_AT_ONCE)
@@ -77,14 +76,14 @@ class TypeTexts:
         return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
-        """Return an installed type, None if there is none of the name."""
+        """Return an installed type, None if it is not installed."""
         if name in self._installed:
             return self._installed[name]
 
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
         while len(self._installed) >= _MAX_NAMES:
-            # The oldest: dictionaries keep their order.
+            # Remove the oldest entry: dictionaries keep their order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found
         return found
@@ -99,7 +98,7 @@ class TypeTexts:
         return None
 
     async def _header_of(self, topic: str, publisher: str) -> Header:
-        """Return a publisher's connection header: connect as a subscriber, and hang up."""
+        """Return a publisher's connection header: connect as a subscriber, then disconnect."""
         uri = await self._node._node.master("lookupNode", publisher)
         answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
         match answer:
@@ -123,7 +122,7 @@ class TypeTexts:
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """A service's type: full texts of request and response."""
+    """A service's type: full definitions of request and response."""
 
     name: str
     type: str
@@ -133,7 +132,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the type that a service's connection header names. Raise NotFoundError if it is not installed here."""
+    """Return the type named in a service's connection header. Raise NotFoundError if it is not installed."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

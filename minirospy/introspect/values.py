@@ -1,7 +1,7 @@
-"""Values as people type and read them: YAML text in, parameter values out, and back.
+"""Parse and format values as users write and read them: YAML text to parameter values, and back.
 
-Pure. Simple values, which most parameters are, are read and written without importing a YAML library: that
-import costs more than all else that `rosparam get` does. ``deg(90)`` and ``rad(pi/2)`` are angles in radians.
+Pure. Simple values, which most parameters are, are parsed and formatted without importing a YAML library, because the import
+takes longer than everything else that `rosparam get` does. ``deg(90)`` and ``rad(pi/2)`` are angles in radians.
 Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
 """
 
@@ -39,11 +39,11 @@ _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
 _LONGEST_ANGLE = 200
-_LONGEST_SHOWN = 40  # digits of an integer that an error shows
+_LONGEST_SHOWN = 40  # digits of an integer in an error message
 
 
 def parse_value(text: str) -> object:
-    """Return the value of a YAML text. Raise ValueTextError."""
+    """Parse a YAML string. Raise ValueTextError."""
     word = text.strip()
     whole, dot, fraction = word.removeprefix("-").partition(".")
     if _is_digits(whole) and dot and _is_digits(fraction):
@@ -60,13 +60,13 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # A byte of the command line that is not UTF-8 is a usage error, which the command reports.
+            # An argument that is not UTF-8 is a usage error, which the command reports.
             raise error.__cause__ from None
         raise ValueTextError(text, one_line(error)) from error
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
-    """Yield the values of the documents of a YAML text, ``---`` between them. Raise ValueTextError."""
+    """Yield the values of a YAML string's documents, which are separated by ``---``. Raise ValueTextError."""
     import yaml
 
     try:
@@ -76,7 +76,7 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
-    """Like :func:`parse_documents`, each as soon as its last line has come: `rostopic echo /a | rostopic pub /b TYPE`."""
+    """Yield values as :func:`parse_documents`, each as soon as it is complete: `rostopic echo /a | rostopic pub /b TYPE`."""
     text: list[str] = []
     for line in lines:
         if line.rstrip() != "---":
@@ -88,19 +88,19 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
 
 
 def parse_arguments(words: Sequence[str]) -> list[object]:
-    """Return the values that a command line gives a message. An empty word is the empty text; to YAML it would be null."""
+    """Parse a message's values from the command line. An empty argument is an empty string; in YAML it would be null."""
     return [parse_value(word) if word else "" for word in words]
 
 
 def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
-    """Yield the values that each document gives a message: a list has one for each field."""
+    """Yield each document's values for a message: a list has one value per field."""
     for document in documents:
         if document is not None:
             yield document if isinstance(document, list) else [document]
 
 
 def format_value(value: object) -> str:
-    """Return a value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
+    """Format a value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -113,14 +113,14 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object) -> str:
-    """Return a value for people's eyes, as `rosparam get -p` prints it: texts bare, not to be parsed again."""
+    """Format a value for people, as `rosparam get -p` prints it: strings unquoted, not meant to be parsed."""
     if isinstance(value, dict):
         return "\n".join(_pretty_lines(value, ""))
     return value if isinstance(value, str) else format_value(value)
 
 
 def check_parameter(value: object, name: str) -> None:
-    """Raise ValueTextError if a value, or one inside it, is nothing that a parameter can hold."""
+    """Raise ValueTextError if a value, or one inside it, cannot be stored as a parameter."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if not isinstance(key, str):
@@ -146,12 +146,12 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Nine digits at most: what YAML reads as Python does. By hand: to compile expressions takes a start's time."""
+    """Return whether a string is at most nine ASCII digits. Not a regular expression: compiling one slows the start."""
     return text.isascii() and text.isdecimal() and len(text) <= 9
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML reads a text as itself, for it has only letters, digits, / and _."""
+    """Return whether YAML parses a string as itself: it has only letters, digits, / and _, and no special meaning."""
     return (
         len(word) > 1
         and word.isascii()
@@ -186,7 +186,7 @@ def _loader() -> type[yaml.SafeLoader]:
 
 
 def add_angles(loader_class: type[_Loader]) -> None:
-    """Teach a YAML loader angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
+    """Add angles to a YAML loader: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
     import yaml
 
     in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
@@ -210,12 +210,12 @@ def add_angles(loader_class: type[_Loader]) -> None:
 
 
 def _arithmetic(text: str) -> float:
-    """Return the value of a sum over numbers and ``pi``. Raise ValueError, SyntaxError or ArithmeticError."""
+    """Evaluate an arithmetic expression over numbers and ``pi``. Raise ValueError, SyntaxError or ArithmeticError."""
     import ast
     import operator
 
     if len(text) > _LONGEST_ANGLE:
-        # Python's parser has its own limits, and its own errors for them.
+        # Longer strings may exceed limits of Python's parser, which raises other errors then.
         raise ValueError(f"more than {_LONGEST_ANGLE} characters")
     binary = {
         ast.Add: operator.add,

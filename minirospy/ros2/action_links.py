@@ -1,4 +1,4 @@
-"""Which actions are bridged: from what both graphs have at a moment. Pure."""
+"""Select the actions to bridge from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action that is offered on one side and used from the other. ``direction``: where goals go."""
+    """An action that is offered on one side and used from the other. ``direction``: the direction of goals."""
 
     action: str
     direction: Direction
@@ -25,21 +25,21 @@ class ActionLink:
 
     @property
     def title(self) -> str:
-        """How messages to people name the link."""
+        """Return the link's name for log messages."""
         return f"action {self.action}"
 
 
 def send_goal_service(action: str) -> str:
-    """Return the service by which an action of ROS 2 gets its goals."""
+    """Return the name of the service by which a ROS 2 action receives goals."""
     return action + _SEND_GOAL
 
 
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return what is to be bridged: each action that one side alone offers, bridges not counted.
+    """Return the actions to bridge: those that only one side offers, apart from bridges.
 
-    ``ros2_services``: services and their types. ``partner(type, direction)``: the type of the side that sends goals.
+    ``ros2_services``: services and their types. ``partner(type, direction)`` returns the type on the goals' sending side.
     """
     here = dict(_of_ros1(ros1))
     there = {
@@ -64,7 +64,7 @@ def _of_ros1(ros1: Snapshot) -> list[tuple[str, str]]:
         if not topic.endswith("/goal") or not type_.endswith(_GOAL_TYPE):
             continue
         name = topic.removesuffix("/goal")
-        # A server is who takes goals and publishes results.
+        # A server subscribes to goals and publishes results.
         servers = set(ros1.subscribers.get(topic, ())) & set(ros1.publishers.get(f"{name}/result", ()))
         if not all(map(is_bridge, servers)):
             found.append((name, type_.removesuffix(_GOAL_TYPE)))

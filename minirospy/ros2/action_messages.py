@@ -1,4 +1,4 @@
-"""The messages of an action in ROS 1 as bytes: what is around a goal, a feedback and a result, which are passed on. Pure.
+"""Serialize and parse the ROS 1 messages of an action around goals, feedback and results, which stay bytes. Pure.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
 """
@@ -30,7 +30,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class GoalId(NamedTuple):
-    """A goal: its id, and when it was sent, in seconds and nanoseconds."""
+    """A goal's id and the time when it was sent, in seconds and nanoseconds."""
 
     id: str
     secs: int = 0
@@ -38,12 +38,12 @@ class GoalId(NamedTuple):
 
     @property
     def nanoseconds(self) -> int:
-        """The stamp as one number, 0 if there is none."""
+        """Return the time in nanoseconds, 0 if there is none."""
         return self.secs * 1_000_000_000 + self.nsecs
 
 
 class Status(NamedTuple):
-    """A goal's status: a number of GoalState, and a text for people."""
+    """A goal's status: a number of GoalState, and a text for users."""
 
     goal: GoalId
     state: int
@@ -51,47 +51,47 @@ class Status(NamedTuple):
 
 
 def goal_message(goal: GoalId, body: bytes) -> bytes:
-    """Return an ActionGoal."""
+    """Serialize an ActionGoal."""
     return _header(goal.secs, goal.nsecs) + _goal_id(goal) + body
 
 
 def parse_goal(data: bytes | memoryview) -> tuple[GoalId, bytes]:
-    """Return a goal's id and its body, of an ActionGoal. Raise DeserializationError."""
+    """Return the goal's id and body from an ActionGoal. Raise DeserializationError."""
     data = bytes(data)
     goal, end = _parse_goal_id(data, _parse_header(data))
     return goal, data[end:]
 
 
 def cancel_message(goal: GoalId) -> bytes:
-    """Return a GoalID."""
+    """Serialize a GoalID."""
     return _goal_id(goal)
 
 
 def parse_cancel(data: bytes | memoryview) -> GoalId:
-    """Return a GoalID. Raise DeserializationError."""
+    """Parse a GoalID. Raise DeserializationError."""
     return _parse_goal_id(bytes(data), 0)[0]
 
 
 def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes:
-    """Return an ActionFeedback or ActionResult."""
+    """Serialize an ActionFeedback or ActionResult."""
     return _header(secs, nsecs) + _status(status) + body
 
 
 def parse_status_and_body(data: bytes | memoryview) -> tuple[Status, bytes]:
-    """Return the parts of an ActionFeedback or ActionResult. Raise DeserializationError."""
+    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError."""
     data = bytes(data)
     status, end = _parse_status(data, _parse_header(data))
     return status, data[end:]
 
 
 def statuses_message(secs: int, nsecs: int, statuses: Iterable[Status]) -> bytes:
-    """Return a GoalStatusArray."""
+    """Serialize a GoalStatusArray."""
     parts = [_status(each) for each in statuses]
     return _header(secs, nsecs) + _LENGTH.pack(len(parts)) + b"".join(parts)
 
 
 def parse_statuses(data: bytes | memoryview) -> list[Status]:
-    """Return the statuses of a GoalStatusArray. Raise DeserializationError."""
+    """Parse a GoalStatusArray. Raise DeserializationError."""
     data = bytes(data)
     end = _parse_header(data)
     (count,) = _unpacked(_LENGTH, data, end)
@@ -150,5 +150,5 @@ def _parse_text(data: bytes, start: int) -> tuple[str, int]:
 def _unpacked(struct_: struct.Struct, data: bytes, start: int) -> tuple[int, ...]:
     try:
         return struct_.unpack_from(data, start)
-    except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
+    except (struct.error, OverflowError) as error:  # OverflowError: an offset that does not fit 32 bits
         raise DeserializationError("the message ends too early") from error

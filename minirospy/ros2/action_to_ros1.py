@@ -1,4 +1,4 @@
-"""An action of ROS 1 that the bridge offers in ROS 2: goals go to ROS 1, feedback and results come back."""
+"""A ROS 1 action that the bridge offers in ROS 2: goals go to ROS 1, feedback and results come back."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 _SERVER_SECONDS = 5.0
-"""How long a server of ROS 1 may take to be connected, and to name a goal in its list of statuses."""
+"""Timeout for a ROS 1 server to connect, and to list a new goal in its statuses."""
 MAX_GOALS = 1_000
-"""Goals that are passed on at a time: more are refused."""
+"""Goals that are passed on concurrently; further ones are refused."""
 _PENDING_SECONDS = 0.5
-"""After this a goal that is still pending counts as accepted: ROS 2 has no such state."""
+"""After this a goal that is still pending counts as accepted, because ROS 2 has no such state."""
 _ENDS = {
     GoalState.SUCCEEDED: SUCCEEDED,
     GoalState.PREEMPTED: CANCELED,
@@ -49,7 +49,7 @@ _REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
 
 
 class _Goal:
-    """A goal of ROS 2 at a server of ROS 1."""
+    """A ROS 2 client's goal on a ROS 1 server."""
 
     def __init__(
         self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]
@@ -62,7 +62,7 @@ class _Goal:
         self._cancel = cancel
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal. From any thread."""
+        """Request the server to cancel the goal. May be called from any thread."""
         self._cancel(self)
 
     def accept(self, is_accepted: bool) -> None:
@@ -75,7 +75,7 @@ class _Goal:
 
 
 class GoalsToRos1:
-    """The client in ROS 1. On the node's loop."""
+    """The client of the ROS 1 server. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -110,8 +110,8 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """End it: goals that run are aborted, those whose result has come get it."""
-        # A result that has come is taken in the next round.
+        """Close the action: running goals are aborted, those whose result has arrived receive it."""
+        # A result that has arrived is processed in the loop's next iteration.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -120,13 +120,13 @@ class GoalsToRos1:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._server:
-            # It waits until what is known is sent.
+            # close() blocks until known results have been sent.
             await self._loop.run_in_executor(None, self._server.close)
         for end in (*self._subscriptions, self._goal, self._cancel):
             await end.close()
 
     def _accept(self, data: bytes, feedback: Callable[[bytes], None]) -> Future[GoalOfRos1 | None]:
-        """Start a goal. In the executor's thread."""
+        """Start a goal. Runs in the executor's thread."""
         accepted: Future[GoalOfRos1 | None] = Future()
         self._loop.call_soon_threadsafe(self._start, data, feedback, accepted)
         return accepted
@@ -137,14 +137,14 @@ class GoalsToRos1:
         if self._is_closed:
             accepted.set_exception(BridgeError("it is not bridged any more"))
             return
-        # Those that are being accepted, and those that run.
+        # Count goals that are being accepted, and running ones.
         if len(self._tasks) + len(self._goals) >= MAX_GOALS:
             accepted.set_exception(BridgeError(f"the bridge passes on {MAX_GOALS} goals already"))
             return
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # Of a task that is cancelled, also before its first step.
+        # Also if the task is cancelled, even before its first step.
         task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
@@ -177,7 +177,7 @@ class GoalsToRos1:
         return goal if is_accepted else None
 
     async def _connected(self) -> None:
-        """Wait until the server takes goals and its answers arrive: a goal that is sent before is lost."""
+        """Wait until the server is connected in both directions: a goal sent before that would be lost."""
         await self._heard.wait()
         for publisher in (self._goal, self._cancel):
             await publisher.wait_for_subscribers()
@@ -209,7 +209,7 @@ class GoalsToRos1:
             state = listed.get(goal.id.id)
             if state is None:
                 if goal.is_listed:
-                    # The server was started again: it does not know the goal any more.
+                    # The server has been restarted and no longer knows the goal.
                     self._end(goal, ABORTED, None)
             elif state == GoalState.PENDING:
                 if not goal.is_listed:
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback has a separate connection: what has arrived by now is read first.
+        # Feedback has a separate connection: process what has already arrived first.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

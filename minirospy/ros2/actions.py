@@ -1,4 +1,4 @@
-"""Actions that pass from one side to the other: which are opened and closed, and how their messages are converted."""
+"""Actions between the two sides: open and close them, and convert their messages."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """How an action's messages are converted; ``classes``: of its topics in ROS 1, by their last name."""
+    """Converts an action's messages; ``classes``: the types of its ROS 1 topics, by the topics' last name."""
 
     goal: Transcoder
     result: Transcoder
@@ -45,7 +45,7 @@ class ActionCodec:
 
 
 class _Types:
-    """The codecs of actions, by the names of both types."""
+    """The codecs of actions, by their types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -54,7 +54,7 @@ class _Types:
         self._codecs: dict[tuple[str, str], ActionCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type of the side that sends goals, for that of the side that offers."""
+        """Return the type on the side that sends goals, for the type on the offering side."""
         names: tuple[str, ...]
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_actions(type_)
@@ -114,7 +114,7 @@ class _Types:
 
 
 def empty_message(spec: MessageSpec, lookup: Lookup) -> bytes:
-    """Return the bytes of a message of ROS 1 whose fields are all zero or empty."""
+    """Return the bytes of a ROS 1 message whose fields are all zero or empty."""
 
     def of_type(type_: FieldType) -> bytes:
         if type_.is_array and type_.length is None:
@@ -131,7 +131,7 @@ def empty_message(spec: MessageSpec, lookup: Lookup) -> bytes:
 
 
 class ActionBridge:
-    """Offers the actions of each side to the other one. On the node's loop."""
+    """Offers each side's actions on the other side. Runs on the node's loop."""
 
     def __init__(
         self, node: Node, side: Ros2Side, actions: NameFilter, rules: Rules, catalogue: Catalogue
@@ -143,15 +143,15 @@ class ActionBridge:
         self._table: LinkTable[ActionLink, GoalsToRos1 | GoalsToRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:
-        """Close all. Idempotent."""
+        """Close all actions. Idempotent."""
         await self._table.close()
 
     def pairs(self, snapshot: Snapshot) -> list[Pair]:
-        """Return what would be bridged, and why something is not."""
+        """Return the actions to bridge, and the reasons why some are not bridged."""
         return pairs(self._wanted(snapshot), self._codec)
 
     async def look(self, snapshot: Snapshot) -> bool:
-        """Open and close actions as both sides are now; whether any changed."""
+        """Open and close actions to match both graphs; return whether any changed."""
         return await self._table.update(self._wanted(snapshot))
 
     def _wanted(self, snapshot: Snapshot) -> list[ActionLink]:

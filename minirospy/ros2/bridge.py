@@ -1,4 +1,4 @@
-"""The bridge as a whole: looks at both graphs, opens links where each side has an end, and closes them again."""
+"""The whole bridge: polls both graphs, and opens and closes links to match their endpoints."""
 
 from __future__ import annotations
 
@@ -49,23 +49,23 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Field of the connection header of what comes from ROS 2, so that no bridge to the same domain sends it back."""
+"""Connection header field of publishers for ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
 _QUERY_SECONDS = 3.0
-"""After this topics are bridged without what is still queried of their publishers."""
+"""Timeout, after which topics are bridged without unanswered publishers' information."""
 _JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Messages that may wait: for as long as a busy machine takes to come back, and no longer for images."""
+"""Queued messages: enough for a pause of a busy machine, except for images."""
 
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """``topics``, ``services``, ``actions``: which may be bridged. ``call_seconds``: how long a call of a service may take.
+    """``topics``, ``services``, ``actions``: filters of what to bridge. ``call_seconds``: timeout of service calls.
 
-    ``max_refresh_interval``: seconds between looks at graphs that do not change.
+    ``max_refresh_interval``: seconds between polls of graphs that do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -77,7 +77,7 @@ class Ros2Options:
 
 
 class _Types:
-    """Specs, interface types and transcoders by the names of both types."""
+    """Specs, interface types and transcoders, by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -86,11 +86,11 @@ class _Types:
         self._ros2 = lru_cache(maxsize=None)(self._ros2_spec)
 
     def interface(self, spec: MessageSpec, lookup: Lookup) -> InterfaceType:
-        """Return what a connection header says of a type."""
+        """Return the type information for a connection header."""
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return a message type of the packages here. Raise TypesDiffer."""
+        """Return an installed message type. Raise TypesDiffer."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:
@@ -99,7 +99,7 @@ class _Types:
             ) from error
 
     def of_text(self, name: str, text: str) -> tuple[MessageSpec, Lookup]:
-        """Return the type that a publisher's full text defines. Raise TypesDiffer."""
+        """Return the type for a publisher's full definition. Raise TypesDiffer."""
         try:
             specs = specs_of_text(name, text)
         except DefinitionError as error:
@@ -113,7 +113,7 @@ class _Types:
         return specs[name], lookup
 
     def transcoder(self, spec: MessageSpec, lookup: Lookup, ros2_type: str) -> Transcoder:
-        """Return the functions that convert. Raise TypesDiffer."""
+        """Return the conversion functions. Raise TypesDiffer."""
         allowed = self._rules.ros2_messages(spec.full_name)
         if ros2_type not in allowed:
             raise TypesDiffer(f"no rule makes [{spec.full_name}] a [{ros2_type}]: write one for --rules")
@@ -124,9 +124,9 @@ class _Types:
 
 
 class Ros2Bridge:
-    """Bridges topics while both sides have an end, services and actions while one side offers them, and parameters.
+    """Bridges topics with endpoints on both sides, services and actions that one side offers, and parameters.
 
-    On the node's loop; messages of ROS 2 pass in its executor's thread.
+    Runs on the node's loop; ROS 2 messages are passed in its executor's thread.
     """
 
     def __init__(self, node: Node, side: Ros2Side, options: Ros2Options, catalogue: Catalogue) -> None:
@@ -149,14 +149,14 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Bridge until :meth:`close`. Raise MasterUnreachableError, RpcError."""
+        """Bridge until :meth:`close`. Raise MasterUnreachableError or RpcError."""
         await self._parameters.start()
         await self.look()
         reporter = ErrorReporter(self.node.log, "the watch of both graphs")
         self._watching = asyncio.ensure_future(keep_running(self._watch, reporter))
 
     async def close(self) -> None:
-        """Close all links, and the side of ROS 2. Idempotent."""
+        """Close all links and the ROS 2 backend. Idempotent."""
         self._is_closed = True
         watching, self._watching = self._watching, None
         if watching:
@@ -171,18 +171,18 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return what would be bridged, and why something is not; opens nothing. Raise as :meth:`look`."""
+        """Return the links to bridge, and the reasons for those that are not; open nothing. Raise as :meth:`look` does."""
         snapshot = await self._snapshot()
         topics = pairs(await self._wanted(snapshot), self._converter)
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Return when ``condition`` holds after a look."""
+        """Return when ``condition()`` is true after a refresh."""
         while not condition():
             await self._changed.wait()
 
     async def look(self) -> bool:
-        """Open and close links as the graphs are now; whether any changed. Raise MasterUnreachableError, RpcError."""
+        """Open and close links to match the graphs; return whether any changed. Raise MasterUnreachableError or RpcError."""
         snapshot = await self._snapshot()
         has_changed = await self.topics.update(await self._wanted(snapshot))
         has_changed |= await self.services.look(snapshot.services)
@@ -194,7 +194,7 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _MIN_REFRESH_INTERVAL
         is_reported = False
-        # In Python 3.11 wait_for, which calls use, may swallow a cancellation.
+        # Check the flag, because wait_for in Python 3.11, which calls use, may swallow a cancellation.
         while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
@@ -209,14 +209,14 @@ class Ros2Bridge:
             pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _snapshot(self) -> Snapshot:
-        """Return the graph of ROS 1; notice which one it is."""
+        """Return the ROS 1 graph, and record its run_id."""
         snapshot = await fetch(self.node._node.master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))
         return snapshot
 
     async def _wanted(self, snapshot: Snapshot) -> list[Link]:
-        """Return what the graphs have to be bridged."""
+        """Return the topic links for the current graphs."""
         names = self.side.topics()
         ros2 = {
             name: self.side.ends(name)
@@ -227,7 +227,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Learn from each new publisher of ROS 1, of a topic with subscribers in ROS 2, its definition and if it latches."""
+        """Query new ROS 1 publishers, on topics with ROS 2 subscribers, for their definition and whether they latch."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -244,7 +244,7 @@ class Ros2Bridge:
         return self._headers.found.get((topic, node), {}).get("latching") == "1"
 
     def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
-        """Return the functions of a link's types. Raise TypesDiffer."""
+        """Return the conversion functions for a link's types. Raise TypesDiffer."""
         texts = [
             header.get("message_definition", "")
             for (topic, _), header in self._headers.found.items()
@@ -266,7 +266,7 @@ class Ros2Bridge:
 
 
 class _Passing:
-    """A link that passes messages; ``passed`` counts them."""
+    """An open link; ``passed`` counts its messages."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link
@@ -278,7 +278,7 @@ class _Passing:
         self._statics = StaticTransforms() if is_static else None
 
     def _with_statics(self, message: Frame) -> Frame:
-        """Return a message with the static transforms that are known, where it has such."""
+        """Return a message; on a static transform topic, merged with all known static transforms."""
         if self._statics is None:
             return message
         left_out = self._statics.left_out
@@ -315,7 +315,7 @@ class _ToRos2(_Passing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait for the subscribers that are there: a message that is published before does not reach them."""
+        """Wait for the existing subscribers to connect: they would not receive messages published before that."""
         loop = asyncio.get_running_loop()
         end = loop.time() + _JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
@@ -366,14 +366,14 @@ class _ToRos1(_Passing):
         await self._publisher.close()
 
     def _deliver(self, data: bytes) -> None:
-        """Pass a message on. In the executor's thread, which writes to the sockets of ROS 1 itself."""
+        """Pass a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
         if data[2:4] == self._bridge.header[2:4]:
-            return  # sent by the bridge: the same graph of ROS 1 has it
+            return  # sent by a bridge from the same ROS 1 graph
         try:
             self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # it has been closed meanwhile
+            return  # closed meanwhile
         else:
             self.passed += 1

@@ -1,7 +1,7 @@
-"""Values of a message of ROS 2 in CDR, by the fields of its type: for what the bridge itself says and reads. Pure.
+"""Encode and decode ROS 2 messages in CDR by the fields of their type, for messages that the bridge itself uses. Pure.
 
-What is only passed on is converted by ``core/idl/cdr.py``, which is faster. Numbers are int, float or bool, arrays of
-bytes bytes, other arrays lists, messages dicts.
+Messages that are only passed on are converted by ``core/idl/cdr.py``, which is faster. Numbers are int, float or bool, byte
+arrays bytes, other arrays lists, messages dicts.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _HEADER = len(CDR_HEADER)
 
 
 def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str, object]:
-    """Return the values of a message of type ``name``; ``fields`` returns those of a type.
+    """Decode a message of type ``name``; ``fields(type)`` returns a type's fields.
 
     Raise DeserializationError.
     """
@@ -35,14 +35,14 @@ def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str,
 
 
 def encode(name: str, fields: Callable[[str], Fields], values: Mapping[str, object]) -> bytes:
-    """Return a message of type ``name``; fields without a value are zero or empty."""
+    """Encode a message of type ``name``; fields without a value are zero or empty."""
     writer = _Writer(fields)
     writer.message(name, values)
     return CDR_HEADER + bytes(writer.data)
 
 
 def _shape(text: str) -> tuple[str, bool, int | None]:
-    """Return a field's type: that of one element, whether it is an array, and its length where that is fixed."""
+    """Return an element's type, whether the field is an array, and its length if it is fixed."""
     if text.startswith("sequence<"):
         return text[len("sequence<") : -1].partition(",")[0], True, None
     base, bracket, length = text.partition("[")

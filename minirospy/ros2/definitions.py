@@ -1,7 +1,7 @@
-"""ROS 2's definitions of types, made of those of ROS 1 and the rules, where no ROS 2 is installed. Pure.
+"""Derive ROS 2's type definitions from those of ROS 1 and the rules, for use without an installed ROS 2. Pure.
 
-What rclpy's classes answer is answered here: fields and their types, by which CDR is laid out. That they are those of the
-other side is checked by their hash, which is part of each key of rmw_zenoh.
+The results, fields and their types, replace those of rclpy's classes and determine the layout in CDR. That they match the
+other side's definitions is verified by the type hash, which is part of each key of rmw_zenoh.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from minirospy.ros2.rules import Rules, snake_case
 
 __all__ = ["NO_HASH", "Definitions"]
 
-NO_HASH = "TypeHashNotSupported"
-"""In the keys of ROS 2 Humble, which has no hashes."""
+NO_HASH = "TypeHashNotSupported"  # in the keys of ROS 2 Humble, which has no hashes
 
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"
@@ -113,14 +112,14 @@ _ADDED: dict[tuple[str, str], Fields] = {
     },
     ("visualization_msgs/Marker", "mesh_resource"): {"mesh_file": "visualization_msgs/MeshFile"},
 }
-"""Fields that ROS 2 has after one of ROS 1."""
+"""ROS 2's additional fields, by the ROS 1 field that they follow."""
 _ADDED_AFTER_HUMBLE = {("sensor_msgs/Range", "range")}
 _BOUNDED = {("shape_msgs/SolidPrimitive", "dimensions"): "sequence<double, 3>"}
 _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Duration"}
 
 
 class Definitions:
-    """The types of ROS 2, ``pkg/Name``, with the fields of ROS 1's under the rules. All raise TypesDiffer."""
+    """ROS 2's types, ``pkg/Name``, with fields from ROS 1's definitions and the rules. All methods raise TypesDiffer."""
 
     def __init__(self, rules: Rules, catalogue: Catalogue) -> None:
         self._rules = rules
@@ -129,7 +128,7 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return the fields of a message; ``is_humble``: as ROS 2 Humble has them."""
+        """Return the fields of a message; ``is_humble``: of ROS 2 Humble's version."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)
@@ -150,7 +149,7 @@ class Definitions:
         )
 
     def hash(self, name: str) -> str:
-        """Return the hash of a message, ``pkg/Name``, or of what :meth:`fields` knows."""
+        """Return the hash of a message, ``pkg/Name``, or of any type that :meth:`fields` accepts."""
         if name not in self._hashes:
             try:
                 self._hashes[name] = type_hash(name, self.fields)
@@ -159,9 +158,9 @@ class Definitions:
         return self._hashes[name]
 
     def fields(self, name: str) -> Fields:
-        """Return the fields of a message, or of what ROS 2 makes of services and actions.
+        """Return the fields of a message, or of a type that ROS 2 generates for services and actions.
 
-        That is ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and their parts.
+        These are ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and their parts.
         """
         if name.count("/") == 1:
             return self.message(name)
@@ -235,7 +234,7 @@ class Definitions:
 
     def _fields(self, spec: MessageSpec, ros1: str, name: str, is_humble: bool) -> Fields:
         rule = self._rules.message(ros1)
-        # Newer definitions of ROS 1 have the temperature of a battery, too.
+        # Newer ROS 1 definitions also have a battery's temperature.
         has = {field.name for field in spec.fields}
         found: dict[str, str] = {}
         for field in spec.fields:

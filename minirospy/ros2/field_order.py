@@ -1,6 +1,6 @@
-"""Messages of ROS 1 whose fields are in another order than in ROS 2: the bytes of the fields, put into the other order. Pure.
+"""Reorder the bytes of ROS 1 messages whose fields have another order than in ROS 2. Pure.
 
-A message of ROS 1 has no padding, so that the bytes of a field do not depend on its place. The generated functions of
+ROS 1 messages have no padding, so a field's bytes do not depend on its position. The generated functions of
 :mod:`minirospy.core.idl.cdr` then convert a message whose fields are in ROS 2's order.
 """
 
@@ -16,7 +16,7 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-_SPARE = 10_000  # elements without bytes that a message may have beyond one for each of its bytes, as in core/idl/cdr.py
+_SPARE = 10_000  # empty elements that a message may have in addition to one per byte, as in core/idl/cdr.py
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Array:
-    """Elements; ``length`` is None if it varies."""
+    """An array of elements; ``length`` is None if it is variable."""
 
     element: Node
     length: int | None = None
@@ -41,7 +41,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Reordered:
-    """A message: its fields as they are read, and the numbers of these in the order in which they are written."""
+    """A message: its fields in reading order, and their indices in writing order."""
 
     fields: tuple[Node, ...]
     order: tuple[int, ...]
@@ -51,7 +51,7 @@ Node: TypeAlias = Fixed | Text | Array | Reordered
 
 
 def inverse(node: Node) -> Node:
-    """Return what puts the fields back."""
+    """Return the node for the reverse order."""
     if isinstance(node, Array):
         return Array(inverse(node.element), node.length)
     if isinstance(node, Reordered):
@@ -61,19 +61,19 @@ def inverse(node: Node) -> Node:
 
 
 def reorder(node: Node, data: bytes | memoryview) -> bytes:
-    """Return a message with its fields in the other order. Raise DeserializationError if it ends too early."""
+    """Return a message with its fields in the other order. Raise DeserializationError if it is too short."""
     view = memoryview(data)
     parts: list[bytes | memoryview] = []
     try:
         end = _write(node, view, 0, parts)
     except struct.error as error:
         raise DeserializationError("the message ends too early") from error
-    parts.append(view[end:])  # what follows the message is refused when it is converted
+    parts.append(view[end:])  # the conversion rejects data after the message
     return b"".join(parts)
 
 
 def _write(node: Node, data: memoryview, start: int, parts: list[bytes | memoryview]) -> int:
-    """Append the bytes of a node that starts at ``start``; return where it ends."""
+    """Append the bytes of a node that starts at ``start``; return its end offset."""
     if isinstance(node, Array) and not isinstance(node.element, Fixed):
         count, end = _count(node, data, start)
         parts.append(data[start:end])
@@ -110,7 +110,7 @@ def _write_fields(node: Reordered, data: memoryview, start: int, parts: list[byt
 
 
 def _count(node: Array, data: memoryview, start: int) -> tuple[int, int]:
-    """Return how many elements an array has, and where the first one starts."""
+    """Return an array's number of elements, and the offset of the first."""
     if node.length is not None:
         return node.length, start
     (count,) = _COUNT.unpack_from(data, start)

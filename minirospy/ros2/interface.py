@@ -1,6 +1,6 @@
-"""What the bridge needs of ROS 2: by rclpy in ``side.py``, by Zenoh in ``zenoh_side.py``; a test may put another side there.
+"""The bridge's interface to ROS 2: implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and by tests.
 
-ROS 2 calls back in threads of its own. Types are ``pkg/Name``; messages are CDR.
+ROS 2 calls back in its own threads. Types are ``pkg/Name``; messages are CDR.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Ros2Publisher(Protocol):
 
     @property
     def subscribers(self) -> int:
-        """The number of subscribers that are connected."""
+        """Return the number of connected subscribers."""
 
     def publish(self, data: bytes) -> None: ...
 
@@ -42,55 +42,55 @@ class Ros2Publisher(Protocol):
 
 
 class Ros2Handle(Protocol):
-    """A subscription or a service, which calls back until it is closed."""
+    """A subscription or a service that calls back until it is closed."""
 
     def close(self) -> None: ...
 
 
 class Ros2Probe(Protocol):
-    """Requests without effect to a client's servers; its methods may be called from any thread."""
+    """Sends requests without effect to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
-        """Whether the servers are connected."""
+        """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send one; return the future of its response: from then on no response to the client is lost."""
+        """Send a request; return the future of its response. After that response, none to the client is lost."""
 
     def close(self) -> None: ...
 
 
 class Ros2Client(Reachable, Protocol):
-    """A client of a service; its methods may be called from any thread."""
+    """A client of a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
+        """Send a request and return the future of the response, both as CDR. It fails with BridgeError."""
 
     def close(self) -> None: ...
 
 
 class Ros2ActionClient(Reachable, Protocol):
-    """A client of an action; its methods may be called from any thread."""
+    """A client of an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future accepted goal, None if it is refused. It fails with BridgeError."""
+        """Send a goal; return the future of the accepted goal, None if it is refused. It fails with BridgeError."""
 
     def close(self) -> None: ...
 
 
 class Ros2Parameters(Protocol):
-    """Parameters of other nodes of ROS 2. Its methods wait: call them in a worker thread. All raise BridgeError."""
+    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread. All raise BridgeError."""
 
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; of type 0 if it is not set."""
+        """Return a parameter; its type is 0 if it is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 
 
 class Ros2Side(Protocol):
-    """A node of ROS 2."""
+    """A ROS 2 node."""
 
     @property
     def domain(self) -> str: ...
@@ -101,7 +101,7 @@ class Ros2Side(Protocol):
     def ends(self, topic: str) -> Ros2Topic: ...
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
 
@@ -117,29 +117,29 @@ class Ros2Side(Protocol):
     ) -> Ros2Handle: ...
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes but those of bridges."""
+        """Return the names and namespaces of all nodes except for bridges."""
 
     def services(self) -> Mapping[str, str]:
-        """Return the services that others than this bridge offer, and their types."""
+        """Return the services of nodes other than this bridge, and their types."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
 
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service: ``answer`` gets the CDR of a request, in a thread; MinirospyError is why a call fails."""
+        """Offer a service: call ``answer`` with a request's CDR, in a thread; a MinirospyError of its future fails the call."""
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer where it is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action: ``accept`` gets a goal, and where its feedback goes, in a thread."""
+        """Offer an action: call ``accept`` with a goal and the function that sends its feedback, in a thread."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the parameters of ROS 1 as those of this node."""
+        """Offer the ROS 1 parameters as this node's parameters."""
 
     def node_parameters(self) -> Ros2Parameters: ...
 

@@ -1,6 +1,6 @@
-"""Two specs of one message, ROS 1's and ROS 2's, and the rules -> the layout of both, or why there is none. Pure.
+"""Compute the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or why there is none. Pure.
 
-A spec of ROS 2 has the form of one of ROS 1; its numbers have the names of ROS 1, its times are ``builtin_interfaces/Time``.
+A ROS 2 spec has the form of a ROS 1 spec: its numeric types have ROS 1's names, its times are ``builtin_interfaces/Time``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """A type of ROS 1 cannot become the type of ROS 2: the reason."""
+    """A ROS 1 type cannot be converted to the ROS 2 type, with the reason."""
 
 
 _WIDTHS = {
@@ -48,9 +48,9 @@ _MAX_ITEMS = 8_000
 
 
 def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
-    """Return the spec of a type, from what ``get_fields_and_field_types`` of its class in ROS 2 returns.
+    """Return a type's spec, built from its ROS 2 class's ``get_fields_and_field_types()``.
 
-    ``full_name`` is ``pkg/Name``. Raise TypesDiffer on a type that ROS 1 lacks.
+    ``full_name`` is ``pkg/Name``. Raise TypesDiffer if a field's type does not exist in ROS 1.
     """
     package, _, name = full_name.partition("/")
     found = [Field(each, ros2_field_type(text)) for each, text in fields.items() if each != _DUMMY]
@@ -58,7 +58,7 @@ def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
 
 
 def ros2_field_type(text: str) -> FieldType:
-    """Return a field's type: ``sequence<double, 3>``, ``uint8[16]``, ``std_msgs/Header``. Raise TypesDiffer."""
+    """Parse a field's type: ``sequence<double, 3>``, ``uint8[16]``, ``std_msgs/Header``. Raise TypesDiffer."""
     if text.startswith("sequence<") and text.endswith(">"):
         inner = text[len("sequence<") : -1]
         head, comma, bound = inner.rpartition(",")
@@ -81,7 +81,7 @@ def _base(text: str, whole: str) -> str:
 def transcoder(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Transcoder:
-    """Return the functions that convert messages of a type. Raise TypesDiffer."""
+    """Return the conversion functions for messages of a type. Raise TypesDiffer."""
     layout = layout_of(ros1, ros1_lookup, ros2, ros2_lookup, rules)
     try:
         made = make_transcoder(ros1.full_name, layout)
@@ -96,7 +96,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return how a message of both types is laid out, with ROS 1's fields in ROS 2's order. Raise TypesDiffer."""
+    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -105,7 +105,7 @@ def layout_of(
 
 
 class _Pairing:
-    """Walks two specs side by side."""
+    """Traverses two specs in parallel."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -136,7 +136,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # CDR has no struct without members: rosidl adds one.
+            # CDR has no empty structs: rosidl adds a member.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
@@ -159,7 +159,7 @@ class _Pairing:
         return self.message(self._ros1(ros1.base), self._ros2(ros2.base), around)
 
     def _alone(self, type_: FieldType, side: Side, around: tuple[str, ...]) -> list[Item]:
-        """Return the items of a field that only one side has."""
+        """Return the layout items of a field that only one side has."""
         self._enter(around)
         base = _SAME.get(type_.base, type_.base)
         one: Layout
@@ -184,7 +184,7 @@ class _Pairing:
 
 
 class _Ordering:
-    """Walks two specs side by side that :class:`_Pairing` has accepted, for the order of their fields."""
+    """Traverses two specs that :class:`_Pairing` has accepted in parallel, for the order of their fields."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -193,7 +193,7 @@ class _Ordering:
         self._is_changed = False
 
     def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
-        """Return how the fields of ROS 1 come into ROS 2's order; None if they are in it."""
+        """Return the reordering from ROS 1's to ROS 2's order; None if they are equal."""
         found = self._message(ros1, ros2)
         return found if self._is_changed else None
 
@@ -227,7 +227,7 @@ class _Ordering:
 
 
 def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
-    """Return the functions for messages of ROS 1 whose fields are in its own order."""
+    """Return conversion functions for ROS 1 messages in ROS 1's field order."""
     back = inverse(order)
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
@@ -240,7 +240,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return the fields of ROS 1, with those of the field that a rule names in its place."""
+    """Return ROS 1's fields; the field that the rule inlines is replaced by its own fields."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:
@@ -253,7 +253,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the numbers of ROS 1's fields in ROS 2's order; one that ROS 2 lacks stays behind the field before it."""
+    """Return the indices of ROS 1's fields in ROS 2's order; a field that ROS 2 lacks stays after its predecessor."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -273,7 +273,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Return the fields of ROS 1 that ROS 2 has too -> those of ROS 2. Raise TypesDiffer where one lacks a partner."""
+    """Return the ROS 1 fields that ROS 2 has -> the ROS 2 fields. Raise TypesDiffer if one has no partner."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}
@@ -309,14 +309,13 @@ def _spellings(name: str) -> Iterator[str]:
 
 # --- rosgraph_msgs/Log
 
-_LEVEL = 12
-"""Where a log line in CDR has its level: after the header of CDR and the time."""
+_LEVEL = 12  # offset of a log message's level in CDR, after the CDR header and the time
 _LEVELS_OF_ROS2 = {1: 10, 2: 20, 4: 30, 8: 40, 16: 50}
 _LEVELS_OF_ROS1 = {level: ros1 for ros1, level in _LEVELS_OF_ROS2.items()}
 
 
 def _with_levels(made: Transcoder) -> Transcoder:
-    """Return functions that change the level, too: the numbers of ROS 1 are bits."""
+    """Return conversion functions that also map the log level: ROS 1's levels are bits."""
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
         found = bytearray(made.to_cdr(data, header))

@@ -1,4 +1,4 @@
-"""The links of one kind, of topics, services or actions: opened where both sides want them, closed where they do not any more."""
+"""The links of one kind (topics, services or actions): opened if both sides want them, closed when one no longer does."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _O = TypeVar("_O", bound="OpenLink")
 
 
 class OpenLink(Protocol):
-    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`, which is called in any case."""
+    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`, which is always called."""
 
     async def open(self) -> None: ...
 
@@ -31,14 +31,14 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link, and why it is not open: nothing if it is."""
+    """A link, and the reason why it is not open, "" if it is."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Return what would be bridged, and why something is not; ``check(link)`` raises TypesDiffer with the reason."""
+    """Return the links, with the reasons why some cannot be opened; ``check(link)`` raises TypesDiffer with the reason."""
     found = []
     for link in wanted:
         try:
@@ -51,7 +51,7 @@ def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
 
 
 class LinkTable(Generic[_L, _O]):
-    """The open links, and those that cannot be opened with the reason. ``make(link)`` raises TypesDiffer. On the node's loop."""
+    """The open links, and the reasons why others are not open. ``make(link)`` may raise TypesDiffer. On the node's loop."""
 
     def __init__(self, log: logging.Logger, make: Callable[[_L], _O]) -> None:
         self.links: dict[_L, _O] = {}
@@ -61,7 +61,7 @@ class LinkTable(Generic[_L, _O]):
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
-        """Close what is not wanted any more and open what is new; return whether there was any."""
+        """Close links that are no longer wanted and open new ones; return whether there were any."""
         gone = [link for link in self.links if link not in wanted]
         for link in gone:
             await self._close(link)
@@ -74,13 +74,13 @@ class LinkTable(Generic[_L, _O]):
             except (TypesDiffer, ROSException, ValueError) as error:
                 self._refuse(link, str(error))
             except MinirospyError:
-                raise  # of the master: it is tried again
+                raise  # an error of the master: the caller retries
             except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
                 self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)
 
     async def close(self) -> None:
-        """Close all. Idempotent."""
+        """Close all links. Idempotent."""
         for link in list(self.links):
             await self._close(link)
 

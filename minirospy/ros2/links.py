@@ -1,4 +1,4 @@
-"""Which topics are bridged, and how: from what both graphs have at a moment. Pure."""
+"""Select the topics to bridge, and how, from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ __all__ = [
 ]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""How the names of all bridges start, on both sides: their ends do not count as ends."""
+"""Prefix of all bridges' node names on both sides: their endpoints are ignored."""
 
 
 def parse_domain(text: str) -> str:
-    """Return the domain of ROS 2 that ``ROS_DOMAIN_ID`` names: 0 if it is empty. Raise BridgeError."""
+    """Return the ROS 2 domain from ``ROS_DOMAIN_ID``: 0 if it is empty. Raise BridgeError."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))
 
 
 class Direction(Enum):
-    """Where messages go."""
+    """The direction of messages."""
 
     TO_ROS2 = "1 -> 2"
     TO_ROS1 = "2 -> 1"
@@ -45,7 +45,7 @@ class Ros2End:
 
 @dataclass(frozen=True)
 class Ros2Topic:
-    """The ends of a topic in ROS 2."""
+    """The endpoints of a topic in ROS 2."""
 
     publishers: tuple[Ros2End, ...] = ()
     subscribers: tuple[Ros2End, ...] = ()
@@ -55,7 +55,7 @@ class Ros2Topic:
 class Link:
     """A topic that is bridged in one direction.
 
-    ``is_latched``: the last message is kept for those who come later. ``is_reliable``: of the subscription in ROS 2.
+    ``is_latched``: later subscribers receive the last message. ``is_reliable``: the reliability of the ROS 2 subscription.
     """
 
     topic: str
@@ -67,7 +67,7 @@ class Link:
 
     @property
     def title(self) -> str:
-        """How messages to people name the link."""
+        """Return the link's name for log messages."""
         return self.topic
 
 
@@ -82,10 +82,10 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return what is to be bridged: each topic with an end on either side, other than those of bridges.
+    """Return the topics to bridge: those with endpoints on both sides, other than those of bridges.
 
-    ``is_latched(topic, node)``: whether a publisher of ROS 1 latches.
-    ``ros1_type``: a type of ROS 2 -> that of ROS 1, for a subscriber of ROS 1 that takes any type, as `rostopic echo`.
+    ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
+    a ROS 1 subscriber to any type, such as `rostopic echo`.
     """
     found = []
     for topic in sorted(ros1.topics & ros2.keys()):
@@ -96,7 +96,7 @@ def links(
         readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
-            # Who wants the last message is served only by a publisher that keeps it.
+            # A subscriber with transient local durability receives messages only from a publisher that has it.
             keeps = any(end.is_transient_local for end in readers)
             latched = keeps or any(is_latched(topic, node) for node in publishers)
             found.append(Link(topic, Direction.TO_ROS2, type_, _type_of(readers, type_), latched))
@@ -108,7 +108,7 @@ def links(
                     type_ or ros1_type(_type_of(writers, "")),
                     _type_of(writers, type_ or ""),
                     all(end.is_transient_local for end in writers),
-                    # A subscription that wants more than a publisher offers gets nothing of it.
+                    # A reliable subscription receives nothing from a best-effort publisher.
                     all(end.is_reliable for end in writers),
                 )
             )
@@ -116,16 +116,16 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Return the type of ends that may differ: preferred is the name of ROS 1, then the first by name."""
+    """Return a type for endpoints that may differ: ROS 1's type name if one has it, else the first by name."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 
 
 def marker(graph: str) -> bytes:
-    """Return the header of CDR for messages that come from a graph of ROS 1, of which ``graph`` is the run_id.
+    """Return the CDR header for messages from a ROS 1 graph; ``graph`` is its run_id.
 
-    Readers ignore the options in its last two bytes; the bridge recognizes by them what it must not send back. The two
-    lowest bits, which XCDR version 2 uses, stay zero, and the options as a whole are never those of other publishers.
+    Readers ignore the options in its last two bytes; by them the bridge recognizes messages that it must not send back. The
+    two lowest bits, which XCDR version 2 uses, stay zero, and the options as a whole are never those of other publishers.
     """
     import zlib
 

@@ -1,4 +1,4 @@
-"""Parameters of ROS 1 as those of a node of ROS 2, and back: names, types and values. Pure.
+"""Convert parameters between ROS 1 and a ROS 2 node: names, types and values. Pure.
 
 Sources: http://wiki.ros.org/Parameter%20Server; rcl_interfaces/msg/ParameterType and ParameterValue.
 """
@@ -37,7 +37,7 @@ FIELDS = (
     "double_array_value",
     "string_array_value",
 )
-"""Type of a parameter in ROS 2 -> the field of a ParameterValue that has its value."""
+"""The field of a ParameterValue that has the value, by ROS 2's parameter type."""
 
 _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
@@ -46,7 +46,7 @@ _SMALLEST, _LARGEST = -(2**31), 2**31 - 1
 
 
 class ParameterService(Enum):
-    """The services that each node of ROS 2 has for its parameters, and their types in rcl_interfaces."""
+    """The parameter services of each ROS 2 node, and their types in rcl_interfaces."""
 
     LIST = "list_parameters", "ListParameters"
     GET = "get_parameters", "GetParameters"
@@ -61,14 +61,14 @@ class ParameterService(Enum):
 
 
 class Value(NamedTuple):
-    """A value in ROS 2: its type, an index of FIELDS, and what its field has. Type 0: it is not set."""
+    """A ROS 2 value: its type, an index of FIELDS, and the field's value. Type 0: it is not set."""
 
     type: int
     value: object = None
 
 
 def ros2_name(name: str) -> str:
-    """Return a parameter's name in ROS 2: ``/robot/speed`` is ``robot.speed``."""
+    """Return a parameter's name in ROS 2: ``robot.speed`` for ``/robot/speed``."""
     return name.strip("/").replace("/", ".")
 
 
@@ -87,7 +87,7 @@ def leaves(value: object, name: str = "") -> Iterator[str]:
 
 
 def ros2_value(value: object) -> Value:
-    """Return a value of ROS 1 for ROS 2; one that has no type there is a text, in JSON."""
+    """Convert a ROS 1 value to ROS 2; if ROS 2 has no such type, to a string with JSON."""
     if isinstance(value, Binary):
         value = value.data
     if isinstance(value, bytes | bytearray):
@@ -108,7 +108,7 @@ def ros2_value(value: object) -> Value:
 
 
 def ros1_value(value: Value) -> object:
-    """Return a value of ROS 2 for ROS 1. Raise BridgeError if ROS 1 has none like it."""
+    """Convert a ROS 2 value to ROS 1. Raise BridgeError if ROS 1 has no such type."""
     if value.type == _BYTES and isinstance(value.value, Collection):
         return Binary(b"".join(each if isinstance(each, bytes) else bytes((each,)) for each in value.value))
     if 0 < value.type <= _ARRAY_OF_SINGLE:
@@ -125,7 +125,7 @@ def _checked(value: object) -> object:
 
 
 def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names and prefixes that a request for a list wants. ``depth``: levels below a prefix, 0 for all."""
+    """Return the names and prefixes that a list request asks for. ``depth``: levels below a prefix, 0 for all."""
     found = []
     for name in names:
         rests = [name] if not prefixes else []

@@ -1,4 +1,4 @@
-"""Parameters across the bridge: those of ROS 1 on its node of ROS 2, those of nodes of ROS 2 by services of ROS 1."""
+"""Bridge parameters: those of ROS 1 as parameters of the bridge's ROS 2 node, those of ROS 2 nodes by ROS 1 services."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class Ros1Parameters:
-    """The parameters of the master, with names and values as in ROS 2. On the node's loop; all raise MinirospyError."""
+    """The master's parameters, with names and values as in ROS 2. Runs on the node's loop; all methods raise MinirospyError."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -39,7 +39,7 @@ class Ros1Parameters:
         return [ros2_name(name) for name in leaves(await self._node.get_param("/", {}))]
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; of type 0 if none is set, or the name is that of a namespace."""
+        """Return the values; the type is 0 if a parameter is not set, or the name is a namespace."""
         found = []
         for name in names:
             value = await self._node.get_param(ros1_name(name), None)
@@ -47,7 +47,7 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return for each why not. ``atomically``: all, or none where one is refused."""
+        """Set or delete parameters; return an error for each, or "". ``atomically``: change none if one is refused."""
         reasons = [_refusal(name, value) for name, value in values]
         if atomically and any(reasons):
             return reasons
@@ -74,7 +74,7 @@ def _refusal(name: str, value: Value) -> str:
 
 
 class ParameterBridge:
-    """Offers the parameters of each side to the other one: ``~get_param``, ``~set_param``, ``~get_param_names`` in ROS 1."""
+    """Offers each side's parameters on the other side: ``~get_param``, ``~set_param``, ``~get_param_names`` in ROS 1."""
 
     def __init__(self, node: Node, side: Ros2Side, catalogue: Catalogue) -> None:
         self._node = node
@@ -84,7 +84,7 @@ class ParameterBridge:
         self._services: list[RawService] = []
 
     async def start(self) -> None:
-        """Offer them."""
+        """Offer the parameters."""
         self._server = self._side.serve_parameters(Ros1Parameters(self._node), asyncio.get_running_loop())
         handlers: dict[str, tuple[str, Callable[[list[str]], Awaitable[bytes]]]] = {
             "get_param": ("rosapi/GetParam", self._get),
@@ -100,7 +100,7 @@ class ParameterBridge:
             await service
 
     async def close(self) -> None:
-        """End the services. Idempotent."""
+        """Close the services. Idempotent."""
         if self._server:
             self._server.close()
             self._server = None
@@ -145,7 +145,7 @@ class ParameterBridge:
         found: list[str] = []
         for name, namespace in self._side.nodes():
             node = f"{namespace.rstrip('/')}/{name}"
-            # A node without parameters, or one that has just ended.
+            # The node has no parameters, or has just exited.
             with contextlib.suppress(BridgeError):
                 names = await self._waited(functools.partial(self._side.node_parameters().names, node))
                 found += [f"{node}:{each}" for each in names]
@@ -169,14 +169,14 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return the texts of a request that has two. Raise ValueError if it has fewer."""
+    """Return the two strings of a request. Raise ValueError if it has fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts
 
 
 def _texts(data: bytes) -> list[str]:
-    """Return the texts that a request consists of. Raise ValueError."""
+    """Parse a request that consists of strings. Raise ValueError."""
     found, end = [], 0
     while end < len(data):
         if end + 4 > len(data):

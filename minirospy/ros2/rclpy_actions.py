@@ -1,6 +1,6 @@
-"""Clients and servers of actions in ROS 2, by rclpy's own: goals, results and feedback as CDR.
+"""Clients and servers of ROS 2 actions with rclpy's own classes; goals, results and feedback are CDR.
 
-All of this runs in the executor's thread, but for the methods that say otherwise.
+Everything runs in the executor's thread, except for methods that say otherwise.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 CANCELED = 5
-"""The statuses of a goal that has ended: action_msgs/GoalStatus."""
+"""Final goal statuses: action_msgs/GoalStatus."""
 SUCCEEDED = 4
 ABORTED = 6
 
@@ -83,12 +83,12 @@ class _RclpyActionClient(Protocol):
 
 
 class Ros2Goal(Protocol):
-    """A goal that a server of ROS 2 has accepted; its methods may be called from any thread."""
+    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
 
     def cancel(self) -> None: ...
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future status, of action_msgs/GoalStatus, and result."""
+        """Return the future of the status, of action_msgs/GoalStatus, and the result."""
 
 
 class _Closable(Protocol):
@@ -99,7 +99,7 @@ class _Closable(Protocol):
 
 
 class GoalOfRos2:
-    """A goal that a server of ROS 2 has accepted. Its methods may be called from any thread."""
+    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
 
     def __init__(self, calls: Calls, handle: _ClientHandle, on_end: Callable[[], None]) -> None:
         self._calls = calls
@@ -111,7 +111,7 @@ class GoalOfRos2:
         self._calls.executor.create_task(self._handle.cancel_goal_async)
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future status and result."""
+        """Return the future of the status and the result."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: RclpyFuture) -> None:
@@ -136,7 +136,7 @@ class GoalOfRos2:
 class ActionClient:
     """A client of an action.
 
-    It subscribes to feedback itself: rclpy's client drops what has not been read when the result comes.
+    It subscribes to feedback itself: rclpy's client drops feedback that has not been read when the result arrives.
     """
 
     def __init__(self, calls: Calls, name: str, class_: ActionClass) -> None:
@@ -145,7 +145,8 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Before the client: a server that has found the client's last end has found this one, too.
+        # Create it before the client: a server that has discovered the client's last endpoint has then discovered
+        # this one, too.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -161,20 +162,20 @@ class ActionClient:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server is connected. From any thread."""
+        """Return whether a server is connected. May be called from any thread."""
         return bool(self._client.server_is_ready())
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """The ids of the servers. From any thread."""
+        """Return the ids of the servers. May be called from any thread."""
         return self._calls.servers(send_goal_service(self._name))
 
     def probe(self) -> Ros2Probe:
-        """Return what cancels a goal that nobody has: cancels are the last of the client's ends that is made."""
+        """Return a probe that cancels a nonexistent goal: the cancel client is the action client's last endpoint."""
         return _CancelProbe(self)
 
     def reach(self) -> Future[None]:
-        """Cancel a goal that nobody has; return the future of the response. From any thread."""
+        """Cancel a nonexistent goal; return the future of the response. May be called from any thread."""
         reached: Future[None] = Future()
 
         def answered(_: object) -> None:
@@ -194,13 +195,13 @@ class ActionClient:
         return reached
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, None if it is refused. From any thread."""
+        """Send a goal; return the accepted goal, None if it is refused. May be called from any thread."""
         accepted: Future[Ros2Goal | None] = Future()
         self._calls.executor.create_task(self._send, goal, feedback, accepted)
         return accepted
 
     def close(self) -> None:
-        """End the client."""
+        """Close the client."""
         self._calls.end(lambda: self._calls.node.destroy_subscription(self._feedback))
         self._calls.end(self._client.destroy)
 
@@ -221,7 +222,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # Nobody waits any more, and in ROS 1 the goal counts as refused: it must not run.
+                # The caller no longer waits, and the goal counts as refused in ROS 1, so it must not run.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -234,21 +235,21 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Pass on the feedback that waits: it was sent before the result that has come."""
+        """Deliver queued feedback, which was sent before the result that has arrived."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The id of the goal takes 16 bytes, so that the rest is aligned as it was.
+        # The goal's id has 16 bytes, so removing it does not change the alignment of the rest.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
 
 
 class _CancelProbe:
-    """Reaches the servers of an action by its client, which stays open."""
+    """A probe of an action's servers with its client, which stays open."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -269,9 +270,9 @@ def _uuid_message(id: bytes) -> object:
 
 
 def _client_class() -> Callable[..., _RclpyActionClient]:
-    """Return rclpy's client of actions, with a lock from the start.
+    """Return rclpy's action client class with a lock as a class attribute.
 
-    Its constructor shows it to the executor before it makes its lock: the executor's thread would fail on that.
+    Its constructor adds the client to the executor before it creates the lock, without which the executor's thread would fail.
     """
     return type(
         "ActionClient", (importlib.import_module("rclpy.action").ActionClient,), {"_lock": threading.Lock()}
@@ -282,18 +283,18 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
 
 
 class GoalOfRos1(Protocol):
-    """A goal that a server of ROS 1 has accepted."""
+    """A goal that a ROS 1 server has accepted."""
 
     @property
     def ended(self) -> Future[tuple[int, bytes | None]]:
-        """The future status, one of those above, and result, None for an empty one."""
+        """Return the future of the final status (see above) and the result, None for an empty one."""
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal. From any thread."""
+        """Request the server to cancel the goal. May be called from any thread."""
 
 
 class Feedback:
-    """The feedback of a goal: kept until its handle is there, then published. From any thread."""
+    """A goal's feedback: buffered until its handle exists, then published. May be called from any thread."""
 
     def __init__(self, calls: Calls, class_: MessageClass) -> None:
         self._calls = calls
@@ -305,7 +306,7 @@ class Feedback:
         self._calls.executor.create_task(self._publish, data)
 
     def start(self, handle: _ServerHandle) -> None:
-        """Publish what has come."""
+        """Publish the buffered feedback."""
         self._handle = handle
         kept, self._kept = self._kept, []
         for data in kept:
@@ -319,11 +320,11 @@ class Feedback:
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
-"""A goal and where its feedback goes -> the accepted goal, None if it is refused."""
+"""Takes a goal and the function for its feedback; returns the accepted goal, None if it is refused."""
 
 
 class ActionServer:
-    """An action that is offered in ROS 2."""
+    """An action that the bridge offers in ROS 2."""
 
     def __init__(self, calls: Calls, name: str, class_: ActionClass, accept: Accept) -> None:
         self._calls = calls
@@ -334,7 +335,8 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # Its constructor shows it to the executor, which may have a goal for it, before it has a logger.
+        # rclpy's constructor adds the server to the executor, which may have a goal for it, before it creates the
+        # logger.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,
@@ -351,7 +353,7 @@ class ActionServer:
         )
 
     def close(self) -> None:
-        """Offer it no more; results that are known, and refusals, are sent first. From any other thread than the executor's."""
+        """Close after sending known results and refusals. Call from any thread but the executor's."""
         sent = threading.Event()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
         sent.wait(_CLOSE_SECONDS)
@@ -359,13 +361,13 @@ class ActionServer:
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the first of the executor's rounds in which no goal waits to be answered."""
+        """Set the event in the executor's first iteration in which no answer is pending."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # What rclpy does after our part of the answer may be a task of its own.
+            # rclpy may complete the answer in a task that runs after the bridge's part.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:
@@ -384,7 +386,7 @@ class ActionServer:
             accepted = None
         if accepted is None:
             return self._module.GoalResponse.REJECT
-        # The goal's handle will have this very object.
+        # The goal's handle will refer to this object.
         self._goals[id(goal)] = (goal, accepted, feedback)
         return self._module.GoalResponse.ACCEPT
 
@@ -409,7 +411,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # A goal that ROS 1 preempted for another one: ROS 2 has no such end.
+            # ROS 1 has preempted the goal for another one, which ROS 2 has no status for.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

@@ -1,7 +1,7 @@
-"""Clients and servers of services in ROS 2, by rclpy, which has no raw services.
+"""Clients and servers of ROS 2 services with rclpy, which has no API for serialized requests.
 
-A request or response is an object of the class that ROS 2 has built for its type; rclpy's own serialization makes it of
-CDR, and back. All of this runs in the executor's thread, but for the methods that say otherwise.
+A request or response is an object of the class that ROS 2 has generated for its type; rclpy's serialization converts it from
+and to CDR. Everything runs in the executor's thread, except for methods that say otherwise.
 """
 
 from __future__ import annotations
@@ -32,10 +32,9 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Fields in which a response without success tells people why."""
+"""Fields in which the response of a failed call may contain the reason."""
 
-_DEPTH = 1000
-"""Requests or responses that may wait for the bridge."""
+_DEPTH = 1000  # requests or responses queued for the bridge
 
 _GUID_PREFIX = 12
 
@@ -46,7 +45,7 @@ _T = TypeVar("_T")
 
 
 class Message(Protocol):
-    """An object of a message, request or response."""
+    """A message, request or response object."""
 
     @staticmethod
     def get_fields_and_field_types() -> dict[str, str]: ...
@@ -81,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """The handle of a subscription, which is entered while it is used."""
+    """The handle of a subscription, a context manager for its use."""
 
     def __enter__(self) -> object: ...
 
@@ -160,11 +159,11 @@ class ServiceNode(Protocol):
 
 
 class NotAnsweredError(Exception):
-    """A request that gets no response: ROS 2 has no errors of services."""
+    """A request that gets no response, because ROS 2 services have no errors."""
 
 
 class Calls:
-    """Makes clients and servers on one node."""
+    """Creates clients and servers on one node."""
 
     def __init__(self, node: ServiceNode, executor: Executor) -> None:
         self.node = node
@@ -173,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh a response takes the path of its request.
+        # In rmw_zenoh a response returns on the path of its request, so it is not lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
-        # A request that waits for its answer does not keep the others waiting.
+        # Reentrant: a request that waits for its answer does not block others.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # That of services, with a longer queue.
+            # The default QoS of services with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -192,17 +191,18 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the ids of a service's servers; None if no response can be lost. From any thread."""
+        """Return the ids of a service's servers; None if no response can be lost. May be called from any thread."""
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return what reaches the nodes that serve; None if one has no parameters, or is not known yet. From any thread."""
+        """Return a probe of a service's nodes; None if one has no parameters, or is not known yet. For any thread."""
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # Another process may have a node of the same name, whose answer would say nothing of this one.
+            # If another process has a node of the same name, its answer would not show that this one has been
+            # reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
             names.add(name)
@@ -212,26 +212,26 @@ class Calls:
         return ParameterProbe([self.client(name, class_) for name in sorted(names)])
 
     def _writers(self, service: str) -> Sequence[_EndpointInfo]:
-        """Return what is known of the publishers of a service's responses, whose topic DDS names so."""
+        """Return the publishers of a service's responses, from the topic that DDS uses for them."""
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy something in the executor's thread, which may be about to wait for it. From any thread.
+        """Destroy an object in the executor's thread, which may be about to wait for it. May be called from any thread.
 
-        rclpy's executor fails on what is destroyed while it makes its list of what it waits for.
+        rclpy's executor fails if an object is destroyed while it builds its wait set.
         """
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
-        """Return what a future of another thread brings, in a coroutine of the executor.
+        """Return the result of another thread's future, in a coroutine of the executor.
 
-        ``after_tasks``: after what the other thread has given to the executor before.
+        ``after_tasks``: after the tasks that the other thread has submitted to the executor before.
         """
         waiting = self._future(executor=self.executor)
 
         def finish() -> None:
             waiting.set_result(None)
-            # A coroutine that waits is resumed at the executor's next round.
+            # The executor resumes a waiting coroutine in its next iteration.
             self.executor.wake()
 
         def done(_: object) -> None:
@@ -256,31 +256,31 @@ class Client:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server is connected. From any thread."""
+        """Return whether a server is connected. May be called from any thread."""
         return bool(self._client.service_is_ready())
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """The ids of the servers; None if no response can be lost. From any thread."""
+        """Return the ids of the servers; None if no response can be lost. May be called from any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:
-        """Return what reads no parameters of the nodes that serve."""
+        """Return a probe that requests no parameters from the servers' nodes."""
         return self._calls.parameter_probe(self._name)
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future response, both as CDR. From any thread."""
+        """Send a request and return the future of the response, both as CDR. May be called from any thread."""
         answered: Future[bytes] = Future()
-        # In the executor's thread: no response arrives before its request is noted.
+        # Send in the executor's thread, so that no response arrives before its request is recorded.
         self._calls.executor.create_task(self._send, request, answered)
         return answered
 
     def call_empty(self) -> Future[bytes]:
-        """Send a request that has the default values of its fields. From any thread."""
+        """Send a request with default values. May be called from any thread."""
         return self.call(self._calls.serialize(self._class.Request()))
 
     def close(self) -> None:
-        """End the client."""
+        """Close the client."""
         self._calls.end(lambda: self._calls.node.destroy_client(self._client))
 
     def _send(self, data: bytes, answered: Future[bytes]) -> None:
@@ -310,18 +310,18 @@ class Client:
 
 
 class ParameterProbe:
-    """Reaches nodes by their parameter services: a request for no parameters has no effect."""
+    """A probe of nodes by their parameter services: a request for no parameters has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients
 
     @property
     def is_ready(self) -> bool:
-        """Return whether all nodes are connected. From any thread."""
+        """Return whether all nodes are connected. May be called from any thread."""
         return all(client.is_ready for client in self._clients)
 
     def reach(self) -> Future[None]:
-        """Send a request to each; return the future of the last response. From any thread."""
+        """Send a request to each node; return the future of the last response. May be called from any thread."""
         reached: Future[None] = Future()
         sent = [client.call_empty() for client in self._clients]
 
@@ -344,15 +344,16 @@ class ParameterProbe:
         return reached
 
     def close(self) -> None:
-        """End the clients."""
+        """Close the clients."""
         for client in self._clients:
             client.close()
 
 
 class Server:
-    """A service that is offered in ROS 2; ``answer`` gets the CDR of a request and returns that of the response.
+    """A service that the bridge offers in ROS 2; ``answer`` takes a request's CDR and returns the future of the response's.
 
-    A MinirospyError of its future is why the call fails: the text of a response that has a place for it, and a line of the log.
+    If the future raises MinirospyError, the call fails: the reason is sent in the response, if it has a field for it, and
+    logged.
     """
 
     def __init__(
@@ -365,7 +366,7 @@ class Server:
         self._service = calls.node.create_service(class_, name, self._arrived, **calls.options)
 
     def close(self) -> None:
-        """Offer it no more."""
+        """Close the service."""
         self._calls.end(lambda: self._calls.node.destroy_service(self._service))
 
     async def _arrived(self, request: Message, response: Message) -> Message:
@@ -374,7 +375,7 @@ class Server:
         except MinirospyError as error:
             return self._refusal(response, _line(error))
         except (CancelledError, RuntimeError) as error:
-            # The bridge ends.
+            # The bridge is shutting down.
             raise NotAnsweredError from error
         return self._calls.deserialize(data, self._class.Response)
 
@@ -383,14 +384,14 @@ class Server:
         fields = response.get_fields_and_field_types()
         text = next((name for name in _REASONS if fields.get(name) == "string"), "")
         if fields.get("success") != "boolean" or not text:
-            # Zeros would be taken for an answer.
+            # Send nothing: a response of zeros would look like a valid answer.
             raise NotAnsweredError
         setattr(response, text, reason)
         return response
 
 
 def _process(info: _EndpointInfo) -> bytes:
-    """Return the part of an end's id that all ends of a process share. Source: RTPS 2.5, 9.3.1."""
+    """Return the part of an endpoint's id that all endpoints of a process share. Source: RTPS 2.5, 9.3.1."""
     return bytes(info.endpoint_gid)[:_GUID_PREFIX]
 
 

@@ -1,4 +1,4 @@
-"""Parameters in ROS 2 by rclpy: the services of a node that has those of ROS 1, and queries of other nodes'."""
+"""Parameters in ROS 2 with rclpy: services for those of ROS 1 on the bridge's node, and access to those of other nodes."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
 
 class ParameterStore(Protocol):
-    """The parameters of ROS 1, on the node's loop; names and values as in ROS 2. All raise MinirospyError."""
+    """The ROS 1 parameters; names and values as in ROS 2. Runs on the node's loop; all methods raise MinirospyError."""
 
     async def names(self) -> list[str]: ...
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; of type 0 if none is set."""
+        """Return the values; the type is 0 if a parameter is not set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return for each why not, "" where it is done."""
+        """Set or delete parameters; return an error for each, "" for success."""
 
 
 class ParameterServer:
@@ -65,7 +65,7 @@ class ParameterServer:
         ]
 
     def close(self) -> None:
-        """End the services."""
+        """Close the services."""
         for service in self._services:
             self._calls.end(functools.partial(self._calls.node.destroy_service, service))
 
@@ -123,7 +123,7 @@ class ParameterServer:
 
 
 class NodeParameters:
-    """Parameters of other nodes of ROS 2. Its methods wait: call them in a worker thread. All raise BridgeError."""
+    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread. All raise BridgeError."""
 
     def __init__(self, calls: Calls) -> None:
         self._calls = calls
@@ -134,7 +134,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; of type 0 if it is not set."""
+        """Return a parameter; its type is 0 if it is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)
@@ -163,7 +163,8 @@ class NodeParameters:
             request = type_.Request()
             empty = self._calls.serialize(request)
             try:
-                # The node may not have found the client yet, and its responses are lost: see reach.py.
+                # Repeat the request: while the node has not discovered the client, its responses are lost (see
+                # reach.py).
                 data = _first(lambda: client.call(empty), end)
                 if fields:
                     for name, value in fields.items():
@@ -177,7 +178,7 @@ class NodeParameters:
 
 
 def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
-    """Call until there is a response, and return it. Raise TimeoutError."""
+    """Repeat a call until it gets a response, and return it. Raise TimeoutError."""
     pause = _AGAIN_SECONDS
     while True:
         try:

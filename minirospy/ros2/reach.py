@@ -1,9 +1,9 @@
-"""Wait until servers of ROS 2 have found the bridge's client: before, their responses may be lost. On the node's loop.
+"""Wait until ROS 2 servers have discovered the bridge's client: earlier responses may be lost. Runs on the node's loop.
 
-A server finds the ends of a client later than the client finds the server. Until then rmw_fastrtps and rmw_cyclonedds keep a
-response for 100 ms, and drop it. A client is not notified of what a server has found, but a response shows it: a request
-without effect is sent until it is answered. A process announces its ends in the order in which they were made, so the answer to a
-client that was made later shows that those before were found, too.
+A server discovers a client's endpoints later than the client discovers the server. Until then rmw_fastrtps and rmw_cyclonedds
+keep a response for 100 ms, and then drop it. A client is not notified of the server's discovery, but a response proves it: a
+request without effect is repeated until it is answered. A process announces its endpoints in the order of their creation, so
+the answer to a client that was created later shows that earlier ones have been discovered, too.
 """
 
 from __future__ import annotations
@@ -22,29 +22,28 @@ __all__ = ["Reach", "Reachable"]
 
 _LOOK_SECONDS = 0.02
 _AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
-_NO_PROBE_SECONDS = 1.0
-"""The wait for servers that have nothing to be reached by."""
+_NO_PROBE_SECONDS = 1.0  # wait for servers that cannot be probed
 _MAX_SECONDS = 10.0
-"""A server that is busy may not have answered yet: it gets the requests all the same."""
+"""Maximum wait: a busy server may not have answered by then, and is sent the requests nevertheless."""
 
 
 class Reachable(Protocol):
-    """A client of a service or an action; its methods may be called from any thread."""
+    """A client of a service or an action. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
-        """Whether a server is connected."""
+        """Return whether a server is connected."""
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """The ids of the servers that are there; None if no response can be lost."""
+        """Return the ids of the existing servers; None if no response can be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return what sends requests without effect to the servers; None if they have nothing for it."""
+        """Return a probe of the servers; None if they have no request without effect."""
 
 
 class Reach:
-    """Knows which servers have found a client."""
+    """Tracks which servers have discovered a client."""
 
     def __init__(self, client: Reachable) -> None:
         self._client = client
@@ -55,21 +54,21 @@ class Reach:
         self._is_closed = False
 
     def start(self) -> None:
-        """Reach the servers that are there, so that later requests need not wait."""
+        """Start to probe the existing servers, so that later requests need not wait."""
         if not self._is_closed and (self._reaching is None or self._reaching.done()):
             self._ready_at = None
             self._reaching = asyncio.ensure_future(self._reach())
 
     async def wait(self, seconds: float = math.inf) -> None:
-        """Return once the responses of the servers of this moment arrive, or after so many seconds.
+        """Return once responses of the current servers arrive, or after ``seconds``.
 
-        That is after ten seconds at most: servers that have not answered by then do not hold up each request.
+        The maximum is ten seconds, so that servers that have not answered by then do not delay every request.
         """
         servers = self._client.servers
         if servers is None or (self._reached is not None and servers <= self._reached):
             return
         self.start()
-        # Calls that were queued go on while what they belong to is being closed.
+        # Do not block queued calls while their link is being closed.
         if self._is_closed or self._reaching is None:
             return
         seconds = min(seconds, _MAX_SECONDS)
@@ -79,7 +78,7 @@ class Reach:
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:
-        """End it; what waits returns. Idempotent."""
+        """Stop; pending waits return. Idempotent."""
         self._is_closed = True
         if self._reaching:
             self._reaching.cancel()
@@ -95,7 +94,7 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until servers are reached, as far as they can be; return False if one has left before."""
+        """Wait until the servers have answered a probe, if they can be probed; return False if one disappears before that."""
         self._wanted = servers
         probe = await self._probe()
         if probe is None:
@@ -112,14 +111,14 @@ class Reach:
             probe = self._client.probe()
             if probe:
                 return probe
-            # Which node a server belongs to may become known later than the server.
+            # A server's node may become known later than the server.
             await asyncio.sleep(_LOOK_SECONDS)
         return None
 
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = _AGAIN_SECONDS
-    # The services of a node that has left are never connected again: without this it would be waited for without an end.
+    # Stop if a server's node has exited, because its services will never be ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
@@ -129,7 +128,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # The requests that follow will have the same reason.
+            # The actual requests will fail for the same reason and report it.
             await asyncio.sleep(pause)
         else:
             return True

@@ -1,6 +1,6 @@
-"""Which type of ROS 2 is which type of ROS 1, and which of its fields are which. Pure.
+"""The mapping of types and their fields between ROS 1 and ROS 2. Pure.
 
-Most types have the same name and fields on both sides. What differs is listed here; a user's own exceptions come from a
+Most types have the same name and fields on both sides. Exceptions are listed here; the user's own exceptions come from a
 file in the format of ros1_bridge's mapping rules.
 Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
 """
@@ -22,11 +22,11 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
 @dataclass(frozen=True)
 class TypeRule:
-    """What is special about a type of ROS 1.
+    """The exceptions for a ROS 1 type.
 
-    ``names``: what it may be in ROS 2, ``pkg/Name``. ``fields``: its fields -> those of ROS 2, all that are passed on; None:
-    each goes to the field of its name, but for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``: a
-    field, whose own fields ROS 2 has in its place.
+    ``names``: its possible names in ROS 2, ``pkg/Name``. ``fields``: its fields -> those of ROS 2, with all that are passed;
+    None: fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``: a
+    field that ROS 2 replaces by that field's own fields.
     """
 
     names: tuple[str, ...] = ()
@@ -41,14 +41,14 @@ _NO_RULE = TypeRule()
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules by type: ``pkg/Name`` of messages, services and actions; those of their parts are messages, named as in ROS 1."""
+    """Rules by ``pkg/Name`` of messages, services and actions. Parts of the latter are messages with ROS 1's names."""
 
     messages: Mapping[str, TypeRule] = field(default_factory=dict)
     services: Mapping[str, TypeRule] = field(default_factory=dict)
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule of a message type, an empty one where there is none."""
+        """Return the rule of a message type, an empty one if there is none."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the type of ROS 1 for a message type of ROS 2: of the same name, unless that has another one in ROS 2."""
+        """Return the ROS 1 type for a ROS 2 message type: the same name, unless that name is another type in ROS 2."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]
@@ -72,15 +72,15 @@ class Rules:
         return self.actions.get(ros1_type, _NO_RULE).names or (ros1_type,)
 
     def ros1_actions(self, ros2_type: str) -> tuple[str, ...]:
-        """Return the names that an action type of ROS 2 may have in ROS 1."""
+        """Return the names that a ROS 2 action type may have in ROS 1."""
         return _of_ros1(self.actions, ros2_type)
 
     def ros1_services(self, ros2_type: str) -> tuple[str, ...]:
-        """Return the names that a service type of ROS 2 may have in ROS 1."""
+        """Return the names that a ROS 2 service type may have in ROS 1."""
         return _of_ros1(self.services, ros2_type)
 
     def with_(self, other: Rules) -> Rules:
-        """Return these rules, where ``other`` has none for a type."""
+        """Return these rules, overridden by those of ``other``."""
         return Rules(
             {**self.messages, **other.messages},
             {**self.services, **other.services},
@@ -95,7 +95,7 @@ def _of_ros1(rules: Mapping[str, TypeRule], ros2_type: str) -> tuple[str, ...]:
 
 
 def snake_case(name: str) -> str:
-    """Return a field's name as ROS 2 writes it: ``seqNumber`` -> ``seq_number``."""
+    """Return a field's name in ROS 2's style: ``seqNumber`` -> ``seq_number``."""
     parts = re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name)
     return re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1_\2", parts).lower()
 
@@ -117,7 +117,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields that ROS 2 has added: ROS 1 sends none, and drops them.
+            # Fields that ROS 2 has added: they are empty from ROS 1, and dropped towards ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),
@@ -139,7 +139,7 @@ BUILT_IN = Rules(
         }
     ),
 )
-"""The rules of the usual packages."""
+"""The rules of the common packages."""
 
 _TYPE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _KEYS = {
@@ -162,7 +162,7 @@ _KEYS = {
 
 
 def parse_rules(text: str, where: str) -> Rules:
-    """Return the rules of a file. Raise BridgeError with what is wrong, and in which rule."""
+    """Parse a file of rules. Raise BridgeError with the error and the rule's number."""
     try:
         loaded = safe_load(text)
     except yaml.YAMLError as error:

@@ -1,4 +1,4 @@
-"""Which services are bridged, and how: from what both graphs offer at a moment. Pure."""
+"""Select the services to bridge, and how, from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["ServiceLink", "is_bridged_type", "service_links"]
 
 _OF_EVERY_NODE = {"roscpp/GetLoggers", "roscpp/SetLoggerLevel"}
 _PACKAGES_OF_EVERY_NODE = {"rcl_interfaces", "type_description_interfaces"}
-"""Services that nodes of one side have for that side's tools: they are not offered to the other one."""
+"""Services of ROS 2 nodes for ROS 2's own tools: they are not offered in ROS 1."""
 
 
 @dataclass(frozen=True)
 class ServiceLink:
-    """A service that is offered on one side and called from the other. ``direction``: where requests go."""
+    """A service that is offered on one side and called from the other. ``direction``: the direction of requests."""
 
     service: str
     direction: Direction
@@ -25,17 +25,17 @@ class ServiceLink:
 
     @property
     def title(self) -> str:
-        """How messages to people name the link."""
+        """Return the link's name for log messages."""
         return f"service {self.service}"
 
 
 def is_bridged_type(type_: str) -> bool:
-    """Return whether services of a type, ``pkg/Name`` of either side, are meant for other nodes."""
+    """Return whether services of a type, ``pkg/Name`` on either side, are for other nodes and not for tools."""
     return type_ not in _OF_EVERY_NODE and type_.partition("/")[0] not in _PACKAGES_OF_EVERY_NODE
 
 
 def is_hidden(name: str) -> bool:
-    """Return whether a name is hidden in ROS 2, as those of actions are: a part of it starts with an underscore."""
+    """Return whether a name is hidden in ROS 2, such as those of actions: one of its parts starts with an underscore."""
     return "/_" in name
 
 
@@ -45,10 +45,10 @@ def service_links(
     ros2: Mapping[str, str],
     partner: Callable[[str, Direction], str],
 ) -> list[ServiceLink]:
-    """Return what is to be bridged: each service that one side alone offers, bridges not counted.
+    """Return the services to bridge: those that only one side offers, apart from bridges.
 
-    ``ros1``: services and their nodes; ``ros1_types``: those whose type is known. ``ros2``: services and their types.
-    ``partner(type, direction)``: the type of the side that calls.
+    ``ros1``: services and their nodes; ``ros1_types``: the known types. ``ros2``: services and their types.
+    ``partner(type, direction)`` returns the type on the calling side.
     """
     offered = {name for name, nodes in ros1.items() if not all(map(is_bridge, nodes))}
     found = []

@@ -1,4 +1,4 @@
-"""Services that pass from one side to the other: what is opened and closed, and how a call is answered."""
+"""Services between the two sides: open and close them, and answer calls."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ if TYPE_CHECKING:
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
 _QUERY_SECONDS = 1.0
-"""After this the services are bridged whose types are known."""
+"""Timeout, after which only services whose types are known are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
-"""Calls of a service that are passed to ROS 1 at a time: more are answered with the reason."""
+"""Concurrent calls of a service to ROS 1; further ones are answered with an error."""
 _MAX_UNDER_WAY = 8
-"""Requests that a server of ROS 2 gets at a time: its queue has 10 places, and those beyond would be lost."""
+"""Concurrent requests to a ROS 2 server: its queue has 10 places, and further ones would be lost."""
 
 
 @dataclass(frozen=True)
 class ServiceCodec:
-    """How the bytes of a service's requests and responses are converted; ``type``: that of ROS 1."""
+    """Converts a service's requests and responses; ``type``: the ROS 1 type."""
 
     type: InterfaceType
     request: Transcoder
@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """The codecs of services, by the names of both types."""
+    """The codecs of services, by their types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -71,7 +71,7 @@ class _Types:
         self._codecs: dict[tuple[str, str], ServiceCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type of the side that calls, for that of the side that offers."""
+        """Return the type on the calling side, for the type on the offering side."""
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_services(type_)
             return next((name for name in names if self._is_in_ros2(name)), names[0])
@@ -124,7 +124,7 @@ class _Types:
 
 
 class ServiceBridge:
-    """Offers the services of each side to the other one. On the node's loop."""
+    """Offers each side's services on the other side. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -144,16 +144,16 @@ class ServiceBridge:
         self._table: LinkTable[ServiceLink, _InRos1 | _InRos2] = LinkTable(node.log, self._make)
 
     async def close(self) -> None:
-        """Close all. Idempotent."""
+        """Close all services. Idempotent."""
         await self._table.close()
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return what would be bridged of these services of ROS 1 and those of ROS 2, and why something is not."""
+        """Return the services to bridge, given those of ROS 1, and the reasons why some are not bridged."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
-        """Open and close services as both sides are now; whether any changed."""
+        """Open and close services to match both graphs; return whether any changed."""
         return await self._table.update(await self._wanted(ros1))
 
     async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Return a server's connection header: of services in ROS 1 the master does not know the types."""
+        """Return a server's connection header, because the ROS 1 master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -191,7 +191,7 @@ class ServiceBridge:
 
 
 class _InRos1:
-    """A service of ROS 2 that the bridge offers in ROS 1."""
+    """A ROS 2 service that the bridge offers in ROS 1."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # The calls under way are answered with the reason.
+        # Running calls are answered with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,7 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server: the client of a service that was found a moment ago may not be connected yet."""
+        """Wait for the server: if the service has just been discovered, its client may not be connected yet."""
         loop = asyncio.get_running_loop()
         end = loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready:
@@ -273,7 +273,7 @@ class _InRos1:
 
 
 class _InRos2:
-    """A service of ROS 1 that the bridge offers in ROS 2."""
+    """A ROS 1 service that the bridge offers in ROS 2."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -300,7 +300,7 @@ class _InRos2:
         await asyncio.gather(*self._calls, return_exceptions=True)
 
     def _arrived(self, request: bytes) -> Future[bytes]:
-        """Start a call. In the executor's thread."""
+        """Start a call. Runs in the executor's thread."""
         answered: Future[bytes] = Future()
         self._loop.call_soon_threadsafe(self._start, request, answered)
         return answered
@@ -315,11 +315,11 @@ class _InRos2:
         task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
-        # Of a task that is cancelled, also before its first step.
+        # Also if the task is cancelled, even before its first step.
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Give the answer, or why there is none, to a future of another thread."""
+        """Set the response or the error in another thread's future."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:

@@ -1,7 +1,6 @@
-"""The side of ROS 2, by rclpy: its topics, publishers and subscriptions of serialized messages.
+"""The ROS 2 backend with rclpy: topics, publishers and subscriptions of serialized messages.
 
-All of rclpy is behind this file and rclpy_*.py. ROS 2 calls back in a thread of its
-executor.
+Only this module and rclpy_*.py use rclpy. ROS 2 calls back in the thread of its executor.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Messages that are read at one call of the executor, which costs more than reading one."""
+"""Messages read per callback of the executor, because a callback costs more than reading one message."""
 
 
 # --- what is used of rclpy, which has no types where it is not installed
@@ -78,7 +77,7 @@ class _Node(Protocol):
 
 
 def require_rclpy() -> None:
-    """Raise BridgeError with what to do where ROS 2 cannot be imported."""
+    """Raise BridgeError with instructions if ROS 2 cannot be imported."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:
@@ -89,7 +88,7 @@ def require_rclpy() -> None:
 
 
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-"""Environment variables that name a file with Fast DDS's settings: the second up to version 2, which _OLD_DISTRIBUTIONS have."""
+"""Environment variables for Fast DDS's settings file; the second is for up to version 2, which _OLD_DISTRIBUTIONS have."""
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -97,7 +96,7 @@ _OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
 
 
 def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment variables that give large messages room in Fast DDS; none where the user has set it up."""
+    """Return the environment variables that enlarge Fast DDS's buffers for large messages; {} if the user has configured it."""
     if any(environment.get(name) for name in (*_PROFILES, *_OTHER_SETTINGS)):
         return {}
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp").startswith("rmw_fastrtps"):
@@ -107,7 +106,7 @@ def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 class RclpySide:
-    """ROS 2 by rclpy: one node, one executor, in one thread."""
+    """The rclpy backend: one node and one executor, in one thread."""
 
     def __init__(self, name: str) -> None:
         """Start the node. Raise BridgeError."""
@@ -120,7 +119,7 @@ class RclpySide:
         self._context = importlib.import_module("rclpy.context").Context()
         no_signals = importlib.import_module("rclpy.signals").SignalHandlerOptions.NO
         try:
-            # Ctrl-C is the bridge's own.
+            # The bridge handles Ctrl-C itself.
             rclpy.init(args=[], context=self._context, signal_handler_options=no_signals)
             self._node = rclpy.create_node(
                 name,
@@ -128,7 +127,7 @@ class RclpySide:
                 use_global_arguments=False,
                 start_parameter_services=False,
             )
-        except Exception as error:  # rclpy's own errors have no common base but this
+        except Exception as error:  # rclpy's errors have no other common base
             with contextlib.suppress(Exception):
                 self._context.try_shutdown()
             raise BridgeError(f"ROS 2 does not start: {' '.join(str(error).split())}") from error
@@ -142,7 +141,7 @@ class RclpySide:
 
     @property
     def domain(self) -> str:
-        """The domain of ROS 2."""
+        """Return the ROS 2 domain."""
         return parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
@@ -158,11 +157,11 @@ class RclpySide:
         )
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
         return dict(self._class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a publisher, which is reliable: so it suits every subscriber. Raise TypesDiffer."""
+        """Return a reliable publisher, which is compatible with every subscriber. Raise TypesDiffer."""
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
         publisher = self._node.create_publisher(self._class(type_), topic, profile)
         return _Publisher(self._calls, self._node, publisher)
@@ -177,18 +176,18 @@ class RclpySide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` with each serialized message, in the executor's thread. Raise TypesDiffer."""
+        """Call ``deliver`` for each serialized message, in the executor's thread. Raise TypesDiffer."""
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
         return _Subscription(self._calls, self._node, self._class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes but those of bridges."""
+        """Return the names and namespaces of all nodes except for bridges."""
         found = self._node.get_node_names_and_namespaces()
         return [(str(name), str(space)) for name, space in found if not name.startswith(BRIDGE_PREFIX)]
 
     def services(self) -> Mapping[str, str]:
-        """Return the services that others than this bridge offer, and their types."""
-        # Services that have clients only are among them.
+        """Return the services of nodes other than this bridge, and their types."""
+        # Includes services that have clients but no server.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)
@@ -197,17 +196,17 @@ class RclpySide:
                 for name, type_ in named.items()
                 if self._node.count_services(name) > own.count(name)
             }
-        # Before ROS 2 Jazzy.
+        # Before ROS 2 Jazzy, query each node.
         offered: dict[str, str] = {}
         for name, namespace in self.nodes():
-            # A node that has just ended has none.
+            # The node has just exited.
             with contextlib.suppress(RuntimeError):
                 found = self._node.get_service_names_and_types_by_node(name, namespace)
                 offered.update((str(service), _short(types[0])) for service, types in found)
         return offered
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
         class_ = self._service_class(type_)
         return (
             dict(class_.Request.get_fields_and_field_types()),
@@ -225,7 +224,7 @@ class RclpySide:
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer where it is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
         class_ = self._action_class(type_)
         goal, result, feedback = (
             dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
@@ -244,7 +243,7 @@ class RclpySide:
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the parameters of ROS 1 as those of this node."""
+        """Offer the ROS 1 parameters as this node's parameters."""
         return ParameterServer(self._calls, str(self._node.get_name()), store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
@@ -252,7 +251,7 @@ class RclpySide:
         return NodeParameters(self._calls)
 
     def close(self) -> None:
-        """End the node and its thread. Idempotent."""
+        """Stop the node and its thread. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -270,7 +269,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Of one callback: the others go on.
+                # Only this callback failed: continue with the others.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -294,7 +293,7 @@ class RclpySide:
     @staticmethod
     def _class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # minirospy's own packages of ROS 1 have classes, too.
+        # minirospy's own ROS 1 packages have classes of that name, too.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)
@@ -315,7 +314,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service of the bridge, which is its own until it ends."""
+    """A service offered by the bridge; it is listed as the bridge's own until it is closed."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -368,7 +367,7 @@ class _Subscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message, and those that have come after it: the executor brings one at a time, slowly."""
+        """Deliver a message and those queued after it, because the executor delivers one at a time, slowly."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:
@@ -378,7 +377,7 @@ class _Subscription:
                 with handle:
                     taken = handle.take_message(self._class, True)
             except self._invalid_handle:
-                return  # closed meanwhile, by the loop's thread
+                return  # closed meanwhile by the loop's thread
             if taken is None:
                 return
             data = taken[0]
@@ -387,7 +386,7 @@ class _Subscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # A node of the other side has named it: an import runs what the module does.
+    # The name comes from a remote node: importing an arbitrary module would execute it.
     if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:
@@ -397,19 +396,19 @@ def _imported(type_: str, kind: str) -> object:
 
 
 def _is_interface_package(package: str) -> bool:
-    """Return whether a package holds what rosidl generates, without importing it: a library for its types."""
+    """Return whether a package contains rosidl's generated type support library, without importing it."""
     if package in sys.stdlib_module_names:
         return False
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # ValueError: a module that was put into sys.modules by hand has no spec.
+        # ValueError: a module without a spec was put into sys.modules.
         return False
     folders = found.submodule_search_locations if found else None
     return any(any(Path(folder).glob(f"{package}_s__rosidl_typesupport_*")) for folder in folders or ())
 
 
 def _short(type_: str) -> str:
-    """Return ``pkg/Name`` of ``pkg/msg/Name``."""
+    """Return ``pkg/Name`` for ``pkg/msg/Name``."""
     package, _, rest = type_.partition("/")
     return f"{package}/{rest.rpartition('/')[2]}"

@@ -1,6 +1,6 @@
-"""XXH3 with 128 bits, by which rmw_zenoh makes an id of 16 bytes of a token's key. Pure.
+"""XXH3 with 128 bits, which rmw_zenoh uses to make an id of 16 bytes from a token's key. Pure.
 
-Source: https://github.com/Cyan4973/xxHash/blob/dev/doc/xxhash_spec.md, with seed 0, for texts of more than 16 bytes.
+Source: https://github.com/Cyan4973/xxHash/blob/dev/doc/xxhash_spec.md, with seed 0, for inputs of more than 16 bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _STRIPE, _STRIPES = 64, 16
 
 
 def xxh3_128(data: bytes) -> bytes:
-    """Return the hash: its low half, then its high one, each little-endian. ``data`` has more than 16 bytes."""
+    """Return the hash: its low half, then its high half, both little-endian. ``data`` has more than 16 bytes."""
     size = len(data)
     low, high = _long(data) if size > 240 else _middle(data, size)
     return struct.pack("<QQ", low, high)

@@ -1,6 +1,6 @@
-"""Clients and servers of actions in ROS 2 by Zenoh: three services and two topics, as rcl_action names them.
+"""Clients and servers of ROS 2 actions over Zenoh: three services and two topics, named as by rcl_action.
 
-A goal's id is in front of it: 16 bytes, so that what follows is aligned as it was.
+A goal is preceded by its id: 16 bytes, so the alignment of the rest does not change.
 Source: https://design.ros2.org/articles/actions.html, and the definitions of action_msgs.
 """
 
@@ -39,17 +39,16 @@ _BODY = _HEADER + 16
 _NO_ID = bytes(16)
 _SECOND = 1_000_000_000
 _ACCEPTED, _EXECUTING, _CANCELING = 1, 2, 3
-"""The statuses of a goal that has not ended: action_msgs/GoalStatus. 0 is unknown."""
+"""Statuses of a goal that has not ended: action_msgs/GoalStatus. 0 is unknown."""
 _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
-"""Why a cancel has no effect: action_msgs/srv/CancelGoal."""
-_KEPT_SECONDS = 60.0
-"""How long the result of a goal can be had after its end."""
+"""Errors of action_msgs/srv/CancelGoal."""
+_KEPT_SECONDS = 60.0  # a goal's result is kept after its end
 _MAX_GOALS = 2_000
 _CLOSE_SECONDS = 1.0
 
 
 class ActionEnds(NamedTuple):
-    """The ends of an action: of a client, or of a server."""
+    """The endpoints of an action client or server."""
 
     send_goal: Entity
     get_result: Entity
@@ -59,14 +58,14 @@ class ActionEnds(NamedTuple):
 
 
 class ActionType:
-    """The messages around goals, results and feedback. ``name``: ``pkg/action/Name``; ``fields``: those of its parts."""
+    """The messages around goals, results and feedback. ``name``: ``pkg/action/Name``; ``fields``: looks up a part's fields."""
 
     def __init__(self, name: str, fields: Callable[[str], Fields]) -> None:
         self._name = name
         self._fields = fields
 
     def write(self, part: str, values: Mapping[str, object]) -> bytes:
-        """Return the CDR of a part, such as ``SendGoal_Response``."""
+        """Return the CDR of a part such as ``SendGoal_Response``."""
         return encode(f"{self._name}_{part}", self._fields, values)
 
     def read(self, part: str, data: bytes) -> dict[str, object]:
@@ -74,12 +73,12 @@ class ActionType:
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
-        """Return the response to a request for a result, None for an empty one. Raise DeserializationError."""
+        """Return the response to a request for a result; None is an empty result. Raise DeserializationError."""
         values = {} if result is None else self.read("Result", result)
         return self.write("GetResult_Response", {"status": status, "result": values})
 
     def result(self, response: bytes) -> tuple[int, bytes]:
-        """Return the status and result of such a response. Raise DeserializationError."""
+        """Return the status and the result from such a response. Raise DeserializationError."""
         found = self.read("GetResult_Response", response)
         return cast("int", found["status"]), self.write(
             "Result", cast("Mapping[str, object]", found["result"])
@@ -90,7 +89,7 @@ class ActionType:
         return encode(name, self._fields, values)
 
     def cancelled(self, request: bytes) -> tuple[bytes, int]:
-        """Return the id and time of a request to cancel. Raise DeserializationError."""
+        """Return the goal's id and time from a cancel request. Raise DeserializationError."""
         found = decode("action_msgs/srv/CancelGoal_Request", self._fields, request)
         info = cast("dict[str, dict[str, object]]", found["goal_info"])
         stamp = cast("dict[str, int]", info["stamp"])
@@ -107,7 +106,7 @@ def _time(stamp: int) -> dict[str, object]:
 
 
 def _split(data: bytes) -> tuple[bytes, bytes]:
-    """Return the id of a goal and what follows. Raise DeserializationError."""
+    """Return a goal's id and the data after it. Raise DeserializationError."""
     if len(data) < _BODY:
         raise DeserializationError("the message ends too early")
     return data[_HEADER:_BODY], data[:_HEADER] + data[_BODY:]
@@ -121,7 +120,7 @@ def _joined(id: bytes, data: bytes) -> bytes:
 
 
 class _SentGoal:
-    """A goal that a server of ROS 2 has accepted. From any thread."""
+    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
 
     def __init__(self, client: ZenohActionClient, id: bytes) -> None:
         self._client = client
@@ -132,12 +131,12 @@ class _SentGoal:
         self._client.cancel(self._id)
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future status and result."""
+        """Return the future of the status and the result."""
         return self._client.result(self._id)
 
 
 class ZenohActionClient:
-    """A client of an action. From any thread. It needs no list of statuses, which it does not subscribe to."""
+    """A client of an action, without a subscription to its statuses. Methods may be called from any thread."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType) -> None:
         self._graph = node.graph
@@ -151,17 +150,17 @@ class ZenohActionClient:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server is there, with all its ends."""
+        """Return whether a server with all its endpoints exists."""
         publishers = self._graph.of_name(self._ends.feedback.name, Kind.PUBLISHER)
         clients = (self._send_goal, self._get_result, self._cancel_goal)
         return bool(publishers) and all(each.is_ready for each in clients)
 
     @property
     def servers(self) -> None:
-        """None: a response takes the path of its request, which the tokens show to be there."""
+        """Return None: a response returns on the path of its request, whose existence the tokens prove."""
 
     def probe(self) -> None:
-        """Return None: nothing has to be reached."""
+        """Return None: no probe is needed."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return the accepted goal, None if it is refused. It fails with BridgeError."""
@@ -178,7 +177,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # Nobody waits any more, and in ROS 1 the goal counts as refused: it must not run.
+                # The caller no longer waits, and the goal counts as refused in ROS 1, so it must not run.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -190,13 +189,13 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Request the server to cancel a goal: whether it does shows in its result."""
+        """Request the server to cancel a goal; the goal's result shows whether it has."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return the future status and result of a goal. It fails with BridgeError."""
+        """Return the future of a goal's status and result. It fails with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -214,7 +213,7 @@ class ZenohActionClient:
         return ended
 
     def close(self) -> None:
-        """End the client. Idempotent."""
+        """Close the client. Idempotent."""
         for each in (self._feedback, self._cancel_goal, self._get_result, self._send_goal):
             each.close()
 
@@ -235,7 +234,7 @@ def _fail(future: Future[Ros2Goal | None] | Future[tuple[int, bytes]], error: Ex
 
 @dataclass
 class _Goal:
-    """A goal of ROS 2. ``status`` is 0 until it is accepted; ``response``: to who wants the result, once it has ended."""
+    """A ROS 2 client's goal. ``status`` is 0 until it is accepted; ``response`` has the result once the goal has ended."""
 
     id: bytes
     status: int = 0
@@ -248,7 +247,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that is offered in ROS 2. All of it runs in one thread, so that what it sends is in order."""
+    """An action that the bridge offers in ROS 2. It runs in one thread, so that everything is sent in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")
@@ -268,9 +267,9 @@ class ZenohActionServer:
         ]
 
     def close(self) -> None:
-        """Offer it no more; results that are known are sent first. Idempotent."""
+        """Close after sending known results. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The responses to what has ended by now come after the first.
+            # The first pass may submit responses for goals that have just ended; the second waits for these.
             self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
         for server in self._servers:
@@ -286,7 +285,7 @@ class ZenohActionServer:
             except Exception:  # noqa: BLE001 - the others go on
                 _log.exception("action [%s] of ROS 1", self._name)
 
-        # After its end nothing is sent.
+        # After close() nothing is sent.
         with contextlib.suppress(RuntimeError):
             self._thread.submit(guarded)
 
@@ -316,7 +315,7 @@ class ZenohActionServer:
             answered.set_result(self._decision(None))
             return
         goal.stamp, goal.status = time.time_ns(), _ACCEPTED
-        # The response is sent before what is submitted from here on.
+        # The response is sent before anything that is submitted later.
         answered.set_result(self._decision(goal))
         self._submit(lambda: self._start(goal))
         goal.there.ended.add_done_callback(lambda end: self._submit(lambda: self._end(goal, end)))
@@ -346,7 +345,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # A goal that ROS 1 preempted for another one: ROS 2 has no such end.
+            # ROS 1 has preempted the goal for another one, which ROS 2 has no status for.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

@@ -1,6 +1,6 @@
-"""Clients and servers of services in ROS 2 by Zenoh: a request is a query, whose reply is the response.
+"""Clients and servers of ROS 2 services over Zenoh: a request is a query, the response its reply.
 
-Zenoh calls back in its own threads; so do the futures.
+Zenoh, and so the futures, call back in Zenoh's threads.
 """
 
 from __future__ import annotations
@@ -31,39 +31,38 @@ __all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 _log = logging.getLogger(__name__)
 
 MAX_BYTES = 64 << 20
-MAX_UNDER_WAY = 200
-"""Requests of a service whose responses are not written yet."""
+MAX_UNDER_WAY = 200  # requests of a service whose responses have not been written yet
 _MAX_OF_ACTION = 2_000
-"""More than goals: a request for a result waits for the goal's end."""
+"""More than the number of goals, because a request for a result waits for the goal's end."""
 _LONGEST_SECONDS = 10_000_000
-"""The bridge has time limits of its own; those of Zenoh would end a goal that takes long."""
+"""Practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
 
 
 class ZenohClient:
-    """A client of a service. From any thread."""
+    """A client of a service. Methods may be called from any thread."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # A request blocks where the network is slow, for seconds: the caller is the loop.
+        # On a slow network, sending a request blocks for seconds; the caller is the loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server is there."""
+        """Return whether a server exists."""
         servers = self._node.graph.of_name(self._end.name, Kind.SERVICE)
         return any(each.key == self._end.key for each in servers)
 
     @property
     def servers(self) -> None:
-        """None: a response takes the path of its request, which the tokens show to be there."""
+        """Return None: a response returns on the path of its request, whose existence the tokens prove."""
 
     def probe(self) -> None:
-        """Return None: nothing has to be reached."""
+        """Return None: no probe is needed."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
+        """Send a request and return the future of the response, both as CDR. It fails with BridgeError."""
         answered: Future[bytes] = Future()
         name = self._end.name
 
@@ -106,16 +105,17 @@ class ZenohClient:
         return answered
 
     def close(self) -> None:
-        """End the client. Idempotent."""
+        """Close the client. Idempotent."""
         self._handle.close()
         self._requests.shutdown(wait=False)
 
 
 class ZenohServer:
-    """A service that is offered in ROS 2; ``answer`` gets the CDR of a request and returns that of the response.
+    """A service that the bridge offers in ROS 2; ``answer`` takes a request's CDR and returns the future of the response's.
 
-    A MinirospyError of its future is why the call fails: the text of a response that has a place for it, else the error of the
-    query, which rmw_zenoh writes to its log. ``thread``: of the caller's, in which all of this happens.
+    If the future raises MinirospyError, the call fails: the reason is sent in the response, if it has a field for it, else
+    as the query's error, which rmw_zenoh logs. ``thread``: the caller's executor for all of this, by default a separate
+    one.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class ZenohServer:
         self._under_way = 0
         self._lock = threading.Lock()
         self._most = MAX_UNDER_WAY if thread is None else _MAX_OF_ACTION
-        # A reply may block where the network is slow.
+        # On a slow network, sending a reply may block.
         self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
         self._own = None if thread else self._replies
         handler = node.handler(self._arrived)
@@ -141,7 +141,7 @@ class ZenohServer:
         self._handle = Handle(node, end, queryable)
 
     def close(self) -> None:
-        """Offer it no more. Idempotent."""
+        """Close the service. Idempotent."""
         self._handle.close()
         if self._own:
             self._own.shutdown(wait=False)
@@ -169,7 +169,7 @@ class ZenohServer:
             answered = self._answer(query.payload.to_bytes())
         except (DeserializationError, ValueError, RuntimeError) as error:
             self._done()
-            # RuntimeError: the loop has ended.
+            # RuntimeError: the loop has been closed.
             self._refuse(query, "the bridge has ended" if isinstance(error, RuntimeError) else str(error))
             return
 
@@ -183,7 +183,7 @@ class ZenohServer:
         answered.add_done_callback(finished)
 
     def _finish(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
-        # A response counts until it is written: those that wait for a slow network take memory.
+        # Count a response until it is written: those that wait for a slow network use memory.
         try:
             self._reply(query, back, answered)
         finally:
@@ -196,10 +196,10 @@ class ZenohServer:
             reason = " ".join(str(error).split())
             _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
             if self._response != ["bool", "string"]:
-                # Zeros would be taken for an answer.
+                # Send an error: a response of zeros would look like a valid answer.
                 self._refuse(query, reason)
                 return
-            # As that of SetBool and Trigger: without success, and why.
+            # A response such as those of SetBool and Trigger: success is false, followed by the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

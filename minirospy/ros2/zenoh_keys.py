@@ -1,4 +1,4 @@
-"""What rmw_zenoh writes into keys and attachments of Zenoh: topics, services, nodes and their ends. Pure.
+"""The Zenoh keys and attachments of rmw_zenoh: topics, services, nodes and their endpoints. Pure.
 
 Source: https://github.com/ros2/rmw_zenoh/blob/rolling/docs/design.md, and liveliness_utils.cpp of the same repository.
 """
@@ -36,7 +36,7 @@ _DEFAULT_DEPTH = 42
 
 
 class Kind(Enum):
-    """What a token declares."""
+    """The kind of entity that a token declares."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -47,22 +47,22 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Qos:
-    """The quality of service of an end, so far as the bridge knows it."""
+    """The quality of service of an endpoint, as far as the bridge uses it."""
 
     is_reliable: bool = True
     is_transient_local: bool = False
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return the text of a token: what differs from rmw_zenoh's own default."""
+        """Return its form in a token: the differences from rmw_zenoh's default."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 
 
 class Entity(NamedTuple):
-    """A node, or an end of a topic or service. ``type``: ``pkg/Name``, or ``pkg/srv/Name`` and the like.
+    """A node, or an endpoint of a topic or service. ``type``: ``pkg/Name``, ``pkg/srv/Name`` or ``pkg/action/Name``.
 
-    ``session``: the id of its session of Zenoh.
+    ``session``: the id of its Zenoh session.
     """
 
     domain: str
@@ -78,18 +78,18 @@ class Entity(NamedTuple):
 
     @property
     def short_type(self) -> str:
-        """The type as ``pkg/Name``."""
+        """Return the type as ``pkg/Name``."""
         package, _, rest = self.type.partition("/")
         return f"{package}/{rest.rpartition('/')[2]}"
 
     @property
     def key(self) -> str:
-        """The key of its messages or requests."""
+        """Return the key of its messages or requests."""
         return data_key(self.domain, self.name, self.type, self.hash)
 
 
 def tokens_pattern(domain: str) -> str:
-    """Return the pattern of all tokens of a domain."""
+    """Return the key expression of all tokens of a domain."""
     return f"{_SPACE}/{domain}/**"
 
 
@@ -99,14 +99,14 @@ def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
 
 
 def dds_name(type_: str) -> str:
-    """Return ``pkg::msg::dds_::Name_`` of ``pkg/Name``, and the like of ``pkg/srv/Name``."""
+    """Return ``pkg::msg::dds_::Name_`` for ``pkg/Name``, and similarly for ``pkg/srv/Name``."""
     package, _, rest = type_.partition("/")
     kind, _, name = rest.rpartition("/")
     return f"{package}::{kind or 'msg'}::dds_::{name}_"
 
 
 def format_token(entity: Entity) -> str:
-    """Return the key of the token that declares it."""
+    """Return the key of an entity's token."""
     node_id = entity.id if entity.kind is Kind.NODE else 0
     parts = [_SPACE, entity.domain, entity.session, str(node_id), str(entity.id), entity.kind.value, "%"]
     parts += [_mangled(entity.namespace), entity.node]
@@ -116,7 +116,7 @@ def format_token(entity: Entity) -> str:
 
 
 def parse_token(key: str) -> Entity | None:
-    """Return what a token declares, None if it is not one that the bridge understands."""
+    """Parse a token's key; return None if the bridge does not understand it."""
     parts = key.split("/")
     if len(key) > _LONGEST or len(parts) < 9 or parts[0] != _SPACE:
         return None
@@ -154,7 +154,7 @@ def _mangled(name: str) -> str:
 
 
 def gid_of(token: str) -> bytes:
-    """Return the id of what a token declares."""
+    """Return the id of the entity that a token declares."""
     return xxh3_128(token.encode())
 
 
@@ -165,13 +165,13 @@ _TIME = slice(8, 16)
 
 
 def attachment(sequence: int, time: int, gid: bytes) -> bytes:
-    """Return what goes with a message or request; ``time`` in nanoseconds since 1970."""
+    """Return the attachment of a message or request; ``time`` in nanoseconds since 1970."""
     return _ATTACHMENT.pack(sequence, time, len(gid), gid)
 
 
 def reply_attachment(data: bytes, time: int) -> bytes:
-    """Return what goes with the response to a request, with this attachment. Raise ValueError if it is not one."""
-    # The id without its length, as other versions of rmw_zenoh may have it, goes back likewise.
+    """Return the attachment of a response to a request with the attachment ``data``. Raise ValueError if it is invalid."""
+    # Other versions of rmw_zenoh may send the id without its length; return it in the same form.
     if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
         raise ValueError("this is not an attachment of rmw_zenoh")
     return data[: _TIME.start] + struct.pack("<q", time) + data[_TIME.stop :]

@@ -1,4 +1,4 @@
-"""The bridge's node of ROS 2 on a session of Zenoh: its tokens, its ends, and the graph that the tokens of others make."""
+"""The bridge's ROS 2 node on a Zenoh session: its tokens and endpoints, and the graph from other sessions' tokens."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _MAX_ENTITIES = 50_000
 
 
 class Graph:
-    """All tokens that are there, but those of one's own session. From any thread."""
+    """All tokens except for those of this session. Methods may be called from any thread."""
 
     def __init__(self, own_session: str = "") -> None:
         self._own = own_session
@@ -49,7 +49,7 @@ class Graph:
         self._lock = threading.Lock()
 
     def set(self, key: str, is_there: bool) -> None:
-        """Add or remove a token; one that is not understood has no effect."""
+        """Add or remove a token; ignore one that cannot be parsed."""
         entity = parse_token(key)
         if entity is None or entity.session == self._own:
             return
@@ -70,23 +70,23 @@ class Graph:
             return list(self._nodes.values())
 
     def ends(self, *kinds: Kind) -> list[Entity]:
-        """Return the ends of these kinds of all topics and services."""
+        """Return the endpoints of these kinds of all topics and services."""
         with self._lock:
             found = [each for ends in self._by_name.values() for each in ends.values()]
         return [each for each in found if each.kind in kinds]
 
     def of_name(self, name: str, *kinds: Kind) -> list[Entity]:
-        """Return the ends of these kinds of a topic or service."""
+        """Return the endpoints of these kinds of a topic or service."""
         with self._lock:
             found = list(self._by_name.get(name, {}).values())
         return [each for each in found if each.kind in kinds]
 
 
 class ZenohNode:
-    """A session with one node. ``graph``: the nodes and ends of other sessions."""
+    """A session with one node. ``graph``: the nodes and endpoints of other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
-        """Open the session; waits for the router. Raise BridgeError."""
+        """Open the session and wait for the router. Raise BridgeError."""
         require_zenoh("ros2-bridge --zenoh")
         self.zenoh = importlib.import_module("zenoh")
         self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
@@ -97,7 +97,7 @@ class ZenohNode:
         self.graph = Graph(self._zid)
         self._is_closed = False
         liveliness = self.session.liveliness()
-        # Until the session closes.
+        # Declared until the session closes.
         self._declared = [
             liveliness.declare_token(format_token(self.entity(Kind.NODE))),
             liveliness.declare_subscriber(
@@ -108,26 +108,26 @@ class ZenohNode:
     def entity(
         self, kind: Kind, name: str = "", type_: str = "", hash_: str = "", qos: Qos | None = None
     ) -> Entity:
-        """Return a new end of this node, whose token :class:`Handle` declares; the first one is the node itself."""
+        """Return a new endpoint of this node, whose token :class:`Handle` declares; the first one is the node itself."""
         id = next(self._ids)
         return Entity(self.domain, self._zid, id, kind, self._name, "/", name, type_, hash_, qos or Qos())
 
     def close(self) -> None:
-        """End the session, and all that it has declared. Idempotent."""
+        """Close the session with all its declarations. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
-        # Of a link that is cut: the other end notices by itself.
+        # If the link is broken, undeclaring fails; the peer notices the loss by itself.
         with contextlib.suppress(self.zenoh.ZError):
             self.session.close()
 
     def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
-        """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
+        """Return a handler that Zenoh calls in its own thread; by default Zenoh starts a thread for each handler."""
         return self.zenoh.handlers.Callback(function, ended, indirect=False)
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # What is kept for those who come later has times.
+        # Messages that are kept for late subscribers need timestamps.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)
@@ -144,7 +144,7 @@ class ZenohNode:
 
 
 class Handle:
-    """An end of a node with its token, and what belongs to it, until it is closed."""
+    """An endpoint of a node, with its token and declarations, until it is closed."""
 
     def __init__(self, node: ZenohNode, end: Entity, *declared: Declared) -> None:
         key = format_token(end)
@@ -154,13 +154,13 @@ class Handle:
         self._sequence = itertools.count(1)
 
     def attachment(self) -> bytes:
-        """Return what goes with the next message or request."""
+        """Return the attachment of the next message or request."""
         return attachment(next(self._sequence), time.time_ns(), self._gid)
 
     def close(self) -> None:
-        """Undeclare it. Idempotent."""
+        """Undeclare the endpoint. Idempotent."""
         declared, self._declared = self._declared, ()
         for each in declared:
-            # It is undeclared with its session.
+            # The session is closed, which has undeclared it.
             with contextlib.suppress(self._fault):
                 each.undeclare()

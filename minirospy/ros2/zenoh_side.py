@@ -1,7 +1,7 @@
-"""The side of ROS 2 by Zenoh, for nodes that run rmw_zenoh: no ROS 2 is installed here.
+"""The ROS 2 backend over Zenoh, for nodes that run rmw_zenoh; no ROS 2 is installed here.
 
-Zenoh calls back in its own threads. Definitions are those of ROS 1 under the rules; a type whose hash in a key of the other
-side differs is not bridged.
+Zenoh calls back in its own threads. Definitions are derived from those of ROS 1 and the rules; a type is not bridged if its
+hash in the other side's keys differs.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _LATCHED = Qos(True, True, 1)
 
 
 class ZenohSide:
-    """ROS 2 by Zenoh: one session with one node."""
+    """The Zenoh backend: one session with one node."""
 
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
-        """Open the session; waits for the router. Raise BridgeError."""
+        """Open the session and wait for the router. Raise BridgeError."""
         self._name = name
         self._node = ZenohNode(name, options)
         self._graph = self._node.graph
@@ -46,7 +46,7 @@ class ZenohSide:
 
     @property
     def domain(self) -> str:
-        """The domain of ROS 2."""
+        """Return the ROS 2 domain."""
         return self._node.domain
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
@@ -64,11 +64,11 @@ class ZenohSide:
         )
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes but those of bridges."""
+        """Return the names and namespaces of all nodes except for bridges."""
         return [(each.node, each.namespace) for each in self._graph.nodes() if not is_bridge(each.node)]
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer, also if the other side's is another one."""
+        """Return the fields of a message type. Raise TypesDiffer if it is unknown, or the other side's definition differs."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC)
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
@@ -87,12 +87,12 @@ class ZenohSide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` with each serialized message, in a thread of Zenoh's. Raise TypesDiffer."""
+        """Call ``deliver`` for each serialized message, in a thread of Zenoh's. Raise TypesDiffer."""
         end = self._topic_end(Kind.SUBSCRIPTION, topic, type_, Qos(is_reliable, is_latched, depth))
         return subscribe(self._node, end, deliver)
 
     def services(self) -> Mapping[str, str]:
-        """Return the services that others than bridges offer, and their types."""
+        """Return the services of nodes other than bridges, and their types."""
         ends = self._graph.ends(Kind.SERVICE)
         return {end.name: end.short_type for end in ends if not is_bridge(end.node)}
 
@@ -113,7 +113,7 @@ class ZenohSide:
         return ZenohServer(self._node, end, response, answer)
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer, as :meth:`fields`."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer as :meth:`fields` does."""
         whole = type_.replace("/", "/action/")
         self._service_end(Kind.CLIENT, "", f"{whole}_SendGoal")
         self._service_end(Kind.CLIENT, "", f"{whole}_GetResult")
@@ -133,7 +133,7 @@ class ZenohSide:
         return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the parameters of ROS 1 as those of this node."""
+        """Offer the ROS 1 parameters as this node's parameters."""
         return ZenohParameterServer(self, self._name, self._definitions.fields, store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
@@ -141,7 +141,7 @@ class ZenohSide:
         return ZenohNodeParameters(self, self._definitions.fields)
 
     def close(self) -> None:
-        """End the session, and all that it has declared. Idempotent."""
+        """Close the session with all its declarations. Idempotent."""
         self._node.close()
 
     def _topic_end(self, kind: Kind, topic: str, type_: str, qos: Qos) -> Entity:
@@ -149,7 +149,7 @@ class ZenohSide:
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
-        """Return an end of a service; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
+        """Return an endpoint of a service; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _SERVICE, name)
         return self._node.entity(kind, name, type_, hash_, Qos())
 
@@ -168,7 +168,7 @@ class ZenohSide:
         return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
-        """Return the hash that keys have for a type: one's own where the other side has it too. Raise TypesDiffer."""
+        """Return the hash of a type for keys: the local one if an endpoint of the other side has it too. Raise TypesDiffer."""
         ends = self._graph.of_name(name, *kinds) if name else self._graph.ends(*kinds)
         hashes = {end.hash for end in ends if end.type == type_ and not is_bridge(end.node)}
         if own in hashes:
@@ -179,7 +179,7 @@ class ZenohSide:
             raise TypesDiffer(
                 f"[{type_}] has another definition in ROS 2: its hash there is {min(hashes)}, here {own}"
             )
-        # No end has it: as most do.
+        # No endpoint has this type: use the form that most endpoints use.
         are_humble = [end.hash == NO_HASH for end in self._graph.ends(*_TOPIC, *_SERVICE)]
         return NO_HASH if are_humble and all(are_humble) else own
 

@@ -1,4 +1,4 @@
-"""Publishers and subscriptions of ROS 2 by Zenoh, also those of actions. Zenoh calls back in its own threads."""
+"""Publishers and subscriptions of ROS 2 over Zenoh, also for actions. Zenoh calls back in its own threads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohPublisher(Handle):
-    """A publisher; what it is like is the quality of service of its end."""
+    """A publisher with its endpoint's quality of service."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         outlet = _outlet(node, end)
@@ -32,23 +32,23 @@ class ZenohPublisher(Handle):
 
     @property
     def subscribers(self) -> int:
-        """Return the number of subscribers; 0 while those of other sessions are not reached yet."""
+        """Return the number of subscribers; 0 until those of other sessions are connected."""
         found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
         count = len([each for each in found if each.key == self._end.key])
-        # One that keeps its messages loses none.
+        # A transient local publisher keeps its messages, so none is lost.
         is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
         return count if is_ready else 0
 
     def publish(self, data: bytes) -> None:
-        """Send a message; a network that is too slow drops it."""
-        # A session that is closed.
+        """Send a message; it is dropped if the network is too slow."""
+        # The session may be closed.
         with contextlib.suppress(self._fault):
             self._outlet.put(data, attachment=self.attachment())
 
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # The bridge's own subscription to the topic, which takes nothing of this session, does not count as a match.
+    # The bridge's own subscription to the topic ignores this session, so it must not count as a match.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
@@ -66,7 +66,7 @@ def _outlet(node: ZenohNode, end: Entity) -> Outlet:
 
 
 def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) -> Handle:
-    """Call ``deliver`` with each serialized message, in a thread of Zenoh's, until the handle is closed."""
+    """Call ``deliver`` for each serialized message, in a thread of Zenoh's, until the handle is closed."""
 
     def arrived(sample: Sample) -> None:
         if sample.kind != node.zenoh.SampleKind.PUT:
@@ -77,7 +77,7 @@ def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) ->
             _log.exception("a message of ROS 2 could not be passed on")
 
     handler = node.handler(arrived)
-    # What this bridge sends does not come back.
+    # Do not receive the bridge's own messages.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         declared = node.session.declare_subscriber(end.key, handler, allowed_origin=remote)

@@ -1,1 +1,1 @@
-"""The shells that move bytes: one asyncio loop a process, sockets, XML-RPC, nodes, the master."""
+"""The I/O layer: one asyncio loop per process, sockets, XML-RPC, nodes, the master."""

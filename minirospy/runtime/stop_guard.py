@@ -1,6 +1,6 @@
-"""A thread that stops what is driven when its commands stop: no event loop, and nothing that holds one up, delays it.
+"""A thread that stops actuators when their commands stop arriving; nothing that blocks the event loop delays it.
 
-A call that keeps Python's global interpreter lock (GIL) delays the thread, too: the servers limit what one call works on.
+A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit the input of one call.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""Stops what is driven; called in the guard's thread. It looks itself whether a command has come meanwhile."""
+"""Stops an actuator; called in the guard's thread. It checks itself whether a command has arrived meanwhile."""
 
 
 class StopGuard:
-    """Calls each function whose deadline passes. Its thread runs while there are deadlines; all methods are for any thread."""
+    """Calls each function when its deadline passes. Its thread runs while there are deadlines; all methods are thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock`` returns seconds."""
+        """Take ``clock``, which returns seconds."""
         self._clock = clock
         self._changed = threading.Condition()
         self._deadlines: dict[Stop, float] = {}
@@ -33,7 +33,10 @@ class StopGuard:
         # The deadline until which the thread waits.
 
     def arm(self, stop: Stop, deadline: float) -> None:
-        """Have ``stop`` called at a time of the clock, in place of its deadline before. Raise BridgeError without a thread."""
+        """Call ``stop`` at ``deadline``, a time of the clock, which replaces its previous deadline.
+
+        Raise BridgeError without a thread.
+        """
         with self._changed:
             self._deadlines[stop] = deadline
             if self._thread is None:
@@ -50,7 +53,7 @@ class StopGuard:
                 self._changed.notify()
 
     def disarm(self, stop: Stop) -> None:
-        """Have ``stop`` called no more. Idempotent."""
+        """Remove the deadline of ``stop``. Idempotent."""
         with self._changed:
             self._deadlines.pop(stop, None)
 
@@ -63,7 +66,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until deadlines have passed, and return what stops; empty once there are no deadlines."""
+        """Wait until deadlines have passed, and return their functions; [] once there are no deadlines."""
         with self._changed:
             while self._deadlines:
                 now = self._clock()

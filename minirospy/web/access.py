@@ -1,6 +1,6 @@
-"""Who may connect, and to what: Host, Origin and token of a request; names of topics, services and parameters.
+"""Access control: checks a request's Host, Origin and token, and filters names of topics, services and parameters.
 
-Pure. On loopback everybody of this machine may connect, but no page of a foreign site: a browser names the page in
+Pure. On loopback every user of this machine may connect, but no page of a foreign site: a browser sends the page's site in
 ``Origin``, and in ``Host`` the name that it looked up (DNS rebinding). Beyond loopback a token is required.
 Source: RFC 6455, section 10.2 (Origin).
 """
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 TOKEN_PROTOCOL = "minirospy.token."
-"""A sub-protocol of this beginning carries a token: a page can set no header of a WebSocket."""
+"""Prefix of a sub-protocol that carries a token, because a page cannot set headers of a WebSocket."""
 
 DESKTOP_ORIGINS = ("file://", "lichtblick://*", "foxglove://*", "app://*", "vscode-webview://*")
 APP_ORIGINS = (
@@ -40,7 +40,7 @@ APP_ORIGINS = (
     "https://studio.foxglove.dev",
     "https://lichtblick-suite.github.io",
 )
-"""The pages of the front ends; a browser sends no other page's name for them."""
+"""The front ends' pages; a browser sends these origins for no other pages."""
 
 _LOCAL_NAMES = ("localhost",)
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
@@ -52,18 +52,18 @@ class Grant(Enum):
     READ = "read-only"
     WRITE = "read-write"
     OWN = "read-write, with the token"
-    """It may also start programs and open files of the user who runs the server: it was given that user's token."""
+    """The client may also start programs and open files as the server's user, because it has that user's token."""
 
 
 class Refusal(NamedTuple):
-    """Why a request is refused: the HTTP status, and one line for a person."""
+    """The reason why a request is refused: the HTTP status, and one line for the user."""
 
     status: int
     text: str
 
 
 class Credentials(NamedTuple):
-    """A request's statements about its sender: the headers Host, Origin, Authorization, the offered sub-protocols, the path."""
+    """What a request states about its sender: the headers Host, Origin and Authorization, offered sub-protocols, and path."""
 
     host: str
     origin: str | None
@@ -73,7 +73,7 @@ class Credentials(NamedTuple):
 
     @property
     def token(self) -> str:
-        """The token of the header, the sub-protocol or the query, "" without one."""
+        """Return the token from the header, a sub-protocol or the query, "" if there is none."""
         scheme, _, rest = self.authorization.partition(" ")
         if scheme.lower() == "bearer":
             return rest.strip()
@@ -88,9 +88,10 @@ class Credentials(NamedTuple):
 class Access:
     """The rules of one listener.
 
-    ``hosts``: names by which this machine may be called besides addresses and localhost. ``origins``: patterns of pages
-    that may connect besides those of this machine and of the front ends. Tokens: "" where there is none;
-    ``requires_token`` for a listener beyond loopback; ``default_is_read``: who needs no token may only look.
+    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns of pages that may connect in
+    addition to those of this machine and of the front ends. Tokens: "" for none. ``requires_token``: for a listener
+    beyond loopback.
+    ``default_is_read``: clients that need no token have read-only access.
     """
 
     hosts: tuple[str, ...] = ()
@@ -108,12 +109,12 @@ class Access:
             raise BridgeError("a listener beyond loopback needs a token")
 
     def check(self, request: Credentials) -> Grant | Refusal:
-        """Return the rights of a request's sender, or why it is refused."""
+        """Return the rights of a request's sender, or the reason why it is refused."""
         if refusal := self.check_host(request.host):
             return refusal
         grant = self._grant_of(request.token)
         if grant:
-            # A page that knows the token was given it: it needs no other right.
+            # A page with the token was given it by the user: do not check its origin.
             return grant
 
         if request.token and (self.read_token or self.write_token):
@@ -128,7 +129,7 @@ class Access:
         return Grant.READ if self.default_is_read else Grant.WRITE
 
     def check_host(self, host: str) -> Refusal | None:
-        """Return why a request that names this host is refused, None if it is not."""
+        """Return the refusal of a request with this Host header, None if it is allowed."""
         if self._knows_host(host):
             return None
         return Refusal(
@@ -139,7 +140,7 @@ class Access:
 
     def _grant_of(self, token: str) -> Grant | None:
         given = token.encode()
-        # Both are compared, so that the time of the answer says nothing.
+        # Compare with both tokens, so that the response time reveals nothing.
         is_write = bool(self.write_token) and hmac.compare_digest(given, self.write_token.encode())
         is_read = bool(self.read_token) and hmac.compare_digest(given, self.read_token.encode())
         return Grant.OWN if is_write else Grant.READ if is_read else None
@@ -156,7 +157,7 @@ class Access:
 
     def _knows_origin(self, origin: str | None, host: str) -> bool:
         if origin is None:
-            return True  # not a browser
+            return True  # not from a browser
         lowered = origin.lower()
         parts = urlsplit(lowered)
         if parts.scheme in ("http", "https") and (
@@ -173,12 +174,12 @@ def new_token() -> str:
 
 
 def is_token(value: object) -> bool:
-    """Return whether a value can be a token: an empty or short one, or one that is no string, is none."""
+    """Return whether a value is a valid token: a string of the right length and characters."""
     return isinstance(value, str) and bool(_TOKEN.fullmatch(value))
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine's loopback address, or its name."""
+    """Return whether a host is a loopback address, or localhost."""
     if host in _LOCAL_NAMES or host.endswith(".localhost"):
         return True
     try:
@@ -188,12 +189,12 @@ def is_loopback(host: str) -> bool:
 
 
 def without_token(target: str) -> str:
-    """Return a request's path for logs: without its query, where a token may be."""
+    """Return a request's path for logs, without its query, which may contain a token."""
     return unquote(urlsplit(target).path)[:200]
 
 
 def header_items(headers: Mapping[str, str], name: str) -> list[str]:
-    """Return the items of a header that is a list."""
+    """Return the items of a header whose value is a list."""
     return [item.strip() for item in headers.get(name, "").split(",") if item.strip()]
 
 

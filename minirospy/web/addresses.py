@@ -1,4 +1,4 @@
-"""Where people find the bridge: addresses of this machine, links of front ends, a QR code for the terminal."""
+"""Addresses of the bridge for users: this machine's addresses, links of front ends, a QR code for the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LICHTBLICK_APP = "https://lichtblick-suite.github.io/lichtblick/"
 
 
 class Links(NamedTuple):
-    """The addresses of one listener. The front ends' links are for a browser on this machine: they carry no token."""
+    """The URLs of one listener. The front ends' links are for a browser on this machine: they contain no token."""
 
     websocket: list[str]
     foxglove: str
@@ -23,7 +23,7 @@ class Links(NamedTuple):
 
 
 def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
-    """Return the links of a listener that is reached by these addresses; the first is that of the front ends' links."""
+    """Return the links of a listener at these addresses; the front ends' links use the first."""
     scheme = "wss" if encrypted else "ws"
     websocket = [f"{scheme}://{_in_uri(address)}:{port}" for address in addresses]
     query = f"ds=foxglove-websocket&ds.url={quote(websocket[0], safe='')}"
@@ -31,12 +31,12 @@ def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
 
 
 def own_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses that other machines may reach, the one of the default route first."""
+    """Return this machine's IPv4 addresses that other machines may reach, that of the default route first."""
     import psutil
 
     found: dict[str, None] = {}
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        # Nothing is sent: the system names the address that it would send from.
+        # connect() of a UDP socket sends nothing: it selects the address to send from.
         probe.connect(("192.0.2.1", 9))
         found[str(probe.getsockname()[0])] = None
     for addresses in psutil.net_if_addrs().values():
@@ -48,13 +48,13 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names by which other machines may reach this one: its own, and that of multicast DNS."""
+    """Return the names by which other machines may reach this one: its host name, and its multicast DNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 
 
 def qr_code(text: str) -> str:
-    """Return a QR code for a terminal; "" where the library segno is missing."""
+    """Return a QR code for a terminal; "" if the library segno is missing."""
     try:
         import segno
     except ImportError:

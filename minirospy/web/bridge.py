@@ -1,4 +1,4 @@
-"""The bridge as a whole: the shared graph, its endpoints and their listeners, their state and their diagnostics."""
+"""The whole bridge: the shared graph, the protocols' endpoints and listeners, their status and diagnostics."""
 
 from __future__ import annotations
 
@@ -49,10 +49,11 @@ _DIAGNOSTICS_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class BridgeOptions:
-    """``address`` is where the listeners are, at a port for each protocol, None: not served.
+    """``address`` is the address of all listeners; each protocol has a port, None if it is not served.
 
-    ``certificate`` and ``key`` are PEM files. Both times are in seconds: ``max_refresh_interval`` between two
-    queries of an unchanged graph, ``retry_delay`` before a port in use is tried again (None: never).
+    ``certificate`` and ``key`` are PEM files. Times are in seconds: ``max_refresh_interval`` between queries of an
+    unchanged graph,
+    ``retry_delay`` before a port in use is tried again (None: never).
     """
 
     address: str = "127.0.0.1"
@@ -72,9 +73,8 @@ class BridgeOptions:
     retry_delay: float | None = None
     rosapi: bool = False
     transforms: bool = False
-    """What clients of rosbridge want beside it: the services of rosapi, tf2_web_republisher."""
-    name: str = "minirospy bridge"
-    """The name of the Foxglove server."""
+    """``rosapi`` and ``transforms``: also run the services of rosapi, and tf2_web_republisher, for clients of rosbridge."""
+    name: str = "minirospy bridge"  # of the Foxglove server
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Extras:
 
 
 class Bridge:
-    """Opens the graph of a node to browsers. On the node's loop."""
+    """Opens the graph of a node to browsers. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -127,7 +127,7 @@ class Bridge:
         self._reporting: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen. Raise BridgeError."""
+        """Open the listeners. Raise BridgeError."""
         tls = self._tls()
         served: list[tuple[str, list[Endpoint], int | None]] = [
             ("foxglove", [self.foxglove, *self._extras.endpoints], self.options.foxglove_port),
@@ -149,7 +149,7 @@ class Bridge:
         tls: ssl.SSLContext | None,
         public: Mapping[str, HttpHandler],
     ) -> Listener:
-        """Return a listener of a protocol. Raise BridgeError if the port is in use, unless it is to be tried again."""
+        """Return a protocol's listener. Raise BridgeError if the port is in use, unless ``retry_delay`` is set."""
         listener = Listener(
             endpoints,
             self.options.access,
@@ -172,7 +172,7 @@ class Bridge:
                 return listener
 
     async def _start_beside(self) -> None:
-        """Offer what clients of rosbridge want beside it, unless another node does."""
+        """Start rosapi and tf2_web_republisher for clients of rosbridge, unless another node provides them."""
         graph = await fetch(self.node._node.master)
         if self.options.rosapi and "/rosapi/topics" not in graph.services:
             from minirospy.web.rosapi.services import Rosapi
@@ -194,7 +194,7 @@ class Bridge:
         await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
-        """Return what the bridge serves and to whom, as JSON has it."""
+        """Return the bridge's listeners and clients, for JSON."""
         clients = []
         for endpoint, listener in self.listeners.items():
             for connection in listener.connections:
@@ -245,7 +245,7 @@ class Bridge:
             return None
         try:
             return tls_context(self.options.certificate, self.options.key)
-        except OSError as error:  # ssl.SSLError is one
+        except OSError as error:  # ssl.SSLError is a subclass
             name = error.filename or f"{self.options.certificate} {self.options.key}".strip()
             raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
 
@@ -253,7 +253,7 @@ class Bridge:
         exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
 
     async def _report(self) -> None:
-        """Publish the state of the clients as diagnostics, every second while there are any."""
+        """Publish the status of the clients as diagnostics, every second while there are clients."""
         from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)

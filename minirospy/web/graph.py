@@ -1,6 +1,6 @@
-"""The ROS side that all clients share: one subscription a topic, one publication a topic, one look at the graph.
+"""The ROS half that all clients share: one subscription per topic, one publication per topic, one view of the graph.
 
-Messages stay bytes. What the graph is, is known to ``introspect/``; nodes, topics and services are those of ``aio/``.
+Messages stay bytes. Queries of the graph are in ``introspect/``; nodes, topics and services are those of ``aio/``.
 """
 
 from __future__ import annotations
@@ -30,20 +30,19 @@ __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", 
 
 _log = logging.getLogger(__name__)
 
-MIN_REFRESH_INTERVAL = 0.25
-"""Seconds from one look at the graph to the next while it changes."""
+MIN_REFRESH_INTERVAL = 0.25  # between refreshes while the graph changes
 
 _QUEUE = 100
 _MAX_WAITING = 32_000_000
-"""Bytes of clients' messages that wait for the subscribers of new topics; beyond, each topic's newest alone."""
+"""Bytes of clients' messages that are queued for the subscribers of new topics; above this, only the newest per topic."""
 
 _QUERY_SECONDS = 2.0
-"""After this the graph is reported without the types of services that are still looked up."""
+"""Timeout, after which the graph is reported without the service types that are still unknown."""
 
 
 @dataclass(frozen=True)
 class Filters:
-    """Names that clients may use."""
+    """The names that clients may use."""
 
     topics: NameFilter = field(default_factory=NameFilter)
     publishable: NameFilter = field(default_factory=NameFilter)
@@ -53,7 +52,7 @@ class Filters:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A message: its bytes, its publisher's connection header, when it came (nanoseconds of the node's time)."""
+    """A message: its bytes, its publisher's connection header, and its receive time (nanoseconds of the node's time)."""
 
     body: bytes | memoryview
     header: Header
@@ -65,7 +64,7 @@ GraphListener = Callable[[Changes], object]
 
 
 class SharedTopic:
-    """A topic that at least one client listens to."""
+    """A topic with at least one client as a listener."""
 
     def __init__(self, graph: SharedGraph, topic: str) -> None:
         self.topic = topic
@@ -73,32 +72,32 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # By the identity of the header, which belongs to one connection.
+        # The key is the id of the header, which is one object per connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
 
     @property
     def headers(self) -> list[Header]:
-        """The connection headers of the publishers that are connected."""
+        """Return the connection headers of the connected publishers."""
         return self._subscription.headers if self._subscription else []
 
     @property
     def is_wanted(self) -> bool:
-        """Return whether anybody listens."""
+        """Return whether the topic has listeners."""
         return bool(self._listeners)
 
     def add(self, listener: TopicListener) -> None:
-        """Call ``listener`` with the last message of each latched publisher, then with each that comes."""
+        """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # While it is being unsubscribed its connections are still there, and bring no latched message again.
+        # If the topic was just being unsubscribed, existing connections do not deliver latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
         self._listeners.append(listener)
 
     def remove(self, listener: TopicListener) -> None:
-        """Call it no more."""
+        """Stop calling ``listener``."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
 
@@ -126,33 +125,33 @@ class SharedTopic:
 
 
 class Publication:
-    """A client's share of a topic that this node publishes. ``publish(bytes)``."""
+    """One client's handle of a topic that this node publishes; its method is ``publish(bytes)``."""
 
     def __init__(self, graph: SharedGraph, topic: str, shared: _SharedPublisher) -> None:
         self.topic = topic
         self._graph = graph
         self._shared: _SharedPublisher | None = shared
         self._waiting: deque[bytes] | None = None
-        """Messages that wait for the subscribers."""
+        """Messages queued until the subscribers are connected."""
 
     @property
     def has_joined(self) -> bool:
-        """Return whether the subscribers that the master knew when the topic was advertised are connected."""
+        """Return whether all subscribers that the master knew when the topic was advertised are connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait for those subscribers, for a second at most: a message that is published before does not reach them."""
+        """Wait for those subscribers, for a second at most: they do not receive messages published before that."""
         if self._shared and self._shared.joining:
             await asyncio.wait([self._shared.joining])
 
     def publish(self, body: bytes) -> None:
-        """Publish a serialized message. Does not wait. For any thread."""
+        """Publish a serialized message without waiting. May be called from any thread."""
         shared = self._shared
         if shared:
             shared.publisher.publish_raw(body)
 
     def publish_when_joined(self, body: bytes) -> None:
-        """Publish once the subscribers of that moment are connected, in order. Does not wait; the newest messages are kept."""
+        """Publish once the current subscribers are connected, in order. Does not block; a full queue drops its oldest."""
         if self._waiting is None:
             if self.has_joined or not (self._shared and self._shared.joining):
                 self.publish(body)
@@ -174,7 +173,7 @@ class Publication:
             self.publish(body)
 
     def close(self) -> None:
-        """End it; the topic is advertised until its last client has left. Idempotent."""
+        """Release one handle. Unadvertise the topic when the last handle is released. Idempotent."""
         self._publish_waiting()
         shared, self._shared = self._shared, None
         if shared:
@@ -191,7 +190,7 @@ class _SharedPublisher:
 
 
 class SharedGraph:
-    """The graph for all clients of the bridge; on the node's loop."""
+    """The graph for all clients of the bridge. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -201,11 +200,11 @@ class SharedGraph:
         max_refresh_interval: float = 1.0,
         clock: Callable[[], int] | None = None,
     ) -> None:
-        """``max_refresh_interval``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
+        """``max_refresh_interval``: seconds between refreshes of an unchanged graph. ``clock``: see :meth:`now`."""
         self.node = node
         self._clock = clock
         self.waiting_bytes = 0
-        """Bytes of the clients' messages that wait for subscribers of new topics."""
+        """Bytes of the clients' messages that are queued for subscribers of new topics."""
         self.filters = filters or Filters()
         self.snapshot = Snapshot()
         self.topics: dict[str, SharedTopic] = {}
@@ -227,14 +226,14 @@ class SharedGraph:
         )
 
     def now(self) -> int:
-        """Return the time of messages in nanoseconds: the node's, unless ``clock`` gives another."""
+        """Return the time for messages in nanoseconds: the node's, or that of ``clock`` if it is set."""
         if self._clock:
             return self._clock()
         now = self.node.now()
         return now.secs * 1_000_000_000 + now.nsecs
 
     async def close(self) -> None:
-        """End everything. Idempotent."""
+        """Close all subscriptions, publications and tasks. Idempotent."""
         tasks = [*self._tasks, *([self._watching] if self._watching else [])]
         self._watching = None
         for task in tasks:
@@ -246,7 +245,7 @@ class SharedGraph:
     # --- the graph
 
     def watch(self, listener: GraphListener) -> None:
-        """Call ``listener`` with each change of the graph, the first of which is the whole graph where nobody watched."""
+        """Call ``listener`` with each change of the graph; for the first listener, the first change is the whole graph."""
         self._listeners.append(listener)
         if self._watching is None:
             self.snapshot = Snapshot()
@@ -255,7 +254,7 @@ class SharedGraph:
         self._refresh_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
-        """Call it no more; nobody looks at the graph while nobody watches."""
+        """Stop calling ``listener``; without listeners, the graph is not polled."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
         if not self._listeners and self._watching:
@@ -263,12 +262,12 @@ class SharedGraph:
             self._watching = None
 
     def refresh_soon(self) -> None:
-        """Look at the graph now: it has changed."""
+        """Refresh the graph now, because it has changed."""
         self._refresh_soon.set()
 
     async def look(self) -> None:
-        """Look at the graph, and report what has changed. Raise MasterUnreachableError, RpcError."""
-        # One at a time: a look that started earlier must not replace the snapshot of a later one.
+        """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError."""
+        # One refresh at a time, so that an earlier one does not replace the snapshot of a later one.
         async with self._looking:
             found = await fetch(self.node._node.master)
             await self._look_up_services(found)
@@ -288,7 +287,8 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the event.
+        # Check the task, because asyncio.wait_for before Python 3.12 may lose a cancellation that coincides with the
+        # event.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()
@@ -309,11 +309,11 @@ class SharedGraph:
                 await asyncio.wait_for(self._refresh_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
-        """Return a service's type; None if it is not known, or not installed here."""
+        """Return a service's type; None if it is unknown or not installed."""
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
-        """Find the types of new services, which the master does not know: their nodes do."""
+        """Query the nodes of new services for their types, which the master does not know."""
         wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
         await self._service_types.look(wanted, _QUERY_SECONDS)
 
@@ -325,14 +325,14 @@ class SharedGraph:
     # --- topics
 
     def subscribe(self, topic: str, listener: TopicListener) -> None:
-        """Call ``listener`` with each message of a topic, and now with what its latched publishers sent last."""
+        """Call ``listener`` with each message of a topic, and immediately with the last messages of latched publishers."""
         shared = self.topics.get(topic)
         if shared is None:
             shared = self.topics[topic] = SharedTopic(self, topic)
         shared.add(listener)
 
     def unsubscribe(self, topic: str, listener: TopicListener) -> None:
-        """End it; the topic is unsubscribed with its last listener."""
+        """Stop calling ``listener``; unsubscribe from the topic with its last listener."""
         shared = self.topics.get(topic)
         if shared:
             shared.remove(listener)
@@ -341,13 +341,13 @@ class SharedGraph:
 
     async def _end_topic(self, shared: SharedTopic) -> None:
         if shared.is_wanted:
-            return  # again
+            return  # a new listener has been added meanwhile
         await shared.close()
         if not shared.is_wanted and self.topics.get(shared.topic) is shared:
             del self.topics[shared.topic]
 
     def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
-        """Publish a topic. Raise BridgeError if it may not be, or is published with another type."""
+        """Advertise a topic. Raise BridgeError if clients may not publish it, or it is published with another type."""
         if not self.filters.publishable(topic):
             raise BridgeError(f"topic [{topic}] may not be published by clients")
         shared = self._publishers.get(topic)
@@ -365,7 +365,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic with its last client."""
+        """Unadvertise a topic when its last client has left."""
         shared.clients -= 1
         if not shared.clients and self._publishers.get(topic) is shared:
             del self._publishers[topic]
@@ -375,13 +375,13 @@ class SharedGraph:
     # --- services
 
     async def call(self, service: str, md5sum: str, request: bytes) -> bytes:
-        """Return the bytes of a service's response. Raise ServiceException; BridgeError where it may not be called."""
+        """Call a service; return the response's bytes. Raise ServiceException, or BridgeError if clients may not call it."""
         if not self.filters.services(service):
             raise BridgeError(f"service [{service}] may not be called by clients")
         return await call_raw(self.node, service, md5sum, request)
 
     def spawn(self, work: Coroutine[object, object, object]) -> asyncio.Task[None]:
-        """Run a coroutine until :meth:`close`; what it raises is logged."""
+        """Run a coroutine as a task until :meth:`close`; log its exception."""
 
         async def guarded() -> None:
             try:
@@ -394,6 +394,6 @@ class SharedGraph:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # A task that is cancelled before its first step has not started the work.
+        # A task that is cancelled before its first step has not started the coroutine: close it.
         task.add_done_callback(lambda _: work.close())
         return task

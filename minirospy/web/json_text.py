@@ -1,7 +1,8 @@
-"""Texts of clients, and their JSON, with limits: `[]` fifty million times would take gigabytes, and hold up all clients. Pure.
+"""Parse clients' JSON within limits: `[]` fifty million times would use gigabytes, and block all clients. Pure.
 
-The library's parser keeps Python's global interpreter lock (GIL) until it has parsed the whole text, and so stops all threads of
-the process. A large text is parsed in pieces instead, by :func:`load_json_in_pieces` in a thread of its own.
+The standard library's parser holds Python's global interpreter lock (GIL) until it has parsed the whole string, and so
+blocks all threads of the process. Large strings are parsed in pieces instead, by :func:`load_json_in_pieces` in a separate
+thread.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 5_000_000  # of numbers: objects and text of them are some 300 MB
+_MAX_VALUES = 5_000_000  # for numbers: objects and strings of this number take some 300 MB
 _MAX_COLLECTIONS = 1_000_000
-MAX_QUICK_CHARACTERS = 64 * 1024  # of any text that is parsed immediately: 2 ms at most
-MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters of a text that has few values, such as an image in base64
+MAX_QUICK_CHARACTERS = 64 * 1024  # in any string that is parsed immediately: 2 ms at most
+MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters in a string with few values, such as an image in base64
 MAX_QUICK_VALUES = 20_000
 _PIECE = 32 * 1024  # characters of numbers that are parsed in one call
 
@@ -33,7 +34,7 @@ _MARKS = re.compile(r'[\[\]{}"]')
 
 
 _HEAD_SIZE = sys.getsizeof("\u0100") - 2 * 2
-"""Bytes of a str that is not ASCII, without its characters and the one behind them."""
+"""Bytes of a non-ASCII str without its characters and the terminating one."""
 
 _BEYOND_LATIN = re.compile(rb"[\xc4-\xff]")
 _BEYOND_BMP = re.compile(rb"[\xf0-\xff]")
@@ -41,7 +42,7 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 
 
 def size_in_memory(data: bytes | bytearray) -> int:
-    """Return the bytes that a text in UTF-8 takes as a str: one wide character makes each take two or four."""
+    """Return the bytes that a UTF-8 string takes as a str: one wide character makes every character take two or four."""
     if data.isascii():
         return len(data)
     characters = len(data.translate(None, _CONTINUATIONS))
@@ -51,29 +52,29 @@ def size_in_memory(data: bytes | bytearray) -> int:
 
 
 def width_of(text: str) -> int:
-    """Return the bytes that each character of a text takes in memory: 1, 2 or 4."""
+    """Return the bytes per character of a str in memory: 1, 2 or 4."""
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Python 3.12 and later keep a copy in UTF-8 with these.
+        # Python 3.12 and later also store a UTF-8 copy in single-character strings.
         return 1 if text <= "\xff" else 2 if text <= "\uffff" else 4
-    # Such a copy of another text makes this too large at most.
+    # In other strings such a copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
 
 def is_quick_text(text: str) -> bool:
-    """Return whether a text is parsed in a few milliseconds."""
+    """Return whether a string can be parsed in a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Also the marks within strings are counted: what is large is one string of base64, which has none.
+    # Brackets and commas in strings are counted as well: a large base64 string has none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
 def load_json(
     text: str | bytes, *, max_values: int = _MAX_VALUES, max_collections: int = _MAX_COLLECTIONS
 ) -> object:
-    """Return the value of a text. Raise ValueError, also if it has too many values, and RecursionError."""
+    """Parse JSON. Raise ValueError, also if it has too many values, or RecursionError."""
     if isinstance(text, str):
         _check_counts(text, max_values, max_collections)
     found: object = json.loads(text)
@@ -81,21 +82,21 @@ def load_json(
 
 
 def load_json_in_pieces(text: str) -> object:
-    """Do the same without keeping the GIL for long: for a thread beside the event loop."""
+    """Parse JSON as :func:`load_json` does without holding the GIL for long, for a thread next to the event loop."""
     _check_counts(text, _MAX_VALUES, _MAX_COLLECTIONS)
     found: object = _PiecewiseDecoder().decode(text)
     return found
 
 
 def _check_counts(text: str, max_values: int, max_collections: int) -> None:
-    """Raise ValueError if a text has too many values; the marks within strings are counted, too."""
+    """Raise ValueError if a string has too many values; brackets and commas in strings are counted as well."""
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
-    """The library's decoder in Python, which lets other threads run, with long arrays of numbers by its parser in C."""
+    """The library's pure-Python decoder, which lets other threads run, but with the C parser for long arrays of numbers."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -104,7 +105,7 @@ class _PiecewiseDecoder(json.JSONDecoder):
 
 
 def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object, int]]) -> tuple[object, int]:
-    """Return the array that starts behind its bracket, and the index behind it. Raise JSONDecodeError, StopIteration."""
+    """Parse the array after its opening bracket; return it and the end index. Raise JSONDecodeError or StopIteration."""
     text, at = start
     values: list[object] = []
     at = _skip_space(text, at)
@@ -115,7 +116,7 @@ def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object,
         mark = _MARKS.search(text, at, at + _PIECE)
         if mark and mark[0] == "]":
             return values + _numbers(text, at, mark.start()), mark.end()
-        # Before another value than a number, or where the piece ends.
+        # Parse numbers up to the next value that is not a number, or the end of the piece.
         comma = text.rfind(",", at, mark.start() if mark else at + _PIECE)
         if comma >= 0:
             values += _numbers(text, at, comma)
@@ -143,7 +144,7 @@ def _skip_space(text: str, at: int) -> int:
 
 
 def _numbers(text: str, start: int, end: int) -> list[object]:
-    """Return the values of a part of an array. Raise JSONDecodeError, also if there are none."""
+    """Parse the values in a part of an array. Raise JSONDecodeError, also if there are none."""
     found: list[object] = json.loads(f"[{text[start:end]}]")
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)

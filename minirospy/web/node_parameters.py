@@ -1,4 +1,4 @@
-"""Private parameters of the bridge's nodes, checked; their tokens, which come from the environment."""
+"""Read and check private parameters of the bridge's nodes; their tokens come from the environment."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["access_of", "address_of", "globs", "number", "private_parameters", "
 _T = TypeVar("_T", str, int, bool)
 
 _OFF = (None, False, 0, "", "None")
-"""Values of parameters that switch nothing on."""
+"""Parameter values that mean "off"."""
 
 
 async def private_parameters(
     node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, object]:
-    """Return a node's private parameters and those ``given`` as arguments; warn of each that is set ``without_effect``."""
+    """Return a node's private parameters, including ``given`` arguments; warn of each in ``without_effect`` that is set."""
     found = await node.get_param("~", {})
     private = {**(found if isinstance(found, dict) else {}), **given}
     for name in without_effect:
@@ -34,7 +34,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter. Raise BridgeError if it is of another type."""
+    """Return a parameter. Raise BridgeError if it has another type."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")
@@ -42,7 +42,7 @@ def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T)
 
 
 def number(private: Mapping[str, object], name: str, default: float) -> float:
-    """Return a parameter that is a number. Raise BridgeError."""
+    """Return a numeric parameter. Raise BridgeError."""
     found = private.get(name, default)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a number")
@@ -58,7 +58,7 @@ def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> l
 
 
 def globs(private: Mapping[str, object], name: str) -> list[str]:
-    """Return the globs of a parameter as rosbridge has them: a list, or a text such as "['/tf', '/odom*']"; none: all."""
+    """Return globs in one of rosbridge's forms: a list, or a string such as "['/tf', '/odom*']"; [] allows all."""
     found = private.get(name, "")
     if isinstance(found, str):
         found = [each.strip().strip("'\"") for each in found.strip().strip("[]").split(",")]
@@ -66,16 +66,16 @@ def globs(private: Mapping[str, object], name: str) -> list[str]:
 
 
 def address_of(private: Mapping[str, object]) -> str:
-    """Return the address to listen at. Raise BridgeError."""
+    """Return the address to listen on. Raise BridgeError."""
     return value(private, "address", str, "") or "127.0.0.1"
 
 
 def access_of(
     private: Mapping[str, object], environ: Mapping[str, str], origins: Iterable[str] = ()
 ) -> Access:
-    """Return the rules for clients, with the tokens of the environment.
+    """Return the access rules, with the tokens from the environment.
 
-    Where other machines may connect and there are none, the tokens are those that are kept for this user. Raise BridgeError.
+    If other machines may connect and the environment has none, use this user's stored tokens. Raise BridgeError.
     """
     beyond = not is_loopback(address_of(private))
     tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))

@@ -23,7 +23,7 @@ _MAX_RATE = 100.0
 
 
 class PlayerPlayback:
-    """A player as the clients of the Foxglove protocol control it."""
+    """A player with the interface for clients of the Foxglove protocol."""
 
     def __init__(self, player: Player, span: tuple[int, int]) -> None:
         self.range = span
@@ -36,7 +36,7 @@ class PlayerPlayback:
         return self._player.state().time
 
     def state(self) -> PlaybackState:
-        """Return the player's state, and the request that it answers; that is answered once."""
+        """Return the player's state, with the id of the request that it answers, each id once."""
         state = self._player.state()
         status = (
             PlaybackStatus.ENDED
@@ -50,7 +50,7 @@ class PlayerPlayback:
         return answer
 
     def control(self, control: PlaybackControl) -> None:
-        """Do what a client requests."""
+        """Execute a client's request."""
         self._request_id, self._did_seek = control.request_id, control.seek is not None
         self._player.control(
             is_paused=control.command is PlaybackCommand.PAUSE,
@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge next to a player, on a separate loop; a context manager. Raise BridgeError."""
+    """A bridge for a player, on a separate loop; a context manager. Raise BridgeError."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)
@@ -70,7 +70,7 @@ class PlayerBridge:
         self._node = Node("play_bridge", anonymous=True, rosout=False)
         self._bridge: Bridge | None = None
         self.lines: list[str] = []
-        """What to print: where front ends find it."""
+        """The lines to print, with the URLs for front ends."""
 
     def __enter__(self) -> PlayerBridge:
         try:
@@ -101,7 +101,7 @@ class PlayerBridge:
         self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
-        """Send the bag's time, and the player's state when that changes, whether by a client or by a key."""
+        """Send the bag's time, and the player's state after each change by a client or a key."""
         shown: tuple[object, ...] = ()
         time = -1
         while True:

@@ -1,4 +1,4 @@
-"""Running a bridge as a process: its node, until Ctrl-C, SIGTERM or `rosnode kill`."""
+"""Run a bridge as a process with a node, until Ctrl-C, SIGTERM or `rosnode kill`."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Bytes of a block that goes back to the system when it is freed; a camera's images are smaller, and mapping each costs time."""
+"""Size of blocks that are returned to the system when freed; above that of camera images, because mapping takes time."""
 
 
 class Part(Protocol):
-    """What a node does: a bridge, or services."""
+    """What a node runs: a bridge, or services."""
 
     async def start(self) -> None: ...
 
@@ -46,15 +46,14 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-_SWITCH_SECONDS = (
-    0.0005  # a thread keeps the GIL; with Python's 5 ms the loop waits so long after each of its calls
-)
+_SWITCH_SECONDS = 0.0005  # GIL switch interval; with Python's 5 ms the loop waits that long after each call
 
 
 def prefer_the_loop() -> None:
-    """Let this process's event loop wait less: for threads that work on large messages, and for the garbage collector.
+    """Reduce the event loop's delays by threads that process large messages, and by the garbage collector.
 
-    Called once all is imported: the collector would visit what was, 15 ms each time that a client sends thousands of arrays.
+    Call it after all imports: otherwise the collector visits their objects, for 15 ms each time a client sends thousands
+    of arrays.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
     gc.collect()
@@ -62,7 +61,7 @@ def prefer_the_loop() -> None:
 
 
 def require_libraries() -> None:
-    """Raise BridgeError with what to install where the library of the web servers is missing."""
+    """Raise BridgeError with the install command if the web servers' library is missing."""
     try:
         import websockets.server  # noqa: F401 only whether it is there
     except ImportError as error:
@@ -72,7 +71,7 @@ def require_libraries() -> None:
 
 
 def run_program(name: str, module: str) -> int:
-    """Run a node's program, whose module imports the libraries; return the exit status, 1 where one is missing."""
+    """Run a node's program, whose module imports the libraries; return the exit status, 1 if a library is missing."""
 
     def body() -> int:
         require_libraries()
@@ -82,7 +81,7 @@ def run_program(name: str, module: str) -> int:
 
 
 def exit_status(name: str, body: Callable[[], int]) -> int:
-    """Return the exit status of a program; 1 where ``body`` raises MinirospyError, which is printed in one line."""
+    """Return the exit status of a program; if ``body`` raises MinirospyError, print it in one line and return 1."""
     try:
         return body()
     except MinirospyError as error:
@@ -91,7 +90,7 @@ def exit_status(name: str, body: Callable[[], int]) -> int:
 
 
 def announce(bridge: Bridge, endpoint: str, text: str, scheme: str = "ws") -> None:
-    """Log where an endpoint is, and whether it needs a token."""
+    """Log an endpoint's URL, and whether it requires a token."""
     listener = bridge.listeners[endpoint]
     scheme += "s" if listener.is_encrypted else ""
     bridge.node.log.info("%s %s://%s:%d", text, scheme, listener.host, listener.port)
@@ -112,9 +111,9 @@ def run(
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
-    it would import message classes. ``connect`` opens what may fail before the node takes its name: the master ends a running
+    ``argv``: remappings, as from a launch file; None: those of the process. ``start`` creates the bridge, ``on_started``
+    shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, which need message
+    classes. ``connect`` runs what may fail before the node registers its name, because the master then shuts down a running
     node of that name.
     """
     return_large_blocks(_LARGE_BLOCK)
@@ -141,7 +140,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # Before there is a master, the wait for it ends; later the node shuts down.
+        # If there is no master yet, cancel the wait for it; later, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:
@@ -151,7 +150,7 @@ async def _run(
         number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
         for number in (*interrupt_signals(), signal.SIGTERM)
     }
-    # On Windows a signal is noticed when the loop next wakes up.
+    # On Windows Python handles a signal only when the loop next wakes up.
     ticking = asyncio.ensure_future(_tick())
     bridge: _P | None = None
     try:
@@ -176,7 +175,7 @@ async def _run(
             raise
     finally:
         if bridge is not None:
-            await bridge.close()  # where the node has not been started
+            await bridge.close()  # needed if the node has not been started
         ticking.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -1,4 +1,4 @@
-"""The tokens of this user's bridges, in a file that only the user reads: the same after each start."""
+"""The tokens of this user's bridges, in a file that only the user can read; they stay the same across restarts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAME = "bridge-tokens.json"
 
 
 class Tokens(NamedTuple):
-    """``write`` lets a client publish, call and set; ``read`` only look."""
+    """``write`` lets a client publish, call services and set parameters; ``read`` gives read-only access."""
 
     write: str
     read: str
@@ -40,12 +40,12 @@ def read_tokens(home: Path) -> Tokens | None:
 
 
 def _is_own(found: os.stat_result) -> bool:
-    """Return whether a file is this user's alone: in a folder that others may write to they may have made it."""
+    """Return whether a file belongs to this user and is private: in a shared folder, others may have created it."""
     return found.st_uid == os.geteuid() and not stat.S_IMODE(found.st_mode) & 0o077
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME; new ones where there are none, or with ``renews``. Raise BridgeError."""
+    """Return the tokens in ROS_HOME; create new ones if there are none, or with ``renews``. Raise BridgeError."""
     found = None if renews else read_tokens(home)
     if found:
         return found

@@ -1,1 +1,1 @@
-"""ROS packages on disk: where they are, what they hold."""
+"""ROS packages on disk: their folders and contents."""

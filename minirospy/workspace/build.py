@@ -1,7 +1,7 @@
-"""Building a workspace: packages in ``src`` -> ``devel``, with generated messages and the files to source.
+"""Build a workspace: packages in ``src`` -> ``devel``, with generated messages and the files to source.
 
-Nothing is compiled by a compiler, and nothing is copied: Python stays where it is written, and ``devel`` points to
-it. What did not change is not made again. Source: http://wiki.ros.org/catkin/workspaces.
+No compiler runs, and no files are copied: Python programs stay in the source folders, to which ``devel`` refers. Unchanged
+parts are not generated again. Source: http://wiki.ros.org/catkin/workspaces.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ PROVIDED = frozenset(
     tf_conversions urdf urdfdom xacro xmlrpcpp
     """.split()  # noqa: SIM905
 )
-"""Packages without messages that packages of Python name: minirospy does their part, or a compiler would."""
+"""Packages without messages that Python packages depend on: minirospy provides their functions, or they need a compiler."""
 
 _KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
 _RELAY = """# Made by catkin_make: {name!r} is in {folder!r}; what was generated for it is here.
@@ -67,7 +67,8 @@ with open(__file__, "rb") as _source:
 """
 
 
-# The interpreter that has rospy, unless its path is none that a first line can hold.
+# The interpreter that has rospy, unless its path is too long or contains white space, which a shebang line cannot
+# have.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -97,7 +98,7 @@ class Workspace(NamedTuple):
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: where it was built before, or where the folder src is.
+    """Return the workspace that contains ``start``: the folder that was built before, or that contains src.
 
     Raise BuildError.
     """
@@ -112,10 +113,10 @@ def find_workspace(start: Path) -> Path:
 
 
 def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
-    """Return the plans of all packages below a folder, in the order to build them in.
+    """Return the plans of all packages below a folder, in build order.
 
-    ``variables`` as in read_plan; CATKIN_BLACKLIST_PACKAGES names those that are not read.
-    Raise BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
+    ``variables`` as in read_plan; packages in CATKIN_BLACKLIST_PACKAGES are skipped.
+    Raise BuildError (a duplicate package name, a cycle), ManifestError, or DefinitionError.
     """
     plans: dict[str, Plan] = {}
     left_out = (variables or {}).get("CATKIN_BLACKLIST_PACKAGES", "").split(";")
@@ -135,7 +136,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Return each package after those that it is built from. Raise BuildError on a cycle."""
+    """Return the plans ordered so that each follows its build dependencies. Raise BuildError if there is a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
@@ -149,7 +150,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package. ``made``: the generated parts, as text; empty if nothing had changed."""
+    """The result of building a package. ``made``: the generated parts, as a string; empty if nothing had changed."""
 
     plan: Plan
     made: str
@@ -164,10 +165,10 @@ def build(
     chosen: Collection[str] | None = None,
     report: Callable[[Report], None] = lambda each: None,
 ) -> None:
-    """Build the packages (``chosen`` of them, or all) into the devel folder; ``report`` is called with each.
+    """Build the ``chosen`` packages, or all, into the devel folder; call ``report`` with the result of each.
 
-    ``outside`` is where the packages of other workspaces and of minirospy are found.
-    Raise BuildError, DefinitionError.
+    ``outside``: the packages of other workspaces and of minirospy.
+    Raise BuildError or DefinitionError.
     """
     builder = _Builder(workspace, plans, outside)
     for plan in plans:
@@ -178,7 +179,7 @@ def build(
 
 
 def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
-    """Return what this installation of minirospy puts into setup files."""
+    """Return the data of this minirospy installation for setup files."""
     return SetUp(
         prefix=prefix,
         sources=sources,
@@ -192,11 +193,11 @@ def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...
 def write_set_up(
     prefix: Path, sources: tuple[Path, ...], environment: Mapping[str, str] = os.environ
 ) -> None:
-    """Write what is sourced. The workspaces that are sourced now become those below this one.
+    """Write the setup files. The workspaces that are sourced in the environment become the parents of this one.
 
-    Where none is sourced, those of the last time stay.
+    If none is sourced, keep the parents of the previous build.
     """
-    # A workspace that is built from its own terminal does not extend itself.
+    # A workspace whose own setup file is sourced must not extend itself.
     own = {
         prefix,
         *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
@@ -214,7 +215,7 @@ def write_set_up(
 
 
 class _Builder:
-    """Builds packages of one workspace, one after the other."""
+    """Builds the packages of one workspace one after the other."""
 
     def __init__(self, workspace: Workspace, plans: Sequence[Plan], outside: Packages) -> None:
         self._workspace = workspace
@@ -223,7 +224,7 @@ class _Builder:
         self._stamps = workspace.build / "minirospy"
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
-        # What generated code depends on: definitions, what CMakeLists.txt says of them, and the compiler.
+        # Generated code depends on the definitions, the CMakeLists.txt files, and the message compiler.
         ours = Path(__file__).parents[1]
         compiler = [
             *(ours / "core" / "idl").glob("*.py"),
@@ -271,19 +272,19 @@ class _Builder:
         return Report(plan, _counts(plan, setup), bool(changed), warnings)
 
     def remove_gone(self) -> None:
-        """Remove the outputs of packages that are not in the workspace any more."""
+        """Remove the outputs of packages that are no longer in the workspace."""
         for stamp in self._stamps.glob("*.json"):
             if stamp.stem not in self._plans:
                 self._remove(_read_stamp(stamp).get("outputs", []))
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """Return the generated modules of a package: file -> text. Raise DefinitionError, BuildError."""
+        """Return the generated modules of a package: file -> text. Raise DefinitionError or BuildError."""
         folder = self._modules / plan.name
         try:
             texts = compile_package(self._catalogue, plan.name)
         except DefinitionError as error:
-            # A type that contains itself is named, not its file.
+            # The error for a type that contains itself names the type: replace it by its file.
             files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
             raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
         modules = {folder / name: text for name, text in texts.items()}
@@ -294,7 +295,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages of other workspaces: a workspace that this one extends may be rebuilt."""
+        """Return a fingerprint of the messages of other workspaces: a parent workspace may have been rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -304,7 +305,7 @@ class _Builder:
         )
 
     def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
-        """Record what was made; remove what was made before and is not any more."""
+        """Record the outputs; remove those of the previous build that no longer exist."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
         note = {
@@ -320,7 +321,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # A folder that is empty but for Python's own cache goes too.
+                # Also remove a folder that contains only Python's cache.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):
@@ -332,7 +333,7 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return warnings of the package's name, and of packages that find_package names and that do not exist."""
+        """Return warnings about the package's name, and about packages in find_package() that do not exist."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
@@ -344,7 +345,7 @@ class _Builder:
         return tuple(warnings)
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Check that every type in a package's definitions exists, and that its package is named where catkin wants it."""
+        """Check that every type used in a package's definitions exists, and that catkin's declarations name its package."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -393,7 +394,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages those of ``names`` may use."""
+        """Return the packages whose messages the messages of ``names`` may use."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -414,13 +415,13 @@ class _Builder:
 
 
 def _option_files(plan: Plan) -> set[Path]:
-    """Return the .cfg files of a package, and the modules next to them that they may import."""
+    """Return the .cfg files of a package, and the modules next to them, which they may import."""
     folders = {path.parent for path in plan.options}
     return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
 
 
 def _key(files: Iterable[Path]) -> str:
-    """Return a fingerprint of files: their names, times and sizes."""
+    """Return a fingerprint of files: their names, modification times and sizes."""
     import hashlib
 
     marks = []
@@ -441,7 +442,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
     """Return the programs in devel that run those in source folders: file -> text.
 
-    So a program that setup.py names is found on PATH, and real ROS finds one that is not executable itself.
+    They put programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
     places = {devel / "bin" / path.name: path for path in (setup.scripts if setup else ())}
     for rule in plan.installs:
@@ -489,7 +490,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """Return the first line of a file that contains a word; 1 where none does."""
+    """Return the first line of a file that contains a word; 1 if none does."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

@@ -1,4 +1,4 @@
-"""The order to build packages in, as catkin has it: manifests in, names out.
+"""The build order of packages, as in catkin, from their manifests.
 
 Source: the behaviour of catkin_pkg.topological_order.
 """
@@ -22,11 +22,10 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the names of packages, each after those that it is built from; of those that could be next, the first.
+    """Return the names of packages, each after its build dependencies; of several that could be next, the first by name.
 
-    A package is built from what it needs to build and test, from what those need to run, and from the packages
-    that ``also`` has for its name. Message generators and what they need go before all others.
-    Raise CircularDependencyError.
+    A package's build dependencies are those that it needs to build and test, their run dependencies, and the packages that
+    ``also`` has for its name. Message generators and their dependencies come first. Raise CircularDependencyError.
     """
     routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
     early = _generators(manifests, routes)
@@ -50,7 +49,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """Return the packages that one is built from, and all that those need to run: each with the one that names it."""
+    """Return a package's build dependencies, including indirect ones, each with the package that names it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -62,7 +61,7 @@ def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str])
 
 
 def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[str, str]]) -> set[str]:
-    """Return the packages that export a message generator, and all that those are built from."""
+    """Return the packages that export a message generator, and their build dependencies."""
     waiting = {
         name
         for name, manifest in manifests.items()
@@ -77,14 +76,14 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 
 
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the names of a cycle, each before one that it needs, from the first by name back to itself.
+    """Return the names of a cycle, each before its dependency, starting and ending with the first by name.
 
-    graphlib has each of ``nodes`` before one that needs it, and the first of them twice.
+    ``nodes`` is graphlib's cycle: each name before one that depends on it, with the first name repeated at the end.
     """
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # What is between the two only needs to run with the other.
+        # Add the packages between the two, which are only run dependencies.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

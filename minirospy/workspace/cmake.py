@@ -1,7 +1,7 @@
-"""The text of a CMakeLists.txt -> the commands in it, as they are written. Pure.
+"""Parse a CMakeLists.txt into commands, without evaluating them. Pure.
 
-Words, quotes, brackets, comments, and which commands are inside which ``if``, ``foreach`` or ``macro``; what they
-come to is said by cmake_run.py. Source: https://cmake.org/cmake/help/latest/manual/cmake-language.7.html.
+Handles words, quotes, brackets and comments, and nests commands inside their ``if``, ``foreach`` or ``macro``; cmake_run.py
+evaluates them. Source: https://cmake.org/cmake/help/latest/manual/cmake-language.7.html.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ _OPENERS = {end: name for name, end in _ENDS.items()}
 
 
 class Word(NamedTuple):
-    """An argument as it is written. ``quoted``: it stays one word whatever is in it."""
+    """An argument as written. ``quoted``: it remains one word, whatever it contains."""
 
     text: str
     quoted: bool = False
 
 
 class Statement(NamedTuple):
-    """A command: its name in lower case, its arguments, the line where it starts, and its content.
+    """A command: its name in lower case, its arguments, the line where it starts, and its body.
 
-    ``body`` holds what is before the ``endif()`` or ``endforeach()`` that closes it; ``else()`` is one of them.
+    ``body`` has the commands before the closing ``endif()`` or ``endforeach()``, including ``else()``.
     """
 
     name: str
@@ -50,15 +50,15 @@ class Statement(NamedTuple):
 
 
 def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
-    """Return the commands of a CMakeLists.txt; ``where`` names the file in errors.
+    """Parse a CMakeLists.txt; ``where`` is the file's name for errors.
 
-    Raise BuildError if a quote, a bracket, an ``if`` or a loop does not close.
+    Raise BuildError if a quote, a bracket, an ``if`` or a loop is not closed.
     """
     return _nested(_commands(text.removeprefix("\ufeff"), where), where, None)
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
-    """Return arguments by the keyword that they follow; those before any keyword are under ``""``."""
+    """Return arguments grouped by the preceding keyword; those before any keyword are under ``""``."""
     found: dict[str, list[str]] = {"": []}
     current = ""
     for word in arguments:
@@ -71,13 +71,13 @@ def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> d
 
 
 def _nested(commands: Iterator[Statement], where: str, opener: Statement | None) -> tuple[Statement, ...]:
-    """Return the commands up to the one that closes ``opener``, each with its content."""
+    """Return the commands up to the one that closes ``opener``, with nested bodies."""
     statements: list[Statement] = []
     for statement in commands:
         if opener and statement.name == _ENDS[opener.name]:
             return tuple(statements)
         if statement.name in _OPENERS:
-            # Reported where it is, unless something else is open: then that is what is wrong.
+            # If a block is open, report it as not closed; otherwise report the closing command without its block.
             line, missing = (
                 (opener.line, _ENDS[opener.name]) if opener else (statement.line, _OPENERS[statement.name])
             )
@@ -142,13 +142,13 @@ def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
 
 
 def _shown(text: str) -> str:
-    """Return the first words of a text, for an error."""
+    """Return the first words of a string, for an error message."""
     return " ".join(text[:40].split())
 
 
 def _word(match: re.Match[str]) -> Word:
     if match["bracket"] is not None:
-        # Nothing in it is a variable.
+        # A bracket argument has no variable references: escape them.
         return Word(re.sub(r"([\\$])", r"\\\1", match["bracket"]), True)
     quoted = match["quoted"] is not None
     return Word(match["quoted"] if quoted else match["word"], quoted)

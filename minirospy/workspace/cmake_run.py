@@ -1,7 +1,7 @@
-"""The evaluation of a CMakeLists.txt: its commands in, those that CMake would run out, with variables filled in.
+"""Evaluate a CMakeLists.txt: return the commands that CMake would run, with variables expanded.
 
-``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are followed, and the
-commands that set variables; all other commands are passed on. An unset variable is empty, and false, as in CMake.
+``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are evaluated, and the
+commands that set variables; all other commands are yielded. An unset variable is empty, and false, as in CMake.
 Source: https://cmake.org/cmake/help/latest/manual/cmake-commands.7.html.
 """
 
@@ -22,13 +22,12 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""What packages of Python look for, and go on without: it is there."""
-_DEEPEST = 40
-"""The depth of nested files and macros; more is a file that includes itself."""
+"""Optional packages that Python packages search for; reported as found."""
+_DEEPEST = 40  # nested files and macros; a deeper file includes itself
 
 
 class Command(NamedTuple):
-    """One command: its name in lower case, its arguments, and its place: the line, the file, its folder."""
+    """A command: its name in lower case, its arguments, and its location: line, file and folder."""
 
     name: str
     arguments: tuple[str, ...]
@@ -51,9 +50,9 @@ class _Leave(Exception):
 
 
 def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
-    """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is one of the environment.
+    """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is an environment variable.
 
-    Raise BuildError: no such file, a bracket that does not close, a condition or a pattern that does not parse.
+    Raise BuildError if the file does not exist, a bracket is not closed, or a condition or pattern does not parse.
     """
     return _Run(file.parent, dict(variables), {}, 0).file(file)
 
@@ -63,12 +62,12 @@ def _items(text: str) -> list[str]:
 
 
 def _escaped(text: str) -> str:
-    """Return a value in a form of which expansion makes the value."""
+    """Escape a value so that expansion leaves it unchanged."""
     return text.replace("\\", "\\\\").replace("$", "\\$")
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Return a macro's commands with its arguments in place, as CMake does it: as text, before any variable."""
+    """Return a macro's commands with its arguments substituted as text, before variables are expanded, as CMake does."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])
@@ -85,8 +84,8 @@ def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> 
 class _Run:
     """Runs the commands of one folder.
 
-    ``_known`` holds the variables of its current scope, ``_raised`` those that ``PARENT_SCOPE`` sets around it,
-    ``_macros`` what it defined.
+    ``_known``: the variables of the current scope; ``_raised``: those that ``PARENT_SCOPE`` sets in the enclosing scope;
+    ``_macros``: the defined macros and functions.
     """
 
     def __init__(self, folder: Path, known: dict[str, str], macros: dict[str, _Macro], depth: int) -> None:
@@ -157,7 +156,7 @@ class _Run:
                 yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
-        """Return words with variables expanded; a list in one without quotes becomes several words."""
+        """Return words with variables expanded; a list in an unquoted word becomes several words."""
         found: list[str] = []
         for word in words:
             text = self._filled(word.text)
@@ -165,7 +164,7 @@ class _Run:
         return found
 
     def _filled(self, text: str) -> str:
-        """Expand variables from the innermost outwards, as in ``${${NAME}_SOURCE_DIR}``."""
+        """Expand variables, innermost first, as in ``${${NAME}_SOURCE_DIR}``."""
 
         def value(match: re.Match[str]) -> str:
             name = f"ENV{{{match[2]}}}" if match[1] else match[2]
@@ -207,7 +206,7 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return what a loop runs over: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
+        """Return the items of a loop: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
         if words[:1] == ["RANGE"]:
             numbers = [int(word) for word in words[1:] if word.isdigit()]
             start, stop, step = (0, *numbers, 1) if len(numbers) == 1 else (*numbers, 1, 1, 1)[:3]
@@ -247,7 +246,7 @@ class _Run:
         self._known, self._raised = {**around, **self._raised}, raised
 
     def _include(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        """Yield a file of the package; a module of CMake's own is left out."""
+        """Yield the commands of an included file in the package; skip CMake's own modules."""
         for name in arguments[:1]:
             folders = [self._folder, *map(Path, _items(self._known.get("CMAKE_MODULE_PATH", "")))]
             paths = [folder / f"{name}{ending}" for folder in folders for ending in ("", ".cmake")]
@@ -321,7 +320,7 @@ class _Run:
             self._known[words[0]] = self._known.get(words[0], "") + "".join(words[1:])
 
     def _file(self, arguments: list[str]) -> None:
-        """Run ``file(GLOB NAME pattern ...)``, ``GLOB_RECURSE``."""
+        """Run ``file(GLOB NAME pattern ...)`` or ``GLOB_RECURSE``."""
         if len(arguments) < 2 or arguments[0] not in ("GLOB", "GLOB_RECURSE"):
             return
 
@@ -336,20 +335,20 @@ class _Run:
         found: list[Path] = []
         for pattern in words:
             path = self._folder / pattern
-            # A package's own folder may hold signs that mean something in a pattern.
+            # Match below the package's folder, because its path may contain characters that are special in a pattern.
             top = self._folder if path.is_relative_to(self._folder) else Path(path.anchor)
             *folders, last = path.relative_to(top).parts or ("*",)
             if arguments[0] == "GLOB":
                 found += top.glob("/".join([*folders, last]))
             elif top == self._folder:
-                # With an unset variable, `${UNSET}/*` is the whole disk.
+                # Only inside the package: if a variable is unset, `${UNSET}/*` would search the whole disk.
                 found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
 
         names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """Count required packages as found: the build reports those that are missing."""
+        """Report required packages as found; the build reports missing ones."""
         if "REQUIRED" in arguments or _HERE & {*arguments[:1]}:
             self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
 
@@ -400,7 +399,7 @@ def _version(text: str) -> list[int]:
 
 _COMPARE: dict[str, Callable[[str, str], bool]] = {
     "MATCHES": lambda left, right: bool(re.search(right, left)),
-    # What a build makes is not there: CMake, too, then says that it must be made.
+    # Generated files do not exist here. CMake returns true for them, so that they are generated.
     "IS_NEWER_THAN": lambda left, right: True,
     **{
         prefix + name: lambda left, right, read=read, test=test: test(read(left), read(right))  # type: ignore[misc]
@@ -432,7 +431,7 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # Targets are made of what is generated; commands and policies are CMake's, which has them.
+            # A target exists if it is one for generated code. Commands and policies are CMake's own, so they exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
             "POLICY": lambda name: True,
@@ -445,7 +444,7 @@ class _Condition:
         return result
 
     def _any(self) -> bool:
-        # CMake takes AND and OR from left to right, neither before the other.
+        # CMake evaluates AND and OR from left to right, with equal precedence.
         result = self._one()
         while self._next < len(self._words):
             if self._took("AND"):
@@ -479,16 +478,16 @@ class _Condition:
             return self._value(left) in _items(self._known.get(self._word().text, ""))
 
         if _TRUE.match(left.text) or _FALSE.match(left.text):
-            # These words mean themselves, even if a variable has that name.
+            # Constants stand for themselves, even if a variable of that name exists.
             return bool(_TRUE.match(left.text))
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 
     def _value(self, word: Word) -> str:
-        """Return the value of the variable that a word without quotes may name."""
+        """Return the value of the variable named by an unquoted word, or the word itself."""
         return word.text if word.quoted else self._known.get(word.text, word.text)
 
     def _word(self) -> Word:
-        # An empty variable leaves no word: `if(${UNSET} STREQUAL "x")`.
+        # An empty variable expands to no word: `if(${UNSET} STREQUAL "x")`.
         if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
             return Word("", True)
         self._next += 1

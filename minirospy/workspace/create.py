@@ -1,4 +1,4 @@
-"""A new package: its package.xml and CMakeLists.txt, with what students edit in them ready as comments.
+"""Create a package: its package.xml and CMakeLists.txt, with common entries as comments to edit.
 
 Source: http://wiki.ros.org/catkin/commands/catkin_create_pkg, http://wiki.ros.org/catkin/package.xml.
 """
@@ -19,7 +19,7 @@ _NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_-]*$")
 
 
 class NewPackage(NamedTuple):
-    """The description of a package before it exists."""
+    """The description of a package to create."""
 
     name: str
     depends: Sequence[str] = ()
@@ -33,7 +33,7 @@ class NewPackage(NamedTuple):
 
 
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
-    """Make the package's folder below ``parent``; return the files and folders made. Raise UsageError."""
+    """Create the package's folder below ``parent``; return the created files and folders. Raise UsageError."""
     if not _NAME.match(package.name):
         raise UsageError(
             f"[{package.name}] is not a name for a package: lower-case letters, digits and underscores, a letter first"
@@ -60,7 +60,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     if package.meta:
         return made
     if "roscpp" in package.depends:
-        # Where C++ headers go, as ROS lays it out.
+        # ROS's folder for C++ headers.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
 
@@ -70,7 +70,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
 
 
 def _person(tag: str, person: str, user: str) -> str:
-    """Return the tag of a person, given as a name or as ``Name <mail>``; a maintainer must have an address."""
+    """Return the tag for a person, given as a name or as ``Name <mail>``; a maintainer must have an address."""
     match = re.match(r"^(.*?)\s*<([^<>]+)>$", person)
     name, mail = (match[1], match[2]) if match else (person, "")
     if not mail and tag == "maintainer":

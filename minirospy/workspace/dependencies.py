@@ -1,7 +1,7 @@
-"""Which package needs which: packages in, their dependencies out, as rospack counts them.
+"""Dependencies between packages, as rospack reports them.
 
-A dependency here is what a package needs to run (``run_depend``, ``exec_depend``, ``depend``) and what is a package
-itself; the other names in a manifest are rosdep keys. Source: http://docs.ros.org/api/rospack/html/commandline.html.
+A dependency is a name in ``run_depend``, ``exec_depend`` or ``depend`` that is a package; the other names in a manifest are
+rosdep keys. Source: http://docs.ros.org/api/rospack/html/commandline.html.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Packages need each other; ``circle`` starts and ends with the same one."""
+    """Packages depend on each other; ``circle`` starts and ends with the same package."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -36,10 +36,10 @@ class CircularDependencyError(MinirospyError):
 
 
 class Dependencies:
-    """The dependencies between packages; manifests are read once, on first use.
+    """The dependencies between packages; each manifest is read once, on first use.
 
-    Metapackages are left out, as by rospack, unless ``with_metapackages``, as by rosstack. ``complain`` is called with
-    the error of each manifest that cannot be read, where all are searched.
+    Metapackages are left out, as by rospack, unless ``with_metapackages``, as by rosstack. When all manifests are searched,
+    ``complain`` is called with the error of each one that cannot be read.
     """
 
     def __init__(
@@ -57,12 +57,12 @@ class Dependencies:
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """The folders that are searched."""
+        """Return the folders that are searched."""
         return self._packages.roots
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Every package, sorted, and the folders that hold one of its name; the first is the one that counts."""
+        """Return all packages, sorted, each with the folders of that name; the first folder is used."""
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
@@ -71,36 +71,36 @@ class Dependencies:
 
     @cached_property
     def metapackages(self) -> dict[str, Path]:
-        """Every metapackage and its folder."""
+        """Return all metapackages and their folders."""
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError, with the nearest names."""
+        """Return the folder of a package. Raise NotFoundError with similar names."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
         return folder
 
     def manifest(self, name: str) -> Manifest:
-        """Return the manifest of a package or metapackage. Raise NotFoundError, ManifestError."""
+        """Return the manifest of a package or metapackage. Raise NotFoundError or ManifestError."""
         if name not in self._manifests:
-            # Not imported above, as `rospack find` does not need it.
+            # Imported late: `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return the packages that a package names, by kind of tag. Raise NotFoundError, ManifestError."""
+        """Return a package's direct dependencies, ordered by kind of tag. Raise NotFoundError or ManifestError."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
         return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return what a package needs, directly or not; each after what it needs itself.
+        """Return a package's direct and indirect dependencies, each after its own dependencies.
 
-        Raise CircularDependencyError and as :meth:`direct`.
+        Raise CircularDependencyError, or as :meth:`direct` does.
         """
         found: dict[str, None] = {}
 
@@ -116,14 +116,14 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield each dependency below the package that names it, with its depth from 0; repeated where it is named again.
+        """Yield each dependency below the package that names it, with its depth from 0; repeat it if several packages name it.
 
-        Raise as :meth:`all`.
+        Raise as :meth:`all` does.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return each path from a package to another that it needs. Raise as :meth:`all`."""
+        """Return each path from a package to one of its dependencies. Raise as :meth:`all` does."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):
@@ -133,12 +133,12 @@ class Dependencies:
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """Return the packages that name this one, sorted. Raise NotFoundError."""
+        """Return the packages that directly depend on this one, sorted. Raise NotFoundError."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """Return the packages that need this one, directly or not, sorted. Raise NotFoundError."""
+        """Return the packages that directly or indirectly depend on this one, sorted. Raise NotFoundError."""
         found: dict[str, None] = {}
         waiting = [name]
         while waiting:
@@ -149,7 +149,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return every name that a package depends on, of any kind, sorted. Raise NotFoundError, ManifestError."""
+        """Return every dependency of a package, of any kind, sorted. Raise NotFoundError or ManifestError."""
         self.folder(name)
         return sorted(self.manifest(name).depends())
 
@@ -172,9 +172,9 @@ class Dependencies:
 
 
 def is_metapackage(folder: Path) -> bool:
-    """Return whether the package in a folder is one that only names others."""
+    """Return whether the package in a folder is a metapackage."""
     try:
-        # A text that lacks the word needs no parser.
+        # Do not parse a file that does not contain the tag.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():
             return False
         from minirospy.workspace.manifest import read_manifest

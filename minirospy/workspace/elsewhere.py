@@ -1,6 +1,6 @@
-"""The parts of ROS 1 that minirospy lacks: packages and modules of C++ or Qt, and what to do instead. A table.
+"""A table of ROS 1 packages and modules that minirospy lacks, such as those in C++ or Qt, and their replacements.
 
-It is consulted where a package, a program or a module is not found: what a workspace or an installation has comes first.
+It is used if a package, program or module is not found: packages in a workspace or an installation take precedence.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ _CPP = {
     "yocs_cmd_vel_mux": "nodelets, in C++",
     "yocs_velocity_smoother": "nodelets, in C++",
 }
-"""Packages whose programs are compiled: what they are."""
+"""Packages with compiled programs, and their descriptions."""
 
 _MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
 _INSTEAD = {
@@ -133,7 +133,7 @@ _INSTEAD = {
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
     "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
 }
-"""What minirospy has in place of some of them, and of others."""
+"""What minirospy provides instead of some of these packages and of others."""
 
 _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "
@@ -164,7 +164,7 @@ _QT_LIBRARIES = (
 _MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Packages of definitions -> what `git clone` takes for ROS 1's."""
+"""Packages of definitions -> the arguments of `git clone` for the ROS 1 version."""
 
 IMPORTED = frozenset(
     {
@@ -177,7 +177,7 @@ IMPORTED = frozenset(
         *_QT_LIBRARIES,
     }
 )
-"""The modules of them that Python programs import; `overlay/` has one for each, which raises ImportError."""
+"""Modules of these packages that Python programs import; `overlay/` has a module for each, which raises ImportError."""
 
 SUBMODULES = {
     "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",
@@ -185,11 +185,11 @@ SUBMODULES = {
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
-"""Submodules that programs import of real ROS's packages and ours lack -> what to use; `overlay/` has one for each."""
+"""Submodules of ROS packages that minirospy's packages lack -> their replacement; `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:
-    """Return what a package or module of ROS 1 is, and what to do without it, in one line; empty for one that is not known."""
+    """Describe a ROS 1 package or module and its replacement in one line; return "" if it is unknown."""
     if name in _CPP:
         what = f"{_CPP[name]}, which minirospy does not have"
         there = _RUN_IT_THERE.format(conda=name.replace("_", "-"))

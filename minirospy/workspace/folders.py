@@ -1,4 +1,4 @@
-"""The folders of ROS's own files, by the environment: ROS_HOME and the folders in it.
+"""The folders of ROS's files from the environment: ROS_HOME and the folders in it.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables.
 """
@@ -27,7 +27,7 @@ def results_dir(environ: Mapping[str, str] | None = None) -> str:
 
 
 def distro_codename(environ: Mapping[str, str] | None = None) -> str:
-    """Return ROS_DISTRO, or the last distribution of ROS 1."""
+    """Return ROS_DISTRO, by default the last ROS 1 distribution."""
     return _environ(environ).get("ROS_DISTRO") or "noetic"
 
 

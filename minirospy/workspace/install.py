@@ -1,4 +1,4 @@
-"""`catkin_make install`: copies of what a package needs to run, below the folder install."""
+"""`catkin_make install`: copy what a package needs at run time to the install folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy what one package installs; return the number of files. Raise BuildError."""
+    """Copy the files that one package installs; return their number. Raise BuildError."""
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():
@@ -32,7 +32,7 @@ def install(workspace: Workspace, plan: Plan) -> int:
 
 
 def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
-    """Yield target and (source, whether it becomes executable) of each file that is installed."""
+    """Yield target and (source, whether to make it executable) of each installed file."""
     share = workspace.install / "share" / plan.name
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)
@@ -73,11 +73,11 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         if source.is_file():
             yield place / (rule.rename or source.name), (source, rule.program)
             continue
-        # As in CMake: with a slash at its end, what is in the folder; else the folder.
+        # As in CMake: with a trailing slash, install the folder's contents; else the folder itself.
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)
-            # What is left out may be a folder above the file.
+            # A pattern may exclude a parent folder of the file.
             parents = [f"/{each.as_posix()}" for each in (below, *below.parents)]
             left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
             if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):

@@ -1,7 +1,7 @@
-"""A package.xml: its text in, a frozen :class:`Manifest` out. Formats 1, 2 and 3.
+"""Parse a package.xml into a frozen :class:`Manifest`. Formats 1, 2 and 3.
 
-Reading is lenient: what catkin refuses and a reader can do without (a package without a maintainer, a tag of another
-format) is kept in :attr:`Manifest.problems`, of which a build warns.
+Parsing is lenient: errors that catkin reports but a reader can ignore (a missing maintainer, a tag of another format) are
+recorded in :attr:`Manifest.problems`, and a build prints them as warnings.
 
 Source: http://wiki.ros.org/catkin/package.xml, https://ros.org/reps/rep-0127.html (format 1),
 https://ros.org/reps/rep-0140.html (format 2), https://ros.org/reps/rep-0149.html (format 3, conditions).
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 VARIABLES: Mapping[str, str] = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
-"""What conditions see where the caller's variables do not say otherwise."""
+"""The default variables of conditions."""
 
 _CONVENTIONAL_NAME = re.compile(r"^[a-z][a-z0-9_-]*$")
 PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
@@ -55,7 +55,7 @@ class Kind(Enum):
 
 
 class Dependency(NamedTuple):
-    """A dependency on a package or a rosdep key; ``tag`` is what the file says (``run_depend``), ``line`` where."""
+    """A dependency on a package or a rosdep key; ``tag`` is the tag in the file (``run_depend``), ``line`` its line."""
 
     name: str
     kinds: frozenset[Kind]
@@ -78,7 +78,7 @@ class Url(NamedTuple):
 
 
 class Export(NamedTuple):
-    """A tag inside ``<export>``: what other tools read of a package."""
+    """A tag inside ``<export>``, for other tools."""
 
     tag: str
     attributes: Mapping[str, str]
@@ -94,9 +94,9 @@ class Problem(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """A package.xml. Conditions are evaluated: what they leave out is not here.
+    """A package.xml. Conditions have been evaluated: elements whose condition is false are left out.
 
-    ``dependencies`` are in the order of the file; :meth:`depends` chooses their names.
+    ``dependencies`` are in file order; :meth:`depends` selects their names by kind.
     """
 
     path: Path
@@ -113,7 +113,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """Return the names of the dependencies of these kinds (none: of all), each once, in the order of the file."""
+        """Return the names of the dependencies of these kinds (default: all), without duplicates, in file order."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -123,12 +123,12 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the build tool of the package: catkin unless it names another."""
+        """Return the package's build tool, by default catkin."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 
 def naming_warning(name: str) -> str | None:
-    """Return catkin's warning of a package's name that does not follow the conventions, else None (REP 144)."""
+    """Return catkin's warning about a package name that does not follow the conventions (REP 144), None if it does."""
     if _CONVENTIONAL_NAME.match(name):
         return None
     return (
@@ -138,9 +138,9 @@ def naming_warning(name: str) -> str | None:
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Return the manifest in a file, or in the package.xml of a folder; conditions see ``variables`` above VARIABLES.
+    """Read the manifest in a file, or in a folder's package.xml; ``variables`` override VARIABLES in conditions.
 
-    Raise ManifestError: no such file, not XML, not a package, no name, a condition that does not parse.
+    Raise ManifestError if the file does not exist, is not XML or not a package, has no name, or a condition does not parse.
     """
     if path.is_dir():
         path = path / "package.xml"
@@ -152,7 +152,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Return the manifest of a text; ``path`` is for the errors. Raise ManifestError as read_manifest does."""
+    """Parse a manifest; ``path`` is for errors. Raise ManifestError as read_manifest does."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -160,9 +160,9 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
 
 
 def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
-    """Return whether ``$ROS_VERSION == 1 and ...`` holds; what is compared is text, and an unknown variable is empty.
+    """Return whether ``$ROS_VERSION == 1 and ...`` is true; values are compared as strings, an unknown variable is empty.
 
-    Raise ValueError with what is wrong.
+    Raise ValueError with the reason if it does not parse.
     """
     return _Condition(condition, variables).value()
 
@@ -171,7 +171,7 @@ def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
 
 
 class _Element:
-    """A tag, its line, its children, and the text in it and in them."""
+    """A tag, its line, its children, and the text in the tag and its children."""
 
     __slots__ = ("attributes", "children", "line", "parts", "tag")
 
@@ -184,7 +184,7 @@ class _Element:
 
     @property
     def text(self) -> str:
-        """The text, with runs of white space as one space."""
+        """Return the text, with each run of white space replaced by one space."""
         return " ".join("".join(self.parts).split())
 
 
@@ -215,7 +215,7 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     except XmlError as error:
         raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
-        # A name of an encoding that Python does not know is a LookupError.
+        # If Python does not know the encoding, the error is a LookupError, without a code.
         code = getattr(error, "code", None)
         why = expat.ErrorString(code) if code is not None else str(error)
         raise ManifestError(str(path), parser.CurrentLineNumber, f"not XML: {why}") from error
@@ -232,7 +232,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Not of formats 2 and 3, but found there.
+    # Not part of formats 2 and 3, but used there.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -257,11 +257,11 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 _EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""What catkin accepts, which stops at any other address."""
+"""Addresses that catkin accepts; it exits with an error for any other."""
 
 
 class _Reader:
-    """The children of <package>, by tag, as the parts of a manifest."""
+    """Reads the children of <package>, by tag, into the parts of a manifest."""
 
     def __init__(self, root: _Element, path: Path, variables: Mapping[str, str]) -> None:
         self._path = path
@@ -387,7 +387,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-_MAX_BRACKETS = 50  # in a condition; each level recurses three times
+_MAX_BRACKETS = 50  # nested in a condition; the parser recurses three times per level
 _COMPARE = {
     "==": str.__eq__,
     "!=": str.__ne__,

@@ -1,4 +1,4 @@
-"""Running .cfg files, programs that describe a node's parameters: package.cfg.NAMEConfig, its header, documents.
+"""Run .cfg files, programs that describe a node's parameters; they write package.cfg.NAMEConfig, a C++ header and docs.
 
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
@@ -21,7 +21,7 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Run the .cfg files of a package; return what they have written into devel, and warnings.
+    """Run the .cfg files of a package; return the files written to devel, and warnings.
 
     Raise BuildError if one fails.
     """
@@ -51,7 +51,7 @@ def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
 
 
 def _run(file: Path, plan: Plan, folders: list[Path], modules: Path) -> None:
-    """Run a .cfg file with our generator, and with the messages and modules of its workspace."""
+    """Run a .cfg file with minirospy's generator, and with the messages and modules of its workspace."""
     base = next(root / "dynamic_reconfigure" for root in built_in_roots())
     path = [str(_OVERLAY), str(modules), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(

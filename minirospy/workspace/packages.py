@@ -1,7 +1,7 @@
-"""The folders of ROS packages, and their programs.
+"""Find the folders of ROS packages, and their programs.
 
-ROS_PACKAGE_PATH comes first, then minirospy's own packages: so a workspace's package hides ours of the same
-name. Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
+ROS_PACKAGE_PATH is searched before minirospy's own packages, so a workspace's package hides the built-in one of the same name.
+Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
 """
 
 from __future__ import annotations
@@ -37,12 +37,11 @@ _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
-_SHOWN = 12
-"""Programs that an error names: a screen's width of them."""
+_SHOWN = 12  # programs listed in an error: about one line
 
 
 class NotExecutableError(MinirospyError):
-    """A file of that name is there, but it is neither Python nor executable."""
+    """A file of that name exists, but it is neither Python nor executable."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -53,26 +52,26 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that an environment sees. A package's name is that in its package.xml."""
+    """The packages that are visible in an environment. A package's name is the one in its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages do not depend on ROS_MASTER_URI, and no look-up of this machine's name is needed.
+        # Packages do not depend on ROS_MASTER_URI or on the machine's name: skip both lookups.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
 
     @classmethod
     def below(cls, *roots: Path) -> Packages:
-        """Return the packages in these folders alone."""
+        """Return only the packages in these folders."""
         packages = cls.__new__(cls)
         packages.roots = roots
         packages._crawls = {}
         return packages
 
     def find(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError with the nearest names."""
+        """Return the folder of a package. Raise NotFoundError with similar names."""
         for root in self.roots:
-            # Where a folder is named as its package, nothing else need be read.
+            # If a folder has the package's name, try it before searching.
             if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
@@ -92,11 +91,11 @@ class Packages:
         return sorted(self.folders())
 
     def folders(self) -> dict[str, Path]:
-        """Return every package and its folder."""
+        """Return all packages and their folders."""
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return every package and each folder that holds one of its name; the first is the one that counts."""
+        """Return all packages, each with the folders of that name; the first folder is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -104,22 +103,22 @@ class Packages:
         return {name: list(folders) for name, folders in found.items()}
 
     def executables(self, package: str) -> list[str]:
-        """Return the names that `rosrun package` can run, sorted."""
+        """Return the names that `rosrun package` accepts, sorted."""
         folder = self.find(package)
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program; of several programs of a name, the first.
+        """Return the command that runs a package's program; of several programs with the name, the first.
 
-        Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError with the nearest names,
+        Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError with similar names, or
         NotExecutableError.
         """
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return each command that a name, or a path in the package, may mean: more than one where folders share a name.
+        """Return each command for a program name, or a path in the package; several folders may have a program of the name.
 
-        Raise as :meth:`find_executable`.
+        Raise as :meth:`find_executable` does.
         """
         folder = self.find(package)
         candidates = (
@@ -130,7 +129,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # A build puts a copy of a script next to it: the same program.
+            # Ignore the copies of scripts that a build puts in devel.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -141,7 +140,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Return a launch file of a package, by its path or, below the package, by its name. Raise NotFoundError."""
+        """Return a launch file of a package, by its path in the package or by its name. Raise NotFoundError."""
         folder = self.find(package)
         if (folder / name).is_file():
             return folder / name
@@ -154,7 +153,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint where another package of the same name, which the found one hides, has the file; else nothing."""
+        """Return a hint if another package of the same name, which the found one hides, has the file; else ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -167,7 +166,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """A folder that is searched for packages: how long that takes, all below it, and whether one is found."""
+    """A folder that is searched for packages: the time in seconds, including subfolders, and whether it has a package."""
 
     folder: Path
     seconds: float
@@ -175,7 +174,7 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Return the result of searching a folder and each below it that is not a package."""
+    """Return the search times of a folder and its subfolders, except for packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
@@ -193,14 +192,14 @@ def crawl_times(root: Path) -> list[CrawlTime]:
 
 
 def built_in_roots() -> tuple[Path, ...]:
-    """Return the folders of minirospy's own packages: next to the package in a checkout, in its ``share`` when installed."""
+    """Return the folders of minirospy's own packages: next to the Python package in a checkout, else in its ``share``."""
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
     return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros")
 
 
 def crawl(root: Path) -> Iterator[Path]:
-    """Yield the package folders at or below ``root``, as rospack searches: not inside a package, not in hidden folders."""
+    """Yield the package folders at or below ``root`` as rospack does: skip folders inside packages, and hidden ones."""
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root
@@ -210,7 +209,7 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    """Return the folders in one that may hold packages, sorted; none where a file says that it is to be ignored."""
+    """Return the subfolders that may contain packages, sorted; [] if a marker file says to ignore the folder."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -225,12 +224,12 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether a folder is a link to one that contains it: a search would never end."""
+    """Return whether an entry is a link to a folder that contains it, which would make the search endless."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in the package.xml of a folder (the folder's where it says none); None if no such file is."""
+    """Return the name in a folder's package.xml (by default the folder's name); None if there is no such file."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
@@ -240,9 +239,9 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield the files of a package: its own folder first, then where its programs are put when it is built or installed.
+    """Yield a package's files: first in its own folder, then in the folders where a build or an installation puts programs.
 
-    The Python modules in minirospy's own packages are not files of the package: `rosrun` does not run them.
+    The Python modules in minirospy's own packages are skipped: `rosrun` does not run them.
     """
     is_ours = folder.parent == _OURS / "ros"
     for path, folders, names in os.walk(folder):
@@ -260,7 +259,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # /usr/share/PKG has its programs in /usr/lib/PKG, whatever is sourced.
+        # The programs of /usr/share/PKG are in /usr/lib/PKG, whatever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -282,7 +281,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Return whether a file is a program for Python, by its name or by its first line."""
+    """Return whether a file is a Python program, by its name or its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:
@@ -290,9 +289,9 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return why ROS 1 would not run a Python program that minirospy runs, and what to do; None if it would.
+    """Return why ROS 1 would not run a Python program that minirospy runs, and a remedy; None if it would.
 
-    ROS 1 leaves the choice of the interpreter to the system, which needs the permission and a first line.
+    ROS 1 lets the system choose the interpreter, which requires execute permission and a shebang line.
     """
     if sys.platform == "win32" or not is_python(program):
         return None
@@ -308,9 +307,9 @@ def why_ros_refuses(program: Path) -> str | None:
 
 
 def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
-    """Return a program's command with a prefix in front, such as ``gdb --args`` or ``python3 -m pdb``.
+    """Return a program's command with a prefix such as ``gdb --args`` or ``python3 -m pdb``.
 
-    A prefix that runs Python files itself gets the file alone, as in ROS 1.
+    A prefix that runs Python files itself is followed by the file only, as in ROS 1.
     """
     if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
         command = command[-1:]

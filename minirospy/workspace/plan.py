@@ -1,6 +1,6 @@
-"""The build of a package as a plan: package.xml and CMakeLists.txt in, a :class:`Plan` out.
+"""Plan the build of a package from its package.xml and CMakeLists.txt, as a :class:`Plan`.
 
-Of CMake only the macros are read that matter to packages of Python. What needs a compiler is named in
+Only the CMake commands that matter to Python packages are evaluated. Targets that need a compiler are listed in
 ``Plan.skipped``. Source: http://wiki.ros.org/catkin/CMakeLists.txt,
 http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/index.html.
 """
@@ -25,7 +25,7 @@ from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest
 __all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
-"""The folder of Python packages below a devel or install folder, as ROS on Debian and Ubuntu has it."""
+"""The folder of Python packages below a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
@@ -62,19 +62,18 @@ _BEFORE = {
     "catkin_python_setup": ("generate_messages", "generate_dynamic_reconfigure_options"),
     "generate_dynamic_reconfigure_options": ("catkin_package",),
 }
-"""What catkin wants before what, though it makes no difference here."""
+"""Commands that catkin requires before others, although the order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
-"""Packages of which one, found before, brings the macros of messages to CMake."""
-_CMAKE_VERSION = "3.25.1"
-"""The CMake that package files believe to be read by."""
+"""Packages that define CMake's message macros; one of them must be found first."""
+_CMAKE_VERSION = "3.25.1"  # the CMake version that package files see
 
 
 class Install(NamedTuple):
-    """Files for the install folder: sources below the package; ``destination`` below the install folder.
+    """Files for the install folder: ``sources`` below the package; ``destination`` below the install folder.
 
-    Of a folder that ends in a slash, what is in it is copied; of any other, the folder itself.
-    ``chosen`` and ``excluded`` are regular expressions for paths: only those files (none: all), not those.
-    ``program``: made executable; ``python``: a script, which devel points to; ``optional``: it may be missing.
+    For a folder with a trailing slash, its contents are copied; otherwise the folder itself.
+    ``chosen`` and ``excluded`` are regular expressions for paths to include (none: all) and to exclude.
+    ``program``: make it executable; ``python``: a script to which devel refers; ``optional``: it may be missing.
     """
 
     command: Command
@@ -88,7 +87,7 @@ class Install(NamedTuple):
     rename: str = ""
 
     def check(self, folder: Path) -> None:
-        """Raise BuildError if a source, below a folder, is not there."""
+        """Raise BuildError if a source does not exist below ``folder``."""
         for name in self.sources:
             source = folder / name
             if not source.exists() and not self.optional:
@@ -99,7 +98,7 @@ class Install(NamedTuple):
 
 
 class Test(NamedTuple):
-    """A test: a file or folder below the package, what runs it, with what arguments and where."""
+    """A test: a file or folder below the package, its runner, arguments and working folder."""
 
     path: str
     kind: str
@@ -113,7 +112,7 @@ class Plan(NamedTuple):
 
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages they may
     contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a
-    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions for this workspace alone;
+    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed;
     ``options``: the .cfg files of dynamic_reconfigure.
     """
 
@@ -133,18 +132,18 @@ class Plan(NamedTuple):
 
     @property
     def cmake_lists(self) -> Path:
-        """The package's CMakeLists.txt."""
+        """Return the path of the package's CMakeLists.txt."""
         return self.folder / "CMakeLists.txt"
 
 
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
-    """Return the plan of the package in ``folder``; ``variables`` are what ``catkin_make -DNAME=VALUE`` sets.
+    """Return the plan of the package in ``folder``; ``variables`` are those set by ``catkin_make -DNAME=VALUE``.
 
-    Raise ManifestError, BuildError.
+    Raise ManifestError or BuildError.
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # It becomes the name of folders and modules.
+        # The package's name becomes the name of folders and modules.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -170,7 +169,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
 
 
 class _Collector:
-    """Gathers a plan, command by command."""
+    """Builds a plan, command by command."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
@@ -214,7 +213,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn of what real catkin refuses, and a build can do without."""
+        """Warn of an error that real catkin reports, but that this build can ignore."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -222,7 +221,7 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Warn of definitions that no macro names, and where nothing is generated of those that are."""
+        """Warn of definitions that no macro names, and if generate_messages() is missing."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
@@ -233,11 +232,11 @@ class _Collector:
                 "generate_messages() is missing: messages, services and actions are added, but not generated"
             )
             self.warn(first.file, first.line, text)
-            # As in catkin, which goes on.
+            # Continue without them, as catkin does.
             self._definitions.clear()
 
     def plan(self) -> Plan:
-        """Return what all commands require."""
+        """Return the plan from all commands."""
         return Plan(
             name=self._manifest.name,
             folder=self._folder,
@@ -255,14 +254,14 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """Return a path that a command names, as it is below the package."""
+        """Return a path that a command names, relative to the package."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # A folder inside the package may be another project.
+        # A subfolder may belong to another project.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,
@@ -338,7 +337,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml names what is passed on to other packages, for the build and for the run."""
+        """Check that package.xml names the packages in CATKIN_DEPENDS, as dependencies for the build and for the run."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 
@@ -392,7 +391,7 @@ class _Collector:
         place = given.get("DESTINATION", [])
         kind = next((kind for kind in ("PROGRAMS", "FILES", "DIRECTORY") if kind in command.arguments), None)
         if kind is None or not place:
-            # TARGETS, CODE, SCRIPT, EXPORT: what a compiler makes.
+            # TARGETS, CODE, SCRIPT and EXPORT are for compiled targets.
             return
         chosen, excluded = _patterns(command.arguments)
         self._installs.append(
@@ -414,7 +413,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what ``PATTERN x`` and ``REGEX x`` choose, and what they leave out with ``EXCLUDE``."""
+    """Return the patterns that ``PATTERN x`` and ``REGEX x`` include, and those that they exclude with ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):
@@ -426,7 +425,7 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _variables(folder: Path, name: str) -> dict[str, str]:
-    """Return what catkin and CMake set before a package's file is read. Destinations are below the install folder."""
+    """Return the variables that catkin and CMake set in advance. Destinations are below the install folder."""
     source = folder.as_posix()
 
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}

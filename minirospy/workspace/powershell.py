@@ -1,6 +1,6 @@
-"""The files that PowerShell sources: ``devel/setup.ps1`` and ``ros.ps1``'s environment, as texts. Pure.
+"""The PowerShell files ``devel/setup.ps1`` and ``ros.ps1``'s environment, as strings. Pure.
 
-As ``setup_files``, of which this is the part for PowerShell 5.1 and later, on Windows, macOS and Linux.
+This is the part of ``setup_files`` for PowerShell 5.1 and later, on Windows, macOS and Linux.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ _OTHERS = """if ($args[0] -ne '--extend') {
 
 
 def quoted(path: object) -> str:
-    """Return a path as one word of PowerShell, whose single quotes know one escape: two of them."""
+    """Return a path as one PowerShell word, in single quotes; a quote inside is doubled."""
     return "'" + str(path).replace("'", "''") + "'"
 
 
 def powershell_base(base: Mapping[str, str], programs: Path) -> str:
-    """Return the text that sets ROS's variables where they are not set, and finds minirospy's commands."""
+    """Return the code that sets ROS's variables if they are not set, and adds minirospy's commands to the path."""
     variables = "".join(
         f"if (-not $env:{name}) {{ $env:{name} = {quoted(value)} }}\n" for name, value in base.items()
     )
@@ -78,7 +78,7 @@ def powershell_setup(
     *,
     extends: bool,
 ) -> str:
-    """Return the text of setup.ps1, or of local_setup.ps1, which keeps what is sourced (``extends``)."""
+    """Return the text of setup.ps1, or of local_setup.ps1, which keeps the sourced workspaces (``extends``)."""
     chain = "".join(f"    _minirospy_workspace {quoted(parent)} put\n" for parent in reversed(parents))
     others = "" if extends else _OTHERS.replace("@CHAIN@", chain)
     last = "".join(f"_minirospy_last ROS_PACKAGE_PATH {quoted(folder)}\n" for folder in share)

@@ -1,7 +1,7 @@
-"""The contents of a package's setup.py: Python packages, modules and scripts.
+"""Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is run, with a ``setup()`` that only listens: so it may compute what it likes, and needs neither setuptools
-nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
+The file is executed with a ``setup()`` that only records its arguments, so it may compute anything, and needs neither
+setuptools nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Names -> their paths: top-level packages (folders), modules (files); scripts (files).
+    """Names -> their paths: top-level packages (folders), modules (files), scripts (files).
 
-    ``warnings`` has a line for each package whose folder is missing, which catkin builds without.
+    ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
 
     packages: dict[str, Path]
@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError with its line."""
+    """Return the packages and scripts in ``folder``/setup.py. Raise BuildError with the line."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -70,7 +70,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return an argument of ``setup()``; of None and of nothing, an empty one. Raise BuildError."""
+    """Return an argument of ``setup()``, an empty ``kind`` if it is missing or None. Raise BuildError."""
     value = given.get(name) or kind()
     if not isinstance(value, kind):
         raise BuildError(str(file), 0, f"{name} is {value!r}: {name}={form} is its form")
@@ -113,7 +113,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every name: empty classes, except for those that are set."""
+    """A module that has every attribute: an empty class, unless the attribute is set."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -122,7 +122,7 @@ class _StandIn(types.ModuleType):
 
 
 class _Finder(MetaPathFinder, Loader):
-    """Finds stand-ins for what a setup.py imports to be set up with."""
+    """Finds stand-ins for the build tools that a setup.py imports."""
 
     def __init__(self, contents: Mapping[str, Mapping[str, object]]) -> None:
         self._contents = contents
@@ -138,7 +138,7 @@ class _Finder(MetaPathFinder, Loader):
         for name in self._contents:
             parent, _, child = name.rpartition(".")
             if parent == module.__name__:
-                # `from catkin_pkg import python_setup` would be an empty class otherwise.
+                # Without this, `from catkin_pkg import python_setup` would return an empty class.
                 setattr(module, child, importlib.import_module(name))
 
 
@@ -147,9 +147,9 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace modules that a setup.py imports, with a ``setup`` that records its arguments; the folder is the current one.
+    """Replace the modules that a setup.py imports, with a ``setup`` that records its arguments; change to its folder.
 
-    As with a script, modules in its folder can be imported; they are forgotten afterwards.
+    As for a script, modules in its folder can be imported; they are unloaded afterwards.
     """
 
     def setup(**arguments: object) -> None:
@@ -188,7 +188,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # A terminal in which no setup.bash was sourced has none of them; catkin's own build sets them.
+    # Set the variables that catkin's build sets: a terminal without a sourced setup.bash has none of them.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield
@@ -206,7 +206,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
 
 
 def _metadata(folder: Path) -> dict[str, str]:
-    """Return what package.xml says of a package, under the names of ``setup()``'s arguments."""
+    """Return a package's metadata from package.xml, under the names of ``setup()``'s arguments."""
     manifest = read_manifest(folder)
     return {
         "name": manifest.name,

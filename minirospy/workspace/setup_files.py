@@ -1,7 +1,7 @@
-"""The files to source: ``devel/setup.bash`` and its like, as texts. Pure.
+"""The files to source, such as ``devel/setup.bash``, as strings. Pure.
 
-The shells do all of it themselves, so that a new terminal waits for no Python. Sourcing one workspace's setup file
-takes the variables of the one before back, and puts those of the workspaces below it and its own in front.
+They run in the shell alone, so that a new terminal does not wait for Python. Sourcing a workspace's setup file removes the
+variables of the previously sourced one, and prepends those of the parent workspaces and its own.
 Source: http://wiki.ros.org/catkin/workspaces, http://wiki.ros.org/ROS/EnvironmentVariables.
 """
 
@@ -19,10 +19,10 @@ SHELLS = ("bash", "zsh", "sh", "fish", "powershell", "bat")
 
 
 class SetUp(NamedTuple):
-    """The data for the texts.
+    """The data for the setup files.
 
     ``prefix``: the devel or install folder; ``sources``: its folders of packages; ``parents``: the prefixes of the
-    workspaces below it, the nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own
+    parent workspaces, nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own
     packages; ``functions``: the folder of ros.bash, ros.fish, ros.ps1, ros.bat.
     """
 
@@ -35,11 +35,11 @@ class SetUp(NamedTuple):
 
 
 def setup_files(setup: SetUp) -> dict[str, str]:
-    """Return file name -> text of all that a prefix needs to be sourced."""
+    """Return file name -> text of all setup files of a prefix."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
-        # As `setup.sh --extend`: what is sourced stays.
+        # As `setup.sh --extend`: keep the sourced workspaces.
         "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
         "setup.fish": _fish(setup),
@@ -58,7 +58,7 @@ def setup_files(setup: SetUp) -> dict[str, str]:
 
 
 def shell_text(shell: str, setup: SetUp) -> str:
-    """Return the text for ``eval "$(minirospy shell)"``: the environment without a workspace, and the functions."""
+    """Return the code for ``eval "$(minirospy shell)"``: the environment without a workspace, and the functions."""
     if shell == "fish":
         return _fish_base(setup) + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
     if shell == "powershell":
@@ -76,7 +76,7 @@ _HEAD = "# Made by minirospy: `source` it to work with the packages of this work
 
 _BASH = (
     _HEAD
-    # `return` outside a function succeeds only in a file that is sourced; $0 may have any value.
+    # `return` outside a function succeeds only in a sourced file; $0 may have any value.
     + """if ! (return 0 2>/dev/null); then
   echo "a program sets nothing in your terminal; type: source '$0'" >&2
 fi
@@ -156,7 +156,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return the text that removes the workspaces sourced before, and adds those that this one extends."""
+    """Return the code that removes previously sourced workspaces, and adds the parents of this one."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -219,7 +219,7 @@ _BASE = {
 
 
 def _quoted(path: Path) -> str:
-    """Return a path as one word of a shell."""
+    """Return a path as one word for a POSIX shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
 
 
@@ -296,7 +296,7 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _fish_quoted(path: Path) -> str:
-    """Return a path as one word of fish, whose single quotes know two escapes, unlike those of other shells."""
+    """Return a path as one word for fish, whose single quotes allow two escapes, unlike those of other shells."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
@@ -329,7 +329,7 @@ def _bat(setup: SetUp, others: str) -> str:
     text = _BAT.format(
         base=_bat_base(setup), others=others, share=share, functions=setup.functions / "ros.bat"
     )
-    # cmd.exe misses labels in a file whose lines end in a line feed alone.
+    # cmd.exe does not find labels in a file with LF line endings.
     return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 

@@ -1,7 +1,7 @@
-"""Messages that no add_message_files() names, but another definition has as a field: plans in, plans with them out.
+"""Add messages to plans that no add_message_files() names, but that other definitions use as fields.
 
-Real catkin finds such a file when it computes the md5sum of the one that has it, and builds. It makes no class of it, so that no
-message of the other type can be made in Python; here it is made, with a warning.
+Real catkin builds such a package: it finds the file when it computes the md5sum of the containing type. But it generates no
+class for the message, so that Python programs cannot create it. Here the class is generated, with a warning.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _FIELD = re.compile(
 
 
 def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
-    """Return the plans; messages that are used and not listed are among their definitions. Raise DefinitionError."""
-    # Which exist: a workspace seldom has any, and then no definition is read.
+    """Return the plans with used but unlisted messages added to their definitions. Raise DefinitionError."""
+    # Check first whether any exist: most workspaces have none, and then no definition need be read.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

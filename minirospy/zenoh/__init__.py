@@ -1,1 +1,1 @@
-"""What the fleet and the bridge to ROS 2 share of the library eclipse-zenoh."""
+"""What the fleet and the bridge to ROS 2 share for using the library eclipse-zenoh."""

@@ -1,4 +1,4 @@
-"""Zenoh's library, for all bridges: what is used of it, which has no types here, and the configuration of a session."""
+"""Zenoh's library for all bridges: protocols for the part that is used, which has no types, and a session's configuration."""
 
 from __future__ import annotations
 
@@ -30,19 +30,20 @@ DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 MAX_PORT = 65_535
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Links of Zenoh; which of them a build has, it says itself."""
+"""Zenoh's link protocols; a build of Zenoh reports an error for those that it lacks."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
-"""Zenoh sets SO_LINGER to 10 s: so long a thread, mostly of its pool rx, waits when it closes a dead link. Measured: 100 robots
-that are lost together are noticed after 30 s with 32 threads in each pool, after 11 s with 128 in rx; the lease is 10 s."""
+"""Zenoh sets SO_LINGER to 10 s, so closing a dead link blocks a thread, mostly of its pool rx, for 10 s. Measured: the loss of
+100 robots together is noticed after 30 s with 32 threads in each pool, after 11 s with 128 in rx; the lease is 10 s.
+"""
 _CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """An endpoint of the command line that can never work."""
+    """An endpoint in the arguments that can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
@@ -94,19 +95,19 @@ class Query(Protocol):
 
 
 class Declared(Protocol):
-    """What has been declared, until it is undeclared."""
+    """A declaration that can be undeclared."""
 
     def undeclare(self) -> None: ...
 
 
 class Matching(Protocol):
-    """Whether others subscribe to what a publisher sends."""
+    """A publisher's matching status: whether it has subscribers."""
 
     matching: bool
 
 
 class Outlet(Protocol):
-    """A publisher of Zenoh. ``put`` may block."""
+    """A Zenoh publisher. ``put`` may block."""
 
     matching_status: Matching
 
@@ -163,10 +164,10 @@ class Config(Protocol):
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """Where a gateway connects and listens. Without any it connects to a router of this machine, and listens nowhere.
+    """The endpoints to connect to and to listen on. By default, connect to a local router, and do not listen.
 
-    ``config``: a file in Zenoh's format, for TLS, users and all else; ``source``: what names it. ``scouts``: whether it looks
-    for others by multicast.
+    ``config``: a file in Zenoh's format, for TLS, users and everything else; ``source``: the option that names it. ``scouts``:
+    whether to discover peers by multicast.
     """
 
     connect: tuple[str, ...] = ()
@@ -177,9 +178,9 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise EndpointError on one that can never work.
+    """Return a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if it can never work.
 
-    ``listens``: its port may be 0, for a free one.
+    ``listens``: its port may be 0, for any free one.
     """
     if not text or has_controls(text) or " " in text:
         raise EndpointError(text, f"is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
@@ -209,7 +210,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the hosts of endpoints that do not resolve now. Blocks; a name may resolve later, as when mDNS comes up."""
+    """Return the hosts of endpoints that do not resolve now. Blocks. They may resolve later, for example once mDNS runs."""
     found = []
     for endpoint in endpoints:
         protocol, _, rest = endpoint.partition("/")
@@ -234,12 +235,12 @@ def is_loopback_endpoint(endpoint: str) -> bool:
 
 
 def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> None:
-    """Raise BridgeError with what to install where Zenoh's library is missing, or speaks another protocol.
+    """Raise BridgeError with the install command if Zenoh's library is missing or incompatible.
 
-    ``who`` needs it. ``has_many_links``: others will connect.
+    ``who`` is the component that needs it. ``has_many_links``: peers will connect.
     """
     if has_many_links:
-        # Before the import: Zenoh reads it once.
+        # Set it before the import: Zenoh reads it once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
     line = install_command("minirospy[fleet]", upgrade=True)
     try:
@@ -253,7 +254,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> No
 
 
 def configured(options: NetworkOptions) -> Config:
-    """Return Zenoh's configuration: the file's, and what the options say; nothing listens unless one of them says so."""
+    """Return Zenoh's configuration from the file and the options; it listens only if one of them requests it."""
     zenoh = importlib.import_module("zenoh")
     default: Config = zenoh.Config()
     config: Config = default
@@ -286,22 +287,23 @@ def configured(options: NetworkOptions) -> Config:
     elif not (connects or listens or options.scouts):
         put("connect/endpoints", [DEFAULT_ENDPOINT])
     if not is_set("mode"):
-        # A router passes on between all that are connected to it; a client has one connection.
+        # A router forwards between all connected peers; a client has one connection.
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router goes on trying; a client without one does not open, and is opened again.
+    # A gateway that loses its router keeps retrying. A client without a router fails to open, and its caller opens it
+    # again.
     for key, value in (
         ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Of a lease of 10 s: TCP repeats what a link loses, so that one fewer than Zenoh's default is enough.
+        # Keep-alives per lease of 10 s. TCP retransmits lost data, so one fewer than Zenoh's default is enough.
         ("transport/link/tx/keep_alive", 3),
-        # What the kernel has taken waits before everything else: at 4 Mbit/s some 0.3 s instead of 1.3 s.
+        # Data in the kernel's buffer is sent before any higher priority: at 4 Mbit/s for some 0.3 s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
-        # It would pass large messages between gateways of one machine by files in /dev/shm, which containers make small.
+        # Shared memory would pass large messages between local gateways in /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),
     ):
         if not is_set(key):
@@ -310,5 +312,5 @@ def configured(options: NetworkOptions) -> Config:
 
 
 def one_line(error: Exception) -> str:
-    # The line of Zenoh's source in which it arose says nothing to a user.
+    # Remove the location in Zenoh's source, which is of no use to the user.
     return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

@@ -1,8 +1,9 @@
-"""TCP links of Zenoh close without waiting.
+"""Remove SO_LINGER from Zenoh's TCP links, so that closing them does not block.
 
-Zenoh sets SO_LINGER to 10 s on each: where the peer is lost, closing blocks one of its threads for so long, and others wait
-for that one. A router that lost 1,000 robots together closed their links for minutes, and read nothing of half of those that
-came again (eclipse-zenoh 1.10.2, which has no option for it). Without SO_LINGER the kernel sends the rest after the close.
+Zenoh sets SO_LINGER to 10 s on each link: if the peer is lost, closing the link blocks one of Zenoh's threads for 10 s, and
+others wait for that thread. A router that lost 1,000 robots together closed their links for minutes, and read nothing from
+half of those that had reconnected (eclipse-zenoh 1.10.2, which has no option for it). Without SO_LINGER the kernel sends
+the remaining data after the close.
 """
 
 from __future__ import annotations
@@ -22,25 +23,25 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 _LOOKS = 10
-"""How often a file is examined: Zenoh creates the socket, connects it, and sets SO_LINGER only then."""
+"""How often to examine a file: Zenoh sets SO_LINGER only after it has created and connected the socket."""
 
 
 class LingerRemover:
-    """Finds the links that Zenoh has opened in this process."""
+    """Removes SO_LINGER from the links that Zenoh has opened in this process."""
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
         """How often each open file has been examined."""
 
     def look(self) -> int:
-        """Remove SO_LINGER from the links that are new; return how many. Without effect on Windows."""
+        """Remove SO_LINGER from new links; return how many. Does nothing on Windows."""
         if sys.platform == "win32":
             return 0
         looks: dict[tuple[int, int], int] = {}
         count = 0
         with contextlib.suppress(OSError):
             for name in os.listdir(_OPEN_FILES):
-                # Others open and close files meanwhile.
+                # Other threads open and close files meanwhile.
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino
@@ -52,7 +53,7 @@ class LingerRemover:
 
 
 def _removes(number: int, file: os.stat_result) -> bool:
-    """Remove SO_LINGER where it is Zenoh's; return whether it was."""
+    """Remove SO_LINGER if Zenoh has set it; return whether it had."""
     if not stat.S_ISSOCK(file.st_mode):
         return False
     with socket.socket(fileno=os.dup(number)) as sock:

@@ -1,1 +1,1 @@
-"""The commands of catkin and catkin_tools: workspaces without CMake."""
+"""The commands of catkin and catkin_tools, for workspaces without CMake."""

@@ -1,1 +1,1 @@
-"""Completion of the commands in the shell, and what the shell evaluates to get it."""
+"""Tab completion of the commands, and the shell code that enables it."""

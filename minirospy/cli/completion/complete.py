@@ -1,13 +1,13 @@
-"""`minirospy complete INDEX WORD...`: what can stand where the cursor is; a line feed between two. For TAB.
+"""`minirospy complete INDEX WORD...`: print the completions at the cursor, one per line. Called by shells for TAB.
 
-The words of a command line come in as the shell holds them (quotes included), INDEX is the place of the word under
-the cursor; candidates go out as the shell is to insert them: quoted where they need it, with a vertical tab for
-each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none; `--powershell`: with none, words and
-candidates as PowerShell writes them). One that ends in ``/`` or ``=`` goes on; after any other comes a space.
+The input is the words of a command line as the shell holds them (quotes included), and INDEX, the index of the word at the
+cursor. The output is candidates as the shell is to insert them: quoted if necessary, with a vertical tab for each line feed
+inside (`minirospy complete --one-line INDEX WORD...`: without line feeds; `--powershell`: without line feeds, words and
+candidates in PowerShell's syntax). A candidate that ends in ``/`` or ``=`` can be continued; any other is followed by a space.
 
-Verbs and options come from the command's own parser, not from a second list. So does what completes an
-argument or an option's value: see minirospy.command.parser.Parser.add_argument. Nothing here ends in an error, and the
-answer of a master is awaited no longer than a person waits. Source: http://wiki.ros.org/rosbash#Tab_completion.
+Verbs and options come from the command's own parser, not from a second list. So do the completers of arguments and of options'
+values: see minirospy.command.parser.Parser.add_argument. Completion never fails with an error, and waits for a master only as
+long as a user would. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ _OPTIONS = ["-h", "--help", "-V", "--version"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the candidates; the exit status is 0, whatever was typed."""
+    """Print the candidates; always return 0."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # An edge: it runs in the middle of somebody's typing, where a fault's only decent form is silence.
+    # Completion runs while the user types: print nothing rather than an error.
     with contextlib.suppress(Exception):
         shell = POWERSHELL if words[0] == _POWERSHELL else POSIX
         one_line = words[0] in (_ONE_LINE, _POWERSHELL)
@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def candidates(
     index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
 ) -> list[str]:
-    """Return the candidates for ``words[index]``, as the shell is to insert it; with ``one_line``, each on one line."""
+    """Return the candidates for ``words[index]`` as the shell is to insert them; ``one_line``: without line feeds."""
     if not 0 < index <= len(words):
         return []
     word = shell.read(words[index] if index < len(words) else "")
@@ -70,11 +70,11 @@ def candidates(
     try:
         found = _of_command(command, before, word.text)
         fitting = (completers.on_one_line(text) if one_line else text for text in found)
-        # What has control characters is not a name to choose; the shell would send them to the terminal.
+        # Drop names with control characters: the shell would send them to the terminal.
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # An unknown package or type: the command itself will say so.
+        # An unknown package or type: the command itself will report it.
         return []
 
 
@@ -99,7 +99,7 @@ def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
-    """Return the candidates for a command's next word, by its own parser."""
+    """Return the candidates for a command's next word, from the command's parser."""
     if entry.completer:
         return _completer(entry.completer)(Cursor("", tuple(before), word))
     grammar: Command | Family | Verb | None = entry.load_grammar()
@@ -120,7 +120,7 @@ def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Itera
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # An option that may stand alone has a number: not a candidate of what follows.
+            # The value of an option with an optional value is a number: do not complete the next word as that value.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None

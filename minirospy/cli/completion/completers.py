@@ -1,7 +1,7 @@
-"""The candidates of TAB: packages, files, launch arguments, what is in the graph, types, whole messages.
+"""The candidates for completion: packages, files, launch arguments, names in the graph, types, whole messages.
 
-A :class:`Cursor` comes in, candidates go out, unquoted; `complete` picks those that fit. Nothing of a graph is waited
-for longer than a person at the keyboard waits: without a master, or with one that is silent, there is nothing to offer.
+A completer takes a :class:`Cursor` and returns unquoted candidates; `complete` selects those that match. Queries to the graph
+have a short timeout: without a master, or if it does not answer, there are no candidates.
 """
 
 from __future__ import annotations
@@ -31,17 +31,15 @@ __all__ = [
     "topics",
 ]  # fmt: skip
 
-LIVE_SECONDS = 0.8
-"""How long a master, or a node, may take."""
+LIVE_SECONDS = 0.8  # timeout for the master and for nodes
 
-_MAX_LETTERS = 1000
-"""Of a parameter's value on a command line."""
+_MAX_LETTERS = 1000  # characters in a parameter's value on a command line
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Cursor(NamedTuple):
-    """The cursor's position: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
+    """The cursor's position: in an argument of ``verb``, after the arguments ``given``; ``word`` is the incomplete word."""
 
     verb: str
     given: tuple[str, ...]
@@ -49,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate to be edited in place: better to read in quotes than with a backslash at each blank."""
+    """A candidate that the user will edit: written in quotes rather than with a backslash before each blank."""
 
     __slots__ = ()
 
@@ -58,7 +56,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates: for a number, an expression, a new name."""
+    """Return no candidates, for a number, an expression or a new name."""
     return ()
 
 
@@ -77,14 +75,14 @@ def package_names(_: Cursor) -> Iterable[str]:
 
 
 def build_targets(cursor: Cursor) -> Iterable[str]:
-    """Return what catkin_make makes."""
+    """Return the targets of catkin_make."""
     names = _packages().names()
     tests = [f"run_tests_{name}" for name in names] if cursor.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of results of tests."""
+    """Return ``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of test results."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -110,7 +108,7 @@ _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
 def package_file(cursor: Cursor) -> Iterable[str]:
-    """Return a package, then the name of a file anywhere in it, or its path."""
+    """Return packages, then the names and paths of files in the chosen one."""
     if not cursor.given:
         return _packages().names()
     if len(cursor.given) > 1:
@@ -119,18 +117,18 @@ def package_file(cursor: Cursor) -> Iterable[str]:
 
 
 def package_path(cursor: Cursor) -> Iterable[str]:
-    """Return the path of a file in the package that is given."""
+    """Return the paths of files in the given package."""
     root = _packages().find(cursor.given[0])
     return [name.removeprefix("./") for name in _below(root, ".", "./" + cursor.word)]
 
 
 def package_file_and_target(cursor: Cursor) -> Iterable[str]:
-    """Return a package, a file of it, and where to."""
+    """Return packages, then files of the chosen one, then destinations."""
     return files(cursor) if len(cursor.given) > 1 else package_file(cursor)
 
 
 def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
-    """Return the names of all files in a package, hidden ones and compiled ones left out."""
+    """Return the names of all files in a package, except hidden and compiled ones."""
     found: set[str] = set()
     for _, inner, names in os.walk(root):
         inner[:] = [name for name in inner if not name.startswith(".") and name != "__pycache__"]
@@ -139,7 +137,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return what is in the folder that ``word`` is in; ``shown`` represents ``root`` at its start."""
+    """Return the contents of the folder that ``word`` is in; ``shown`` replaces ``root`` at the start."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -147,19 +145,19 @@ def _below(root: Path, shown: str, word: str) -> list[str]:
 
 
 def files(cursor: Cursor) -> Iterable[str]:
-    """Return files and folders of this computer, as shells complete them."""
+    """Return local files and folders, as shells complete them."""
     head, slash, prefix = cursor.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=prefix.startswith("."))]
 
 
 def bag_files(cursor: Cursor) -> Iterable[str]:
-    """Return bags, and folders, of this computer."""
+    """Return local bags and folders."""
     return [name for name in files(cursor) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
 
 
 def folders(cursor: Cursor) -> Iterable[str]:
-    """Return folders of this computer."""
+    """Return local folders."""
     return [name for name in files(cursor) if name.endswith("/")]
 
 
@@ -168,12 +166,12 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
         entries = [entry for entry in os.scandir(folder) if hidden or not entry.name.startswith(".")]
     except OSError:
         return []
-    # A link to itself is neither a folder nor an error.
+    # isdir() returns False for a link to itself, without an error.
     return sorted(entry.name + "/" if os.path.isdir(entry) else entry.name for entry in entries)
 
 
 def rosrun_words(cursor: Cursor) -> Iterable[str]:
-    """Return options of rosrun, packages, programs of one; then the program's arguments: files, remappings."""
+    """Return rosrun's options, packages, programs of the chosen one; then files and remappings for the program's arguments."""
     given = list(cursor.given)
     while given and given[0].startswith("-"):
         if given.pop(0) in ("-p", "--prefix"):
@@ -193,14 +191,14 @@ def rosrun_words(cursor: Cursor) -> Iterable[str]:
 
 
 def rospack_words(cursor: Cursor) -> Iterable[str]:
-    """Return a verb of rospack, its options, a package."""
+    """Return rospack's verbs and options, and packages."""
     from minirospy.ros.rospack.commands.rospack import _VERBS
 
     return _pack_words(cursor, _VERBS)
 
 
 def rosstack_words(cursor: Cursor) -> Iterable[str]:
-    """Return a verb of rosstack, its options, a stack."""
+    """Return rosstack's verbs and options, and stacks."""
     from minirospy.ros.rospack.commands.rospack import _STACK_VERBS
 
     return _pack_words(cursor, _STACK_VERBS)
@@ -225,7 +223,7 @@ def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 
 
 def launch_words(cursor: Cursor) -> Iterable[str]:
-    """Yield packages, launch files of one, or their paths; then ``arg:=`` for each argument that the file declares."""
+    """Yield packages, launch files in the chosen one, or paths; then ``arg:=`` for each argument that the file declares."""
     if ":=" not in cursor.word:
         if not cursor.given:
             yield from _packages().names()
@@ -240,7 +238,7 @@ def launch_words(cursor: Cursor) -> Iterable[str]:
 
 
 def launch_files(cursor: Cursor) -> Iterable[str]:
-    """Return launch files of this computer, and the folders on the way to them."""
+    """Return local launch files, and folders."""
     return [name for name in files(cursor) if name.endswith((*_LAUNCH, "/"))]
 
 
@@ -269,7 +267,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     if not cursor.given:
         return []
     file = _launch_file(cursor)
-    # A value that is not typed yet is not an error, and errors (collected in the list) hide no node.
+    # Give missing arguments an empty value, and collect errors in a list, so that neither hides nodes.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
@@ -279,7 +277,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return what the master, and the nodes, answer; nothing if that takes longer than a TAB may."""
+    """Return what ``ask`` gets from the master and the nodes; [] if that takes longer than LIVE_SECONDS."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -290,7 +288,7 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
         with contextlib.suppress(Exception), Graph.open("rostopic") as graph:
             answers.append(list(ask(graph)))
 
-    # A thread, because no timeout reaches into the look-up of a host's name.
+    # Use a thread, because host name lookups have no timeout.
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     thread.join(LIVE_SECONDS)
@@ -298,12 +296,12 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Return global names, with their first slash only if they are typed so."""
+    """Return global names, with the leading slash only if ``word`` has one."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics; for echo and type also the fields of one."""
+    """Return the topics; for echo and type also the fields of a topic."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -320,7 +318,7 @@ def topics(cursor: Cursor) -> Iterable[str]:
 
 
 def nodes(cursor: Cursor) -> Iterable[str]:
-    """Return the nodes that are not named yet."""
+    """Return the nodes that are not on the command line yet."""
     from minirospy.introspect.nodes import list_nodes
 
     names = _live(list_nodes)
@@ -328,7 +326,7 @@ def nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def machines(_: Cursor) -> Iterable[str]:
-    """Return the hosts that nodes run on."""
+    """Return the hosts on which nodes run."""
     from minirospy.introspect.graph import node_host
     from minirospy.introspect.nodes import list_nodes
 
@@ -352,7 +350,7 @@ def parameters(cursor: Cursor) -> Iterable[str]:
 
 
 def parameter_value(cursor: Cursor) -> Iterable[str]:
-    """Return a parameter's value, to be changed, for `rosparam set PARAMETER`."""
+    """Return a parameter's value for editing, for `rosparam set PARAMETER`."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
 
@@ -360,7 +358,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # A list or a table is read from one line as well; nobody changes a robot's whole description there.
+    # Lists and dictionaries can be written on one line. Nobody edits a whole robot description there, so skip long
+    # values.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
@@ -390,7 +389,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/Type``: all types would be hundreds. `rosmsg show` takes the name alone too."""
+    """Return ``pkg/``, then ``pkg/Type``, because all types would be hundreds; for `rosmsg show` also bare names."""
     from minirospy.introspect.interfaces import Interfaces, Kind
 
     package, slash, _ = cursor.word.partition("/")
@@ -408,22 +407,22 @@ def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
 
 
 def message_types(cursor: Cursor) -> Iterable[str]:
-    """Return the types of messages."""
+    """Return message types."""
     return _types(cursor, "msg", ("msg", "action"))
 
 
 def service_types(cursor: Cursor) -> Iterable[str]:
-    """Return the types of services."""
+    """Return service types."""
     return _types(cursor, "srv", ("srv",))
 
 
 def prototype_types(cursor: Cursor) -> Iterable[str]:
-    """Return the types of a kind, for `rosmsg-proto msg|srv`."""
+    """Return the types of the chosen kind, for `rosmsg-proto msg|srv`."""
     return service_types(cursor) if cursor.given[:1] == ("srv",) else message_types(cursor)
 
 
 def topic_type(cursor: Cursor) -> Iterable[str]:
-    """Return the topic's type, all types where it has none, for `rostopic pub TOPIC`."""
+    """Return the topic's type, or all types if it has none, for `rostopic pub TOPIC`."""
     if not cursor.given:
         return message_types(cursor)
 
@@ -435,7 +434,7 @@ def topic_type(cursor: Cursor) -> Iterable[str]:
 
 
 def message_text(cursor: Cursor) -> Iterable[str]:
-    """Return a whole message to be changed, for `rostopic pub TOPIC TYPE`."""
+    """Return a whole message for editing, for `rostopic pub TOPIC TYPE`."""
     if len(cursor.given) != 2:
         return []
     catalogue = _catalogue()
@@ -443,7 +442,7 @@ def message_text(cursor: Cursor) -> Iterable[str]:
 
 
 def request_text(cursor: Cursor) -> Iterable[str]:
-    """Return a whole request to be changed, for `rosservice call SERVICE`."""
+    """Return a whole request for editing, for `rosservice call SERVICE`."""
     from minirospy.introspect.services import service_type
 
     if len(cursor.given) != 1:
@@ -459,12 +458,12 @@ def request_text(cursor: Cursor) -> Iterable[str]:
 def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
     from minirospy.introspect.prototype import prototype
 
-    # Within double quotes a shell for people would read !! as the command before.
+    # Within double quotes an interactive shell would replace !! by the previous command.
     return Text(prototype(spec, catalogue).replace('!!binary ""', "[]"))
 
 
 def _fields(type_: str, path: str) -> list[str]:
-    """Return the fields of a message type's field ``path``."""
+    """Return the fields of the field ``path`` of a message type."""
     catalogue = _catalogue()
     spec = catalogue.message(type_)
     for step in filter(None, path.split("/")):
@@ -480,7 +479,7 @@ def _fields(type_: str, path: str) -> list[str]:
 
 
 def on_one_line(text: str) -> str:
-    """Return a message's text on one line, as YAML allows it too."""
+    """Return a message's YAML on one line."""
     if not isinstance(text, Text) or "\n" not in text:
         return text
     import yaml
@@ -494,7 +493,7 @@ def on_one_line(text: str) -> str:
         elif isinstance(node, yaml.ScalarNode) and "\n" in node.value:
             node.style = '"'
 
-    # As nodes, for a value would be written in another way: a field that is called `on` would become `true`.
+    # Compose nodes, because loading values and dumping them changes them: a field called `on` would become `true`.
     root = yaml.compose(text, yaml.SafeLoader)
     flow(root)
     return Text(
@@ -506,28 +505,28 @@ def on_one_line(text: str) -> str:
 
 
 def pins(cursor: Cursor) -> Iterable[str]:
-    """Return the pins of the virtual board that have something on them; to press, those of buttons."""
+    """Return the pins of the virtual board that are wired; for press, those with buttons."""
     from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the views of the dashboard, and the layouts whose names are no view's."""
+    """Return the dashboard's views, and the layouts that are not named like a view."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))
 
 
 def dashboard_layouts(_: Cursor) -> Iterable[str]:
-    """Return the layouts that come with the dashboard's page."""
+    """Return the layouts that are part of the dashboard's page."""
     from minirospy.web.dashboard.views import LAYOUTS
 
     return LAYOUTS
 
 
 def shells(_: Cursor) -> Iterable[str]:
-    """Return what `minirospy shell` has something for."""
+    """Return the shells that `minirospy shell` supports."""
     from minirospy.workspace.setup_files import SHELLS
 
     return SHELLS

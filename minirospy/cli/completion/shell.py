@@ -1,4 +1,4 @@
-"""`eval "$(minirospy shell)"`: roscd and the like, completion and the environment, without a workspace."""
+"""`eval "$(minirospy shell)"`: roscd and similar functions, completion and the environment, without a workspace."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _parser() -> Parser:
 def _shell(shell: str | None) -> None:
     default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = shell or Path(default).stem
-    # Its program's name on Linux and macOS, and on Windows from version 6 on.
+    # pwsh is PowerShell's program on Linux and macOS, and on Windows from version 6 on.
     name = "powershell" if name == "pwsh" else name
     if name not in SHELLS:
         raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")

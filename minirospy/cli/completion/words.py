@@ -1,4 +1,4 @@
-"""The words of a command line, as shells write them: quotes and escapes taken out, and put in. Pure."""
+"""Remove and add the quotes and escapes in the words of a shell's command line. Pure."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ __all__ = ["POSIX", "POWERSHELL", "Shell", "Word"]
 _VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 _LINE_FEED = "\v"
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
-"""What no shell reads as more than a word."""
+"""Strings that need no quotes in any POSIX shell."""
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
-"""The same there, where a comma makes an array, @ and % have meanings of their own."""
+"""The same for PowerShell, where a comma makes an array, and @ and % have other meanings."""
 
 
 class Word(NamedTuple):
-    """A word without its quotes; the one that is still open at its end was opened at ``text[at:]``."""
+    """A word without its quotes; an unclosed ``quote`` was opened at ``text[at:]``."""
 
     text: str
     quote: str
@@ -28,7 +28,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """How a shell's words are read, and how a candidate for a word is written."""
+    """How to read a shell's words, and how to write a candidate for a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -38,7 +38,7 @@ class Shell(NamedTuple):
 
 
 def _read_posix(word: str) -> Word:
-    """Return a word without its quotes; $NAME outside of single ones is replaced by its value."""
+    """Return a word without its quotes; $NAME is replaced by its value, except within single quotes."""
     text = ""
     quote = ""
     at = read = 0
@@ -65,9 +65,9 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
+    """Return ``text`` in the shell's syntax, in the quotes that the user opened; else a :class:`Text` in double quotes."""
     if word.quote:
-        # A folder's quotes stay open: what is in it comes next.
+        # Leave the quotes of a folder open: the user may continue the path.
         end = "" if text.endswith("/") else word.quote
         return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
     if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
@@ -79,7 +79,7 @@ def _inside(text: str, quote: str) -> str:
     text = text.replace("\n", _LINE_FEED)
     if quote == "'":
         return text.replace("'", r"'\''")
-    # A shell for people puts old commands in place of an exclamation mark, in double quotes too.
+    # An interactive shell expands an exclamation mark from its history, in double quotes as well.
     return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
 
 
@@ -91,7 +91,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Return a word without its quotes; ``quote`` is the one that it began with, whether closed or not."""
+    """Return a word without its quotes; ``quote`` is the one at its start, whether it is closed or not."""
     text = ""
     quote = ""
     read = 0
@@ -114,7 +114,7 @@ def _read_powershell(word: str) -> Word:
 
 
 def _write_powershell(text: str, word: Word) -> str:
-    """Return ``text`` in the quotes that its word began with; else in single ones where it needs any."""
+    """Return ``text`` in the quotes that the user opened, else in single quotes if it needs any."""
     if word.quote == '"':
         return '"' + re.sub(r'([`$"])', r"`\1", text) + '"'
     if word.quote or not _PLAIN_IN_POWERSHELL.match(text):

@@ -1,1 +1,1 @@
-"""The commands of ROS: `roscore`, `rosrun`, `roslaunch`, `rostopic` and their family."""
+"""ROS's commands: `roscore`, `rosrun`, `roslaunch`, `rostopic` and others."""

@@ -1,4 +1,4 @@
-"""Reading of bags, of any version."""
+"""The interface for reading bags of any version."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 __all__ = ["BagReader", "Block", "Position", "StoredMessage"]
 
 Position = int | tuple[int, int]
-"""Where a message's record is: its chunk's position and its offset in there; in version 1.2 its position in the file."""
+"""A message's location: its chunk's position and its offset in the chunk; in version 1.2 its position in the file."""
 
 
 class StoredMessage(NamedTuple):
-    """A message: its connection, the time of its reception in nanoseconds, its bytes, and its place."""
+    """A message: its connection, its receive time in nanoseconds, its bytes, and its location."""
 
     connection: Connection
     time: int
@@ -27,10 +27,10 @@ class StoredMessage(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Messages that follow each other in the order of time, from one chunk.
+    """Consecutive messages in the order of time, from one chunk.
 
-    ``found`` are time, rank (the place of its connection among those that were wanted), offset of the record, and start
-    and end of the body in ``data``. ``chunk`` is its position; None in bags of version 1.2.
+    ``found`` contains time, rank (the index of its connection among the requested ones), offset of the record, and start
+    and end of the body in ``data``. ``chunk`` is the chunk's position; None in bags of version 1.2.
     """
 
     chunk: int | None
@@ -39,16 +39,13 @@ class Block(NamedTuple):
 
 
 class BagReader(ABC):
-    """The interface of the readers of each version."""
+    """The common interface of the readers for each version."""
 
-    version: int
-    """200 for 2.0."""
-    indexed = True
-    """Whether the bag has an index, or was made to have one."""
+    version: int  # 200 means 2.0
+    indexed = True  # the bag has an index, or one was rebuilt
     stream: BinaryIO
     connections: dict[int, Connection]
-    chunks: Sequence[ChunkInfo]
-    """The chunks in the order of the file; none in bags of version 1.2."""
+    chunks: Sequence[ChunkInfo]  # the chunks in file order; empty in bags of version 1.2
 
     @property
     def version_name(self) -> str:
@@ -56,22 +53,22 @@ class BagReader(ABC):
         return f"{self.version // 100}.{self.version % 100}" + ("" if self.indexed else " (unindexed)")
 
     def prepare(self) -> None:
-        """Find the connections of a bag that has no index, as version 1.2 allows. Raise BagFormatError."""
+        """Find the connections of a bag without an index, as version 1.2 allows. Raise BagFormatError."""
         return
 
     @abstractmethod
     def blocks(
         self, connections: Sequence[int], start: int | None = None, end: int | None = None
     ) -> Iterator[Block]:
-        """Yield what :meth:`messages` yields, in blocks: for those who read millions."""
+        """Yield the same messages as :meth:`messages`, in blocks, for reading millions of messages."""
 
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
         """Yield the messages of these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
 
-        They come in the order of time; those of one time in the order of the connections. Raise BagFormatError if
-        the bag is damaged, when the messages before the damage have been yielded.
+        They are in the order of time; messages with equal times in the order of the connections. If the bag is damaged, raise
+        BagFormatError after yielding the messages before the damage.
         """
         self.prepare()
         wanted = list(self.connections if connections is None else connections)
@@ -83,18 +80,18 @@ class BagReader(ABC):
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:
-        """Return the message at a position, as an entry or another message has it. Raise BagFormatError."""
+        """Return the message at a position taken from an entry or another message. Raise BagFormatError."""
 
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """Return the indexes of these connections, and read those that have not been read. Raise BagFormatError."""
+        """Return the indexes of these connections, reading those that have not been read yet. Raise BagFormatError."""
 
     def times(self, connections: Iterable[int]) -> list[array[int]]:
-        """Return the times of the messages of these connections, in arrays for the caller to keep. Raise BagFormatError."""
+        """Return the times of these connections' messages, in arrays that the caller may keep. Raise BagFormatError."""
         return [array("Q", index.times) for index in self.index(connections)]
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """Return the headers of the chunks by their positions. Raise BagUnindexedError."""
+        """Return chunk position -> the chunk's header. Raise BagUnindexedError."""
         return {}
 
     def size(self) -> int:
@@ -102,5 +99,5 @@ class BagReader(ABC):
         return size_of(self.stream)
 
     def close(self) -> None:
-        """End what helps reading; the stream stays open."""
+        """Release the reader's resources, such as threads; the stream stays open."""
         return

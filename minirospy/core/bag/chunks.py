@@ -1,7 +1,7 @@
-"""The chunks of a bag's stream: their headers, their decompressed data, and the messages in it.
+"""The chunks of a bag: their headers, their decompressed data, and the messages in it.
 
 Messages are found by scanning a chunk's data, not by its index records: that costs no more, and a damaged index cannot
-lead to a wrong message. The next chunks are decompressed ahead in threads, as bz2 and lz4 release the GIL.
+lead to a wrong message. Threads decompress the next chunks in advance, since bz2 and lz4 release the GIL.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["ChunkStream", "Found", "StoredChunk", "scan", "scan_into", "size_of"
 
 
 class StoredChunk(NamedTuple):
-    """A chunk's header, and where its data is in the file."""
+    """A chunk's header, and the position of its data in the file."""
 
     chunk: Chunk
     data_position: int
@@ -39,19 +39,19 @@ class StoredChunk(NamedTuple):
 Found = tuple[int, int, int, int, int]
 """A message in a chunk's data: time, rank of its connection, offset of its record, start and end of its body.
 
-As plain tuples they sort as rosbag orders messages: by time, those of one time by connection, then by place.
+Plain tuples, which sort as rosbag orders messages: by time, then by connection, then by offset.
 """
 
 
 class Ranks(Protocol):
-    """The rank of a connection among those whose messages are wanted, or None: a dict, for example."""
+    """A mapping such as a dict: the rank of a connection among the requested ones, or None if it was not requested."""
 
     def get(self, number: int, /) -> int | None:
-        """Return the rank."""
+        """Return the rank of a connection, or None."""
 
 
 class _Ahead:
-    """A chunk that another thread decompresses."""
+    """A chunk that another thread decompresses in advance."""
 
     def __init__(self, executor: Executor, chunk: Chunk, data: bytes) -> None:
         self._is_cancelled = False
@@ -64,7 +64,7 @@ class _Ahead:
         return self._future.result()
 
     def cancel(self) -> None:
-        """Have the thread stop soon."""
+        """Let the thread stop soon."""
         self._is_cancelled = True
         self._future.cancel()
 
@@ -91,7 +91,7 @@ class ChunkStream:
         return self._headers[position]
 
     def set_header(self, position: int, header: StoredChunk) -> None:
-        """Have the chunk at a position read by this header instead of the one in the file."""
+        """Use this header for the chunk at a position, instead of the one in the file."""
         self._headers[position] = header
 
     def data(self, position: int) -> bytes:
@@ -100,7 +100,7 @@ class ChunkStream:
             try:
                 return ahead.result()
             finally:
-                # After Ctrl-C nobody waits for it.
+                # After Ctrl-C the result is no longer needed.
                 ahead.cancel()
         chunk = self.header(position).chunk
         try:
@@ -111,9 +111,9 @@ class ChunkStream:
     def pick(
         self, info: ChunkInfo, ranks: Ranks, known: Mapping[int, Connection]
     ) -> tuple[bytes, list[Found]] | None:
-        """Return bodies and places of the few messages that are wanted of a chunk, without reading the rest of it.
+        """Return the bodies and locations of a few requested messages in a chunk, without reading the rest of it.
 
-        ``known``: see :func:`scan`. None if that does not pay, or if an index is damaged: then the chunk is to be scanned.
+        ``known``: see :func:`scan`. Return None if scanning is cheaper or an index is damaged: then the chunk must be scanned.
         """
         chunk, data_position = header = self.header(info.position)
         wanted = sum(count for number, count in info.counts.items() if ranks.get(number) is not None)
@@ -129,7 +129,7 @@ class ChunkStream:
             return None
 
     def prepare(self, positions: Iterable[int]) -> None:
-        """Start to decompress the chunks at these positions; forget others that were started."""
+        """Start to decompress the chunks at these positions; cancel others that were started."""
         wanted = [
             position
             for position in positions
@@ -145,7 +145,7 @@ class ChunkStream:
                 self._ahead[position] = _Ahead(self._start(), chunk, data)
 
     def close(self) -> None:
-        """End the threads; the stream stays open."""
+        """Stop the threads; the stream stays open."""
         while self._ahead:
             self._ahead.popitem()[1].cancel()
         if self._executor is not None:
@@ -165,9 +165,9 @@ class ChunkStream:
     def _entries(
         self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
-        """Return offset, time, rank and connection of the messages that are wanted, from a chunk's index records.
+        """Return offset, time, rank and connection of the requested messages, from a chunk's index records.
 
-        And the offsets of all messages, by connection.
+        Also return the offsets of all messages, by connection.
         """
         limit = size_of(self.stream)
         self.stream.seek(header.end)
@@ -190,9 +190,9 @@ class ChunkStream:
         all_offsets: list[array[int]],
         known: Mapping[int, Connection],
     ) -> None:
-        """Compare the record of each connection, which is in front of its first message, with that of the index.
+        """Compare each connection's record, which precedes its first message, with the one in the bag's index.
 
-        Once for each connection. Raise BagFormatError if they differ, or where the index of the chunk is wrong.
+        This is done once per connection. Raise BagFormatError if they differ, or if the chunk's index is wrong.
         """
         limit = size_of(self.stream)
         for first, _, _, number in entries:
@@ -215,7 +215,10 @@ class ChunkStream:
     def _picked(
         self, start: int, size: int, entries: list[tuple[int, int, int, int]]
     ) -> tuple[bytes, list[Found]]:
-        """Return the bodies of messages one behind the other. Raise BagFormatError if the index is wrong."""
+        """Return the concatenated bodies of the messages, and their locations there.
+
+        Raise BagFormatError if the index is wrong.
+        """
         prefixes = {number: encoding.message_prefixes(number) for *_, number in entries}
         bodies: list[bytes] = []
         found: list[Found] = []
@@ -246,13 +249,14 @@ class ChunkStream:
 
 
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
-"""Threads that decompress ahead, and chunks that they are ahead: the reader's own thread needs a core, too."""
+"""Number of threads that decompress in advance, and of chunks in advance; leaves one core for the reader's thread."""
 
 
-_MAX_AHEAD = 64 * 1024 * 1024  # bytes of a chunk that is decompressed ahead: several are in memory at a time
+# bytes; larger chunks are not decompressed in advance, since several would be in memory
+_MAX_AHEAD = 64 * 1024 * 1024
 
+# Chunk bytes per requested message; above this, only these messages are read instead of the whole chunk
 PICK_SIZE = 32 * 1024
-"""Bytes of a chunk for each message that is wanted of it, above which only those messages are read."""
 
 
 def size_of(stream: BinaryIO) -> int:
@@ -261,7 +265,7 @@ def size_of(stream: BinaryIO) -> int:
 
 
 class _Layout(NamedTuple):
-    """A message's header as one of the writers orders its fields: 46 bytes with two constant parts."""
+    """The field order of a message's header by one of the writers: 46 bytes with two constant parts."""
 
     form: struct.Struct
     first: bytes
@@ -278,10 +282,10 @@ _STAMP_AND_SIZE = struct.Struct("<III")
 
 
 def scan(data: bytes, ranks: Ranks, known: Mapping[int, Connection]) -> list[Found]:
-    """Return the messages of a chunk's data whose connections have ``ranks``, in the order of the data.
+    """Return the messages in a chunk's data whose connections have ``ranks``, in the order of the data.
 
-    ``known`` are all connections of the bag, by its index: a message of another one is damage, and so is a connection that
-    has another topic or type in the data. Raise BagFormatError.
+    ``known`` are all connections in the bag's index: a message of another connection means damage, and so does a connection
+    with another topic or type in the data. Raise BagFormatError.
     """
     found: list[Found] = []
     connections: dict[int, Connection] = {}
@@ -300,7 +304,7 @@ def scan_into(
 ) -> int:
     """Add the messages of a chunk's data to ``found``, and its connections to ``connections``; return the data's size.
 
-    Raise BagFormatError, whose position is where the whole records end.
+    Raise BagFormatError, with the end of the complete records as its position.
     """
     add = found.append
     end, last_head = len(data), len(data) - _HEAD
@@ -348,7 +352,7 @@ _COMPARED = ("type", "md5sum", "message_definition")
 
 
 def _check_connection(stored: Connection, known: Mapping[int, Connection]) -> None:
-    """Raise BagFormatError if the index has another topic or type for a connection that was found in a chunk."""
+    """Raise BagFormatError if the index has another topic or type for a connection found in a chunk."""
     indexed = known.get(stored.id, stored)
     if indexed.topic == stored.topic and all(
         indexed.header.get(name) == stored.header.get(name) for name in _COMPARED

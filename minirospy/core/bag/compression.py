@@ -1,7 +1,7 @@
-"""Compression of chunks: bytes in, bytes out, by the name that a chunk's header has (none, bz2, lz4; in MCAP files zstd).
+"""Compression of chunks: bytes in, bytes out, by the name in a chunk's header (none, bz2, lz4; in MCAP files zstd).
 
 An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a checksum of the
-content, neither checksums of blocks nor the content's size. Every standard frame is read. lz4 is imported when a chunk
+content, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk
 needs it. Sources: http://wiki.ros.org/Bags/Format/2.0, https://github.com/lz4/lz4/blob/dev/doc/lz4_Frame_format.md.
 """
 
@@ -30,24 +30,22 @@ __all__ = [
 NONE = "none"
 BZ2 = "bz2"
 LZ4 = "lz4"
-COMPRESSIONS = (NONE, BZ2, LZ4)
-"""The names of the compressions, in the order in which rosbag lists them."""
+COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
-"""Bytes of a compressed chunk's data: a message of 1 GiB, the most that a connection can carry, and what is before it."""
+"""Maximum bytes of a compressed chunk's data: a message of 1 GiB, the limit of a connection, and the records before it."""
 
-_MAX_LZ4 = 256
-"""How many times as long as its LZ4 block data can be."""
-_MAX_STREAMS = 20_000  # bz2 streams of a chunk; parallel compressors write one for each 100 kB
-_PIECE = 16 * 1024 * 1024  # bytes that are decompressed at a time, while Ctrl-C waits
-_INPUT = 256 * 1024  # bytes of compressed data that are given to a library at a time
+_MAX_LZ4 = 256  # maximum ratio of data to its LZ4 block
+_MAX_STREAMS = 20_000  # bz2 streams per chunk; parallel compressors write one for each 100 kB
+_PIECE = 16 * 1024 * 1024  # bytes to decompress at a time, during which Ctrl-C waits
+_INPUT = 256 * 1024  # bytes of compressed data to pass to a library at a time
 
 Buffer = bytes | bytearray | memoryview
 _T = TypeVar("_T")
 
 
 def check_compression(name: str) -> None:
-    """Raise BagCompressionError unless chunks can be compressed by ``name`` on this machine."""
+    """Raise BagCompressionError unless this machine can compress chunks with ``name``."""
     if name not in COMPRESSIONS:
         raise BagCompressionError(name, f"it must be one of: {', '.join(COMPRESSIONS)}")
     if name == LZ4:
@@ -55,22 +53,22 @@ def check_compression(name: str) -> None:
 
 
 def compress(name: str, data: Buffer) -> bytes:
-    """Return a chunk's data compressed by ``name``. Raise BagCompressionError."""
+    """Return a chunk's data compressed with ``name``. Raise BagCompressionError."""
     return _choose(_COMPRESS, name)(data)
 
 
 def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
-    """Return a chunk's data, which must have ``size`` bytes once it is decompressed.
+    """Return a chunk's data, which must have ``size`` bytes after decompression.
 
-    Never more than ``size`` bytes and a piece are allocated. ``is_cancelled`` is asked between pieces, in another thread
-    than the caller's perhaps. Raise BagFormatError if the data is damaged, has another size or is cancelled,
+    Never allocates more than ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly by another
+    thread than the caller's. Raise BagFormatError if the data is damaged, has another size or is cancelled,
     BagCompressionError if the compression is unknown or its library is missing.
     """
     return _decompressed(_choose(_DECOMPRESS, name), name, data, size, is_cancelled)
 
 
 def decompress_mcap(name: str, data: bytes, size: int) -> bytes:
-    """Return the data of a chunk of an MCAP file; ``name`` is zstd, lz4, or "" for none. Raise as :func:`decompress`."""
+    """Return the data of a chunk in an MCAP file; ``name`` is zstd, lz4, or "" for none. Raise as :func:`decompress`."""
     if not name:
         return data
     return _decompressed(_choose(_DECOMPRESS_MCAP, name), name, data, size, lambda: False)
@@ -131,10 +129,10 @@ def _compress_lz4(data: Buffer) -> bytes:
 
 
 class _Output:
-    """The data as far as it is decompressed; ``size`` bytes are expected. Raise BagFormatError if there are more.
+    """Collects decompressed data, of which ``size`` bytes are expected. Raise BagFormatError if there are more.
 
-    Much data comes in pieces: a library would gather them itself, and have all of them twice when it joins them, while
-    Ctrl-C waits for it.
+    Large data is decompressed in pieces: a library would need twice the memory to join its own pieces, while Ctrl-C waits
+    for it.
     """
 
     def __init__(self, size: int, is_cancelled: Callable[[], bool]) -> None:
@@ -146,7 +144,7 @@ class _Output:
 
     @property
     def room(self) -> int:
-        """The bytes to ask for: one more than is expected, so that a stream's end is seen and its checksum compared."""
+        """The bytes to request: one more than expected, so that the stream's end is reached and its checksum verified."""
         return min(self.size - self._length + 1, _PIECE)
 
     def add(self, piece: bytes) -> None:
@@ -178,7 +176,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
     view, streams = memoryview(data), 0
     stream: bz2.BZ2Decompressor | None = None
-    # In parts, as what follows a stream is copied: of a million short streams, a million times.
+    # In parts, since each stream copies the data that follows it: a million times for a million short streams.
     for start in range(0, len(data), _INPUT):
         part: Buffer = view[start : start + _INPUT]
         while part:
@@ -203,10 +201,10 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
     if output.size > len(data) * _MAX_LZ4:
-        # The library allocates what is expected before it looks at the data.
+        # The library allocates the expected size before it reads the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
-    # In parts, as the library copies what is left of them each time.
+    # In parts, since the library copies the remaining data each time.
     for start in range(0, len(data), _INPUT):
         part = data[start : start + _INPUT]
         while part or not (stream.eof or stream.needs_input):

@@ -1,6 +1,6 @@
-"""The index of a bag: for each connection the times and places of its messages, 16 bytes a message.
+"""The index of a bag: the times and locations of each connection's messages, 16 bytes per message.
 
-It is read from the index records behind the chunks when somebody needs it; reading messages in the order of time does not.
+It is read on demand from the index records after the chunks; reading messages in the order of time does not need it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _ENTRY_SIZE = 12
 
 
 class Entry(NamedTuple):
-    """A message's time and place: its chunk's position, and its record's offset in the chunk's data.
+    """A message's time and location: its chunk's position, and its record's offset in the chunk's data.
 
-    In bags of version 1.2, which have no chunks, ``chunk`` is None and ``offset`` the position in the file.
+    In bags of version 1.2, which have no chunks, ``chunk`` is None and ``offset`` is the position in the file.
     """
 
     time: int
@@ -88,7 +88,7 @@ class ConnectionIndex:
     def between(
         self, start: int | None = None, end: int | None = None, *, backwards: bool = False
     ) -> Iterator[Entry]:
-        """Yield the entries from ``start`` to ``end``, both included."""
+        """Yield the entries from time ``start`` to ``end``, both included."""
         first = 0 if start is None else bisect_left(self.times, start)
         last = len(self.times) if end is None else bisect_right(self.times, end)
         places = range(first, last)
@@ -103,9 +103,9 @@ class ConnectionIndex:
 
 
 def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[int]]:
-    """Read the data of an index record of version 2.0: times, offsets; the stream is left behind the record.
+    """Read the data of an index record of version 2.0: times, offsets; the stream is left after the record.
 
-    The data's size is taken from the number of entries: ROS C Turtle wrote a wrong length. Raise BagFormatError.
+    The data's size is computed from the number of entries, since ROS C Turtle wrote a wrong length. Raise BagFormatError.
     """
     record.expect(records.OP_INDEX_DATA)
     if (version := record.uint32("ver")) != 1:
@@ -126,7 +126,7 @@ def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[in
 
 
 def merge_entries(indexes: Iterable[Iterable[Entry]], *, backwards: bool = False) -> Iterator[Entry]:
-    """Yield the entries of several connections in the order of time; those of one time in the order of ``indexes``."""
+    """Yield the entries of several connections in the order of time; entries with equal times in the order of ``indexes``."""
     return merge(*indexes, key=_time, reverse=backwards)
 
 

@@ -1,4 +1,4 @@
-"""The contents of a bag, as `rosbag info` prints them: a reader in, a summary out, and its text or YAML.
+"""The summary of a bag, as `rosbag info` prints it: a reader in, a summary out, as text or YAML.
 
 Source: http://wiki.ros.org/rosbag/Commandline#info. The texts are those of ROS, which programs parse.
 """
@@ -31,14 +31,13 @@ __all__ = [
 ]
 
 _NUMPY_PAYS = 100_000
-"""Times whose median numpy finds sooner than Python does, the import of numpy included."""
+"""Number of times above which numpy computes the median faster than Python, including numpy's import."""
 
-_BLOCK = 1 << 16
-"""Times that numpy handles together."""
+_BLOCK = 1 << 16  # number of times that numpy processes together
 
 
 class Topic(NamedTuple):
-    """A topic: the type of its first connection, messages, connections, and their rate, if it is known, in Hz."""
+    """A topic: its first connection's type, the number of messages and connections, and the rate in Hz, if known."""
 
     name: str
     type: str
@@ -48,7 +47,7 @@ class Topic(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The number of a bag's chunks of one compression; bytes before and after it."""
+    """The number of a bag's chunks with one compression, and their bytes before and after it."""
 
     compression: str
     chunks: int
@@ -57,7 +56,7 @@ class Stored(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """The contents of a bag. ``start`` and ``end`` in seconds are None if it has no messages."""
+    """The summary of a bag. ``start`` and ``end`` in seconds are None if it has no messages."""
 
     path: str | None
     version: str
@@ -66,13 +65,12 @@ class Summary(NamedTuple):
     end: float | None
     messages: int
     stored: list[Stored]
-    types: list[tuple[str, str]]
-    """Types and their md5sums."""
+    types: list[tuple[str, str]]  # types and their md5sums
     topics: list[Topic]
 
 
 def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summary:
-    """Return what a bag holds; with ``frequencies`` the whole index is read for the topics' rates. Raise BagFormatError."""
+    """Return a bag's summary; with ``frequencies``, read the whole index for the topics' rates. Raise BagFormatError."""
     version = reader.version_name
     connections = list(reader.connections.values())
     counts: Counter[int] = Counter()
@@ -92,7 +90,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         end = seconds(max(index.times[-1] for index in indexes if index))
 
     if frequencies:
-        # ROS's Python writer stores connections that have no message; its reader forgets them.
+        # ROS's Python writer also stores connections without messages; its reader omits them.
         connections = [each for each in connections if counts[each.id]]
     types: dict[str, str] = {}
     by_topic: dict[str, list[Connection]] = {}
@@ -128,7 +126,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
 
 
 def compression_of(reader: BagReader) -> list[Stored]:
-    """Return how a bag's chunks are stored, the most frequent compression first."""
+    """Return the compressions of a bag's chunks, the most frequent one first."""
     found: dict[str, list[int]] = {}
     for header in reader.chunk_headers().values():
         sums = found.setdefault(header.chunk.compression, [0, 0, 0])
@@ -139,13 +137,13 @@ def compression_of(reader: BagReader) -> list[Stored]:
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded as genpy's to_sec does it."""
+    """Return a time in seconds, rounded like genpy's to_sec."""
     whole, rest = divmod(nanoseconds, 10**9)
     return whole + rest / 1e9
 
 
 def as_text(summary: Summary) -> str:
-    """Return what `rosbag info` prints."""
+    """Return the output of `rosbag info`."""
     rows = [("path", summary.path)] if summary.path else []
     rows.append(("version", summary.version))
     if summary.start is None or summary.end is None:
@@ -171,7 +169,7 @@ def as_text(summary: Summary) -> str:
 
 
 def as_yaml(summary: Summary) -> str:
-    """Return what `rosbag info -y` prints."""
+    """Return the output of `rosbag info -y`."""
     lines = [f"path: {summary.path}"] if summary.path else []
     lines.append(f"version: {summary.version}")
     if summary.start is None or summary.end is None:
@@ -208,7 +206,7 @@ def as_yaml(summary: Summary) -> str:
 
 
 def value_of(text: str, key: str) -> str:
-    """Return the value of a key in what :func:`as_yaml` gives, such as ``start`` or ``topics[0].type``, as -k prints it.
+    """Return the value of a key in the output of :func:`as_yaml`, such as ``start`` or ``topics[0].type``, as -k prints it.
 
     Raise LookupError if it does not exist.
     """
@@ -229,7 +227,7 @@ def value_of(text: str, key: str) -> str:
 
 
 def _printed(value: object) -> str:
-    """Return an item of a list as -k prints it."""
+    """Return a list item as -k prints it."""
     if not isinstance(value, dict):
         return f"  {value}"
     return "\n  ".join(f"{name}: {each}" for name, each in value.items())
@@ -252,7 +250,7 @@ def _median(times: list[array[int]]) -> float:
 
 
 def _median_by_numpy(times: list[array[int]]) -> float:
-    """Return the same in the memory of the times themselves, which are overwritten."""
+    """Return the same, computed in the memory of ``times``, which is overwritten."""
     import numpy as np
 
     joined = np.frombuffer(times[0], np.uint64)
@@ -318,7 +316,7 @@ def _topic_lines(topics: Sequence[Topic], widest_type: int) -> Iterable[str]:
 
 
 def _listed(name: str, lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Return rows of which only the first has the name."""
+    """Return rows of which only the first one has the name."""
     return [("" if number else name, line) for number, line in enumerate(lines)]
 
 
@@ -349,7 +347,7 @@ def _local_time(stamp: float) -> str:
     try:
         return time.strftime("%b %d %Y %H:%M:%S", time.localtime(stamp)) + fraction
     except (OSError, OverflowError, ValueError):
-        # Beyond what the system's calendar knows, as in a damaged bag.
+        # The time is out of the system calendar's range, as in a damaged bag.
         return f"{stamp:.2f}"
 
 

@@ -1,4 +1,4 @@
-"""An MCAP file with messages of ROS 1 in, connections and messages in the order of time out.
+"""Read an MCAP file with messages of ROS 1: connections and messages in the order of time.
 
 Opening reads the summary at the file's end. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
 """
@@ -29,20 +29,18 @@ if TYPE_CHECKING:
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
-_MAX_NAME = 32  # bytes of the name of a compression
-_HEAD = struct.Struct("<BQ")
-"""In front of each record: its opcode, and the bytes of its content."""
-_MESSAGE = struct.Struct("<HIQQ")
-"""At the start of a message: its channel, sequence, time, and the time of its publication."""
+_MAX_NAME = 32  # bytes of a compression's name
+_HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
+_MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
-"""A record's head; a chunk's first and last time, bytes of its data in memory, their CRC, bytes of its compression's name."""
+"""The head of a chunk record: record head; first and last time, uncompressed size, CRC, length of the compression's name."""
 _LENGTH = struct.Struct("<Q")
+# Afooter with its record head: the positions of the summary and of its offsets, the CRC
 _FOOTER = struct.Struct("<BQQQI")
-"""A record's head; the positions of the summary and of its offsets, the CRC."""
 
 
 def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
-    """Return a reader of the bag or MCAP file that starts at the stream's position. Raise what those raise."""
+    """Return a reader of the bag or MCAP file that starts at the stream's position. Raise the exceptions of either reader."""
     start = stream.tell()
     magic = stream.read(len(MAGIC))
     stream.seek(start)
@@ -52,8 +50,8 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 class McapReader(BagReader):
     """An MCAP file of profile ``ros1``; its channels are the connections.
 
-    Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError if the file is damaged,
-    McapUnindexedError where its summary is missing or damaged, BagError if the extra is missing.
+    Channels with other encodings are not read; ``foreign`` contains their topics. Raise BagFormatError if the file is
+    damaged, McapUnindexedError if its summary is missing or damaged, BagError if the extra is missing.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -94,7 +92,7 @@ class McapReader(BagReader):
 
     @property
     def version_name(self) -> str:
-        """The format, in place of a bag's version."""
+        """The name of the format, in place of a bag's version."""
         return "MCAP 0"
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
@@ -109,9 +107,8 @@ class McapReader(BagReader):
         wanted = {number: self.connections[number] for number in chosen}
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
-        # A chunk is read when its first message may be the next one; its data is in memory once, and so are those of others
-        # only as far as they overlap with it in time.
-        # No two have one position.
+        # A chunk is read when its first message may be the next one. Each chunk's data is in memory once, together
+        # with other chunks' data only if they overlap in time. Positions are unique, so runs are never compared.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:
@@ -127,7 +124,7 @@ class McapReader(BagReader):
                 heappop(heap)
 
     def _runs(self, wanted: Collection[int], first: int, last: int) -> list[_Run]:
-        """Return what has to be read for these channels and times. Raise BagFormatError."""
+        """Return the runs to read for these channels and times. Raise BagFormatError."""
         indexes = self._summary.chunk_indexes
         if not indexes:
             return self._unindexed_runs()
@@ -136,7 +133,7 @@ class McapReader(BagReader):
             for index in indexes
             if index.message_end_time >= first
             and index.message_start_time <= last
-            # Without message indexes, a chunk may have each channel.
+            # Without message indexes, a chunk may contain any channel.
             and not (index.message_index_offsets and index.message_index_offsets.keys().isdisjoint(wanted))
         ]
 
@@ -174,11 +171,11 @@ class McapReader(BagReader):
             yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
 
     def message_at(self, position: Position) -> StoredMessage:
-        """Raise BagFormatError: messages are read in order only."""
+        """Raise BagFormatError: messages can only be read in order."""
         raise BagFormatError("messages of MCAP files are read in order only")
 
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """See :meth:`BagReader.index`; the file is read whole."""
+        """See :meth:`BagReader.index`; reads the whole file."""
         indexes = {number: ConnectionIndex() for number in connections}
         for message in self.messages(list(indexes)):
             indexes[message.connection.id].extend([message.time], [0], 0)
@@ -186,7 +183,7 @@ class McapReader(BagReader):
 
 
 class _ChunkHeader(NamedTuple):
-    """What is in front of a chunk's data, and where the data is."""
+    """The fields before a chunk's data, and the position of the data."""
 
     start: int
     compression: str
@@ -196,7 +193,7 @@ class _ChunkHeader(NamedTuple):
 
 
 class _Run:
-    """The messages of a chunk, in the order of time: time, place in the chunk, channel, start and end of the body."""
+    """The messages of a chunk, in the order of time: time, index in the chunk, channel, start and end of the body."""
 
     def __init__(self, position: int, start: int) -> None:
         self.position = position
@@ -213,7 +210,7 @@ class _Run:
         first: int,
         last: int,
     ) -> None:
-        """Read the chunk, and find the messages of these channels and times. Raise BagFormatError."""
+        """Read the chunk, and find the messages with these channels and times. Raise BagFormatError."""
         from mcap.opcode import Opcode
 
         with mcap_faults():
@@ -262,7 +259,7 @@ class _Run:
 
 
 class _Loose(_Run):
-    """The messages outside of chunks; ``places`` are positions and lengths of their records."""
+    """The messages outside of chunks; ``places`` are the positions and lengths of their records."""
 
     def __init__(self, position: int, start: int) -> None:
         super().__init__(position, start)
@@ -296,7 +293,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the library: it may ask for any length, and gets what there is without claiming memory for the rest."""
+    """A stream for the library, which may request any length: returns available data without allocating the full length."""
 
     def __init__(self, data: bytes) -> None:
         self._stream = BytesIO(data)
@@ -307,7 +304,7 @@ class _Bounded:
 
 
 def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
-    """Return the summary at the file's end; None if there is none. Raise BagFormatError, and what the library raises."""
+    """Return the summary at the file's end; None if there is none. Raise BagFormatError, and the library's exceptions."""
     from mcap import records
     from mcap.opcode import Opcode
     from mcap.stream_reader import StreamReader
@@ -326,7 +323,7 @@ def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
     stream.seek(start)
     found = Summary()
     summary = _Bounded(stream.read(size - start))
-    # Chunks have no place here, and are not decompressed.
+    # A summary contains no chunks; do not decompress any.
     for record in StreamReader(summary, skip_magic=True, emit_chunks=True).records:  # type: ignore[arg-type]
         match record:
             case records.Statistics():
@@ -369,7 +366,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunks; the first one has the counts of all, which the summary does not have for each."""
+    """Return the chunks; each one has the counts of the whole file, since the summary has none per chunk."""
     assert summary.statistics is not None
     counts = dict(summary.statistics.channel_message_counts)
     infos = []

@@ -1,6 +1,6 @@
-"""Repair of an MCAP file whose end is missing or damaged: its summary is made again from its chunks.
+"""Repair an MCAP file whose end is missing or damaged: rebuild its summary from its chunks.
 
-Every whole chunk is recovered; one whose data is damaged is left out of the index. Source: https://mcap.dev/spec.
+Every complete chunk is recovered; a chunk with damaged data is left out of the index. Source: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -31,21 +31,17 @@ if TYPE_CHECKING:
 
 __all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
-MAGIC = b"\x89MCAP0\r\n"
-"""The first and the last bytes of a file."""
+MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a file
 
-_HEAD = struct.Struct("<BQ")
-"""In front of each record: its opcode, and the bytes of its content."""
-_MESSAGE = struct.Struct("<HIQ")
-"""At the start of a message: its channel, sequence and time."""
+_HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
+_MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time
 
-_Entries = dict[int, list[tuple[int, int]]]
-"""Times and offsets of a chunk's messages, by channel."""
+_Entries = dict[int, list[tuple[int, int]]]  # channel -> times and offsets of a chunk's messages
 
 
 @contextlib.contextmanager
 def mcap_faults() -> Iterator[None]:
-    """Turn what the library raises on damaged files into BagFormatError."""
+    """Convert the library's exceptions on damaged files into BagFormatError."""
     from mcap.exceptions import McapError
     from zstandard import ZstdError
 
@@ -54,7 +50,8 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # Of the decompressors, of lengths that no memory holds, and of seeking before the start of a short file.
+        # From the decompressors, from lengths that exceed the memory, and from seeking before the start of a short
+        # file.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
@@ -67,7 +64,7 @@ def chunk_data(name: str, data: bytes, size: int) -> bytes:
 
 
 class _Recovered(NamedTuple):
-    """A chunk, the messages of each of its channels, and where it ends, with its message indexes."""
+    """A chunk, the messages of each of its channels, and its end including its message indexes."""
 
     info: ChunkIndex
     counts: Counter[int]
@@ -75,10 +72,10 @@ class _Recovered(NamedTuple):
 
 
 class McapRepair:
-    """Makes the summary of an MCAP file again, in place. The library is installed.
+    """Rebuilds the summary of an MCAP file, in place. The library must be installed.
 
     ``limit``: bytes of the stream that are known to be written, if not all are. After :meth:`run`, ``problems`` are lines
-    about what could not be recovered.
+    about data that could not be recovered.
     """
 
     def __init__(self, stream: BinaryIO, limit: int | None = None) -> None:
@@ -92,11 +89,10 @@ class McapRepair:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._has_loose = False
-        self._entries: _Entries = {}
-        """Of the last chunk, until its message indexes have been read."""
+        self._entries: _Entries = {}  # of the last chunk, until its message indexes have been read
 
     def run(self) -> Iterator[int]:
-        """Read the records; yield the position of each. Raise BagFormatError if not even the header is whole."""
+        """Read the records; yield the position of each. Raise BagFormatError if even the header is incomplete."""
         from mcap.opcode import Opcode
 
         self._stream.seek(0)
@@ -122,7 +118,7 @@ class McapRepair:
             raise BagFormatError("the header of the MCAP file is not whole")
 
     def apply(self) -> int:
-        """Write the summary behind the last chunk for which the disk has room; return the messages. Raise OSError."""
+        """Write the summary after the last chunk that leaves disk space for it; return the message count. Raise OSError."""
         tail = self._message_indexes() if self._entries else b""
         while True:
             self._stream.seek(self._end)
@@ -138,7 +134,7 @@ class McapRepair:
             return sum(chunk.counts.total() for chunk in self._chunks)
 
     def _content(self, position: int) -> tuple[int, bytes] | None:
-        """Return opcode and content of the record at a position; None if it is not whole."""
+        """Return opcode and content of the record at a position; None if it is incomplete."""
         if position + _HEAD.size > self._limit:
             return None
         self._stream.seek(position)
@@ -159,7 +155,7 @@ class McapRepair:
             self._add_message_index(records.MessageIndex.read(stream), position, length)
             return
         if self._entries:
-            # A chunk has all message indexes, or none.
+            # The message indexes of the last chunk are incomplete: discard them, since a chunk has all or none.
             self._chunks[-1].info.message_index_offsets.clear()
             self._chunks[-1].info.message_index_length = 0
             self._entries = {}
@@ -251,7 +247,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return the message indexes of a last chunk behind which they are not whole, and enter them into its index."""
+        """Return the message indexes of a last chunk whose own are incomplete, and add them to its chunk index."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 
@@ -265,7 +261,7 @@ class McapRepair:
         return bytes(builder.end())  # type: ignore[no-untyped-call]
 
     def _write(self, tail: bytes) -> None:
-        """Write the file's end at the stream's position: ``tail``, the summary, the footer."""
+        """Write the file's end at the stream's position: ``tail``, the summary, and the footer."""
         from mcap.data_stream import RecordBuilder
         from mcap.opcode import Opcode
         from mcap.records import DataEnd, Footer, SummaryOffset
@@ -300,7 +296,7 @@ class McapRepair:
             offset.write(builder)
         summary = bytes(builder.end())  # type: ignore[no-untyped-call]
 
-        # The checksum is of the summary, and of the footer up to itself.
+        # The checksum covers the summary, and the footer up to the checksum.
         footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, offset_start)
         Footer(start, offset_start, zlib.crc32(footer, zlib.crc32(summary))).write(builder)
         data = memoryview(head + summary + bytes(builder.end()) + MAGIC)  # type: ignore[no-untyped-call]

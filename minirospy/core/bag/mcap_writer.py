@@ -1,8 +1,8 @@
-"""Messages with their times in, an MCAP file out, laid out as the MCAP tools convert bags: profile ``ros1``.
+"""Write an MCAP file from messages with their times, in the layout of the MCAP tools' bag conversion: profile ``ros1``.
 
-A connection is a channel; what its connection header has besides the type and the definition (md5sum, callerid, latching,
-...) is the channel's metadata, the definition a schema of encoding ``ros1msg``. Needs the extra ``minirospy[mcap]``.
-Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
+A connection becomes a channel. The connection header's fields except the type and the definition (md5sum, callerid,
+latching, ...) become the channel's metadata, the definition a schema of encoding ``ros1msg``. Needs the extra
+``minirospy[mcap]``. Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ __all__ = [
 ]
 
 CHUNK_SIZE = 4 * 1024 * 1024
-"""Bytes of a chunk before compression, as the MCAP tools have it: the summary that `rosbag info` reads has a record of each."""
+"""Bytes per chunk before compression, like the MCAP tools; the summary that `rosbag info` reads has a record per chunk."""
 
+# Name of a chunk compression -> the library's name
 COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
-"""The names of the compressions of chunks, and those that the library gives them."""
 
 SCHEMA_FIELDS = ("type", "message_definition")
-"""The fields of a connection header that are the channel's schema; the others are its metadata."""
+"""The fields of a connection header that form the channel's schema; the others are its metadata."""
 
 _NEEDED = (*SCHEMA_FIELDS, "md5sum")
 
 
 def check_mcap() -> None:
-    """Raise BagError, which names the extra to install, unless MCAP files can be read and written."""
+    """Raise BagError, which names the extra to install, unless the library for MCAP files is available."""
     try:
         import mcap.records  # noqa: F401 - the rest is imported where it is needed
         import zstandard  # noqa: F401
@@ -50,13 +50,13 @@ def check_mcap() -> None:
 
 
 def check_mcap_compression(name: str) -> None:
-    """Raise BagCompressionError unless chunks of MCAP files can be compressed so."""
+    """Raise BagCompressionError unless chunks of MCAP files can be compressed with ``name``."""
     if name not in COMPRESSIONS:
         raise BagCompressionError(name, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
 
 
 class McapWriter:
-    """Writes an MCAP file into a binary stream, which it does not close. As :class:`minirospy.core.bag.writer.BagWriter`.
+    """Writes an MCAP file into a binary stream, which it does not close; like :class:`minirospy.core.bag.writer.BagWriter`.
 
     ``compression``: none, lz4 or zstd. Raise BagCompressionError for another, BagError if the extra is missing.
     """
@@ -81,12 +81,12 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far, besides those that are yet to be compressed."""
+        """The bytes of the file so far, except those still to be compressed."""
         return self._stream.tell() + (self._gathered if self._is_plain else 0)
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory that the stream has not been given yet."""
+        """The bytes in memory that are not written to the stream yet."""
         return self._gathered
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
@@ -104,16 +104,16 @@ class McapWriter:
         return self._writer.register_channel(topic, "ros1", self._schemas[key], fields)
 
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message that came at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
+        """Write a message received at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
         if time < 0:
             raise BagFormatError(f"the time {time} ns is before 1970")
         whole = b"".join((body, tail)) if tail else body
 
-        # Of all connections together, as the MCAP tools' converter counts them.
+        # Counted over all connections, like the MCAP tools' converter.
         sequence = self._count % 2**32
         self._gathered += len(whole)
         self._count += 1
-        # A view is copied into the chunk by the library.
+        # The library copies a memoryview into the chunk.
         self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
         if self._gathered > self._chunk_size:
             self._gathered = 0
@@ -129,9 +129,10 @@ class McapWriter:
             self._stream.flush()
 
     def salvage(self, written: int | None = None) -> int:
-        """Complete a file whose stream has failed with the chunks before, read back; return how many messages are lost.
+        """Complete a file whose stream has failed, with the chunks read back from it; return the number of lost messages.
 
-        As :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise BagFormatError or OSError if not even an empty file fits.
+        Like :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise BagFormatError or OSError if even an empty file does
+        not fit.
         """
         from minirospy.core.bag.mcap_repair import McapRepair
 
@@ -143,7 +144,7 @@ class McapWriter:
 
 
 class _Whole:
-    """A stream whose writes are whole, also those of a file without a buffer, into which the library puts its own."""
+    """A stream whose write() writes all data, even to an unbuffered file; the library does its own buffering."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream

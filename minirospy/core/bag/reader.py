@@ -1,7 +1,7 @@
-"""Reading bags: a seekable binary stream in, connections and messages in the order of time out.
+"""Read bags: a seekable binary stream in, connections and messages in the order of time out.
 
-Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read chunk
-by chunk; where chunks overlap in time they are merged. Memory: the chunk infos, and a few chunks.
+Opening a bag of version 2.0 reads its first record, and the connections and chunk infos at its end. Messages are read
+chunk by chunk; chunks that overlap in time are merged. Memory use: the chunk infos, and a few chunks.
 Source: http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.reader12`.
 """
 
@@ -25,8 +25,8 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 
 __all__ = ["ChunkedReader", "open_bag"]
 
+# Bytes of overlapping chunks that are kept decompressed; beyond that, some are read again
 _CACHE_SIZE = 64 * 1024 * 1024
-"""Bytes of chunks that overlap in time and are kept decompressed; of more, some are read again."""
 
 _END_OF_TIME = 1 << 64
 
@@ -34,7 +34,7 @@ _END_OF_TIME = 1 << 64
 def open_bag(stream: BinaryIO) -> BagReader:
     """Return a reader of the bag that starts at the stream's position.
 
-    Raise BagFormatError if it is not a bag, BagVersionError for a version that is not read, BagUnindexedError for
+    Raise BagFormatError if it is not a bag, BagVersionError for an unsupported version, BagUnindexedError for
     a bag that was not closed or whose index is damaged, BagEncryptedError.
     """
     version = records.read_version(stream)
@@ -52,7 +52,7 @@ def open_bag(stream: BinaryIO) -> BagReader:
 class ChunkedReader(BagReader):
     """A bag of version 2.0. ``connections`` and ``chunks`` may grow: a bag can be read while it is written.
 
-    ``headers``: of chunks whose header in the file is not complete, by their positions.
+    ``headers``: chunk position -> header, for chunks whose header in the file is incomplete.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class ChunkedReader(BagReader):
 
     @classmethod
     def open(cls, stream: BinaryIO, version: int = 200) -> ChunkedReader:
-        """Read the bag's header, connections and chunk infos; the stream is behind the first line."""
+        """Read the bag's header, connections and chunk infos; the stream must be after the first line."""
         position = stream.tell()
         try:
             limit = size_of(stream)
@@ -149,14 +149,14 @@ class ChunkedReader(BagReader):
         return [self._indexes[number] for number in wanted]
 
     def times(self, connections: Iterable[int]) -> list[array[int]]:
-        """See :meth:`BagReader.times`. They are not kept: half of an index."""
+        """See :meth:`BagReader.times`. The times are not cached."""
         found = {number: array("Q") for number in connections}
         for number, _, times, _ in self._index_records(set(found)):
             found[number].extend(times)
         return list(found.values())
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """See :meth:`BagReader.chunk_headers`. Raise BagUnindexedError if one is damaged: the index leads elsewhere."""
+        """See :meth:`BagReader.chunk_headers`. Raise BagUnindexedError if one is damaged, since the index is then wrong."""
         try:
             return {chunk.position: self._chunks.header(chunk.position) for chunk in self.chunks}
         except BagFormatError as error:
@@ -173,7 +173,7 @@ class ChunkedReader(BagReader):
         return indexes
 
     def _index_records(self, wanted: set[int]) -> Iterator[tuple[int, int, array[int], array[int]]]:
-        """Yield connection, chunk, times and offsets of the index records behind the chunks. Raise BagUnindexedError."""
+        """Yield connection, chunk, times and offsets of the index records after the chunks. Raise BagUnindexedError."""
         limit = self.size()
         try:
             for chunk in self.chunks:
@@ -190,7 +190,7 @@ class ChunkedReader(BagReader):
 
 
 class _Run:
-    """A chunk whose messages are being yielded; ``done`` of them have been."""
+    """A chunk whose messages are being yielded; ``done`` is the number of those already yielded."""
 
     __slots__ = ("done", "number", "position")
 
@@ -201,10 +201,10 @@ class _Run:
 
 
 class _Merge:
-    """Blocks of messages in the order of time, from chunks that may overlap.
+    """Merges chunks that may overlap into blocks of messages in the order of time.
 
-    Each chunk is a run of sorted messages. Runs that wait for others stay in memory up to _CACHE_SIZE; a run that was
-    dropped is read again, so that a bag whose chunks all overlap needs no more memory.
+    Each chunk is a run of sorted messages. Waiting runs stay in memory up to _CACHE_SIZE; a run that was
+    dropped is read again, so even a bag whose chunks all overlap needs no more memory.
     """
 
     def __init__(
@@ -224,8 +224,8 @@ class _Merge:
         self._size = 0
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the messages that come next."""
-        # The run's number decides between runs whose next messages have one time, connection and place.
+        """Yield the blocks in order."""
+        # The run's number breaks ties between runs whose next messages have equal time, connection and offset.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
@@ -244,7 +244,7 @@ class _Merge:
                 stop = bisect_left(found, heap[0][:2], run.done)
             if number < count:
                 stop = min(stop, bisect_left(found, (self._chunks[number].start_time,), run.done))
-            # Of two messages with one time and connection, the one in the earlier chunk comes first.
+            # Of two messages with equal time and connection, the one in the earlier chunk comes first.
             stop = max(stop, run.done + 1)
 
             yield Block(
@@ -303,7 +303,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if messages would be missing without a word: the index has more, or other, than its header."""
+    """Raise BagFormatError if the index contradicts its header, in which case messages would be missing silently."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:
@@ -319,7 +319,7 @@ def _check_index(
     try:
         more = records.read_record(stream, limit)
     except BagFormatError:
-        return  # what others have appended is not looked at
+        return  # data appended by other programs is ignored
     if more.op in (records.OP_CHUNK_INFO, records.OP_CONNECTION):
         raise BagFormatError("the index has more records than the bag header counts", position)
 

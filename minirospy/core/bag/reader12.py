@@ -1,6 +1,6 @@
-"""Reading bags of version 1.2, which have no chunks: definitions and messages follow each other in the file.
+"""Read bags of version 1.2, which have no chunks: definitions and messages follow each other in the file.
 
-Such a bag has an index at its end, or, without a bag header, none. What comes out is what `minirospy.core.bag.reader` gives.
+Such a bag has an index at its end, or none if it has no bag header. The results are those of `minirospy.core.bag.reader`.
 Source: http://wiki.ros.org/Bags/Format/1.2.
 """
 
@@ -23,9 +23,9 @@ _ENTRY = struct.Struct("<IIQ")
 
 
 class Reader12(BagReader):
-    """A bag of version 1.2: a connection for each topic.
+    """A bag of version 1.2, with a connection for each topic.
 
-    ``start``: the position of the first record. Until :meth:`read_index` or :meth:`scan` it is not ``indexed``.
+    ``start``: the position of the first record. It is not ``indexed`` until :meth:`read_index` or :meth:`scan`.
     """
 
     def __init__(self, stream: BinaryIO, version: int, start: int) -> None:
@@ -39,7 +39,7 @@ class Reader12(BagReader):
         self._indexes: dict[int, ConnectionIndex] = {}
 
     def read_index(self) -> None:
-        """Read the index at the bag's end. Raise BagUnindexedError if there is none, or if it is damaged."""
+        """Read the index at the bag's end. Raise BagUnindexedError if it is missing or damaged."""
         try:
             limit = size_of(self.stream)
             self.stream.seek(self.start)
@@ -63,7 +63,7 @@ class Reader12(BagReader):
             raise BagUnindexedError(str(error)) from error
 
     def scan(self) -> Iterator[int]:
-        """Make the index from the messages; yield the position of each record. Ends at the first one that is damaged."""
+        """Build the index from the messages; yield the position of each record. Stops at the first damaged one."""
         self.connections.clear()
         self._by_topic.clear()
         self._indexes.clear()
@@ -129,7 +129,7 @@ class Reader12(BagReader):
         return [self._indexes[number] for number in connections]
 
     def _seek(self, position: int, limit: int) -> None:
-        """Seek to a position that the index has. Raise BagFormatError if it is behind the file's end."""
+        """Seek to a position from the index. Raise BagFormatError if it is beyond the file's end."""
         if position > limit:
             raise BagFormatError("an index entry is behind the file's end", position)
         self.stream.seek(position)
@@ -168,7 +168,7 @@ class Reader12(BagReader):
     def _connection_of(self, record: Record) -> int:
         topic = record.text("topic")
         if topic not in self._by_topic:
-            # A definition is stored once for each type; other topics of the type refer to it.
+            # A definition is stored once per type; other topics of the type refer to it.
             type_ = record.text("type")
             like = next((each for each in self.connections.values() if each.type == type_), None)
             if like is None:
@@ -188,7 +188,8 @@ class Reader12(BagReader):
 def open_bag12(stream: BinaryIO, version: int) -> Reader12:
     """Return a reader of the bag whose first line has been read.
 
-    A bag without a header has no index, and is scanned when it is read. Raise BagUnindexedError if it should have one.
+    A bag without a bag header has no index, and is scanned when it is read. Raise BagUnindexedError if a bag header is
+    present but the index is missing.
     """
     start = stream.tell()
     limit = size_of(stream)
@@ -200,7 +201,7 @@ def open_bag12(stream: BinaryIO, version: int) -> Reader12:
 
 
 def unindexed_bag12(stream: BinaryIO) -> Reader12:
-    """Return a reader of the bag at the stream's position, which is to be scanned. Raise BagFormatError."""
+    """Return a reader of the bag at the stream's position, which must then be scanned. Raise BagFormatError."""
     version = records.read_version(stream)
     return Reader12(stream, version, stream.tell())
 

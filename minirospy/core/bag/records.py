@@ -1,10 +1,10 @@
-"""The records of bags: bytes in, named tuples out.
+"""Parse the records of bags: bytes in, named tuples out.
 
-A record is a header (its length, then fields ``name=value``, each with its length in front) and data (its length, then
-bytes). Which record it is, the field ``op`` says. All numbers are little-endian; times are nanoseconds since 1970 here,
-and seconds and nanoseconds of 32 bits each in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
+A record is a header (its length, then fields ``name=value``, each with a length prefix) and data (its length, then
+bytes). The field ``op`` specifies the kind of record. All numbers are little-endian; times are nanoseconds since 1970
+here, and seconds and nanoseconds of 32 bits each in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
 
-Fields may have every order, and unknown fields and records are passed over. The way back: `minirospy.core.bag.encoding`.
+Fields may be in any order, and unknown fields and records are skipped. The inverse: `minirospy.core.bag.encoding`.
 """
 
 from __future__ import annotations
@@ -51,10 +51,9 @@ __all__ = [
 ]
 
 MAGIC = b"#ROSBAG V2.0\n"
-"""The first line of a bag of version 2.0."""
+"""The first line of a bag of version 2.0"""
 
-OP_MESSAGE_DEFINITION = 1
-"""Only in bags of version 1.2."""
+OP_MESSAGE_DEFINITION = 1  # only in bags of version 1.2
 OP_MESSAGE_DATA = 2
 OP_BAG_HEADER = 3
 OP_INDEX_DATA = 4
@@ -63,13 +62,12 @@ OP_CHUNK_INFO = 6
 OP_CONNECTION = 7
 
 BAG_HEADER_SIZE = 4096
-"""Bytes of the bag header's fields and padding together: it is written again when the bag is closed."""
+"""Bytes of the bag header's fields and padding together, constant since it is overwritten when the bag is closed."""
 
-MAX_HEADER = 16 * 1024 * 1024
-"""Bytes that a record's header may have: in bags of version 1.2 it holds definitions."""
+MAX_HEADER = 16 * 1024 * 1024  # bytes of a record's header, which contains definitions in bags of version 1.2
 
 MAX_UINT32 = 0xFFFFFFFF
-"""Sizes and times of 32 bits end here: a record's data, a chunk's content."""
+"""The maximum of sizes and times of 32 bits, such as a record's data size or a chunk's uncompressed size."""
 
 _BILLION = 10**9
 _OPS = {
@@ -89,11 +87,11 @@ _PAIR = struct.Struct("<II")
 _ENTRY = struct.Struct("<III")
 
 Fields = dict[str, bytes]
-"""The fields of a header; values stay bytes, since definitions are not always UTF-8."""
+"""The fields of a header; the values are bytes, since definitions are not always UTF-8."""
 
 
 class BagHeader(NamedTuple):
-    """The first record: where the index is (0: the bag was not closed), and how many records it has."""
+    """The first record: the position of the index (0: the bag was not closed), and its numbers of records."""
 
     index_pos: int
     connection_count: int
@@ -101,7 +99,7 @@ class BagHeader(NamedTuple):
 
 
 class Connection(NamedTuple):
-    """A topic of one publisher: ``id`` in the bag, ``topic``, and the connection header that was received."""
+    """A topic of one publisher: ``id`` in the bag, ``topic``, and the publisher's connection header."""
 
     id: int
     topic: str
@@ -109,7 +107,7 @@ class Connection(NamedTuple):
 
     @property
     def type(self) -> str:
-        """The type of its messages, such as ``std_msgs/String``."""
+        """The type of the connection's messages, such as ``std_msgs/String``."""
         return self._text("type")
 
     @property
@@ -119,7 +117,7 @@ class Connection(NamedTuple):
 
     @property
     def definition(self) -> str:
-        """The full text of the type: its definition, and those of all types that it needs."""
+        """The full text of the type: its definition, and those of all types that it uses."""
         return self._text("message_definition")
 
     @property
@@ -137,7 +135,7 @@ class Connection(NamedTuple):
 
 
 class MessageData(NamedTuple):
-    """A message: the id of its connection, the time of its reception, its bytes."""
+    """A message: the id of its connection, its receive time, its bytes."""
 
     connection: int
     time: int
@@ -145,21 +143,21 @@ class MessageData(NamedTuple):
 
 
 class IndexEntry(NamedTuple):
-    """Where a message is: its time, and its record's offset in the chunk's decompressed data."""
+    """The location of a message: its time, and its record's offset in the chunk's decompressed data."""
 
     time: int
     offset: int
 
 
 class IndexData(NamedTuple):
-    """The entries of one connection in the chunk before this record."""
+    """The entries of one connection in the chunk that precedes this record."""
 
     connection: int
     entries: list[IndexEntry]
 
 
 class Chunk(NamedTuple):
-    """The header of a chunk: its compression, the sizes of its data in memory and in the file."""
+    """The header of a chunk: its compression, and the sizes of its data in memory and in the file."""
 
     compression: str
     size: int
@@ -167,7 +165,7 @@ class Chunk(NamedTuple):
 
 
 class ChunkInfo(NamedTuple):
-    """The summary of a chunk: its position, the times of its first and last message, messages of each connection."""
+    """The summary of a chunk: its position, the times of its first and last message, and the messages per connection."""
 
     position: int
     start_time: int
@@ -176,7 +174,7 @@ class ChunkInfo(NamedTuple):
 
 
 class Record(NamedTuple):
-    """A record's header, and where its data is in the stream or buffer that it was read from."""
+    """A record's header, and the position of its data in the stream or buffer."""
 
     position: int
     op: int
@@ -190,15 +188,15 @@ class Record(NamedTuple):
         return self.data_position + self.data_size
 
     def uint32(self, name: str) -> int:
-        """Return a field's number. Raise BagFormatError if it is missing or has another size."""
+        """Return a field's 32-bit number. Raise BagFormatError if it is missing or has another size."""
         return int(self._number(name, _UINT32))
 
     def uint64(self, name: str) -> int:
-        """Return a field's number of 64 bits. Raise BagFormatError as above."""
+        """Return a field's 64-bit number. Raise BagFormatError if it is missing or has another size."""
         return int(self._number(name, _UINT64))
 
     def time(self, name: str) -> int:
-        """Return a field's time. Raise BagFormatError as above."""
+        """Return a field's time in nanoseconds. Raise BagFormatError if it is missing or has another size."""
         value = self.field(name)
         if len(value) != 8:
             raise BagFormatError(f'error reading field "{name}": it has {len(value)} bytes', self.position)
@@ -230,7 +228,7 @@ class Record(NamedTuple):
 
 
 def to_nanoseconds(seconds: int, nanoseconds: int) -> int:
-    """Return a time of a record as one number."""
+    """Return a record's time in nanoseconds."""
     return seconds * _BILLION + nanoseconds
 
 
@@ -249,9 +247,9 @@ def read_version(stream: BinaryIO) -> int:
 
 
 def read_record(stream: BinaryIO, limit: int) -> Record:
-    """Read the header of the record at the stream's position, and the length of its data, which comes next.
+    """Read the header of the record at the stream's position, and the length of its data, which follows.
 
-    ``limit`` is the stream's size: a length that goes beyond it is damage. Raise BagFormatError.
+    ``limit`` is the stream's size: a length that goes beyond it means damage. Raise BagFormatError.
     """
     position = stream.tell()
     header_size = _read_length(stream, position)
@@ -292,7 +290,7 @@ def parse_record(buffer: bytes, position: int) -> Record:
 
 
 def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
-    """Yield the records of a buffer. Raise BagFormatError at the first one that is not whole."""
+    """Yield the records of a buffer. Raise BagFormatError at the first incomplete one."""
     while position < len(buffer):
         record = parse_record(buffer, position)
         yield record
@@ -300,7 +298,7 @@ def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
 
 
 def parse_fields(header: bytes, position: int | None = None) -> Fields:
-    """Return the fields of a header whose length has been taken off. Raise BagFormatError, which names ``position``."""
+    """Return the fields of a header without its length prefix. Raise BagFormatError, which names ``position``."""
     fields: Fields = {}
     at, end = 0, len(header)
     while at < end:

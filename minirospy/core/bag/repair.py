@@ -1,7 +1,7 @@
-"""Repair of a bag that was not closed, whose end is missing, or that is damaged: its index is made again from its chunks.
+"""Repair a bag that was not closed, whose end is missing, or that is damaged: rebuild its index from its chunks.
 
-Every whole chunk is recovered, and of a last chunk that is not compressed every whole message. A chunk whose
-data is damaged is left out of the index; where the records do not follow each other any more, the next chunk is searched.
+Every complete chunk is recovered, and every complete message of an incomplete, uncompressed last chunk. A chunk with
+damaged data is left out of the index; after damage between records, the next chunk is searched.
 Source: http://wiki.ros.org/rosbag/Commandline#reindex.
 """
 
@@ -26,7 +26,7 @@ _Entry = tuple[int, int, int]
 
 
 class _Content(NamedTuple):
-    """The contents of a chunk's data; ``end``: bytes of whole records."""
+    """The contents of a chunk's data; ``end``: the length of the complete records."""
 
     connections: dict[int, Connection]
     messages: list[Found]
@@ -34,12 +34,12 @@ class _Content(NamedTuple):
 
     @property
     def entries(self) -> list[_Entry]:
-        """The entries of the index, sorted."""
+        """The sorted entries of the chunk's index."""
         return sorted(each[:3] for each in self.messages)
 
     @property
     def has_wrong_time(self) -> bool:
-        """Whether a message has a time that no index can hold: more nanoseconds than a second has, in the last of all seconds."""
+        """True if a message has a time that no index can contain: over 999,999,999 nanoseconds in the last 32-bit second."""
         return any(each[0] >= _END_OF_TIME for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
@@ -57,7 +57,7 @@ class _Content(NamedTuple):
 
 
 class _Edit(NamedTuple):
-    """Bytes of the file that are replaced by others."""
+    """A range of bytes in the file and its replacement."""
 
     start: int
     end: int
@@ -65,7 +65,7 @@ class _Edit(NamedTuple):
 
 
 class _Rewriting:
-    """Edits of a file, in order and in place: what does not fit where it goes waits until that has been read."""
+    """Applies edits to a file, in order and in place: output that would overwrite unread bytes is buffered."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -74,11 +74,11 @@ class _Rewriting:
 
     @property
     def shift(self) -> int:
-        """By how many bytes what is read next moves."""
+        """The number of bytes by which the following data moves."""
         return self._written + len(self._waiting) - self._read
 
     def copy_until(self, position: int) -> None:
-        """Leave the file as it is up to a position."""
+        """Keep the file's bytes up to a position, moving them if necessary."""
         if not self.shift and not self._waiting:
             self._read = self._written = position
         while self._read < position:
@@ -88,12 +88,12 @@ class _Rewriting:
             self._put(block)
 
     def replace(self, edit: _Edit) -> None:
-        """Write other bytes in place of those at the position."""
+        """Write the edit's bytes in place of those at its position."""
         self._read = edit.end
         self._put(edit.data)
 
     def finish(self) -> int:
-        """End the file here; return by how many bytes its end has moved."""
+        """Truncate the file here; return the number of bytes by which its end has moved."""
         shift, self._read = self.shift, self._read + len(self._waiting)
         self._put(b"")
         self._stream.seek(self._written)
@@ -110,11 +110,11 @@ class _Rewriting:
 
 
 class Repair:
-    """Makes the index of a bag of version 2.0 again, in place where the stream can be written.
+    """Rebuilds the index of a bag of version 2.0, in place if the stream is writable.
 
-    After :meth:`run`: ``connections``, ``chunks``, ``end`` is where the index goes, ``headers`` are those of chunks whose
-    header in the file is not complete, and ``problems`` are lines about what could not be recovered. :meth:`apply` moves
-    the chunks together, and changes their positions.
+    After :meth:`run`: ``connections``, ``chunks``, ``end`` is the position for the index, ``headers`` are those of chunks
+    whose header in the file is incomplete, and ``problems`` are lines about data that could not be recovered. :meth:`apply`
+    removes the damaged ranges, which changes the chunks' positions.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -125,10 +125,8 @@ class Repair:
         self.problems: list[str] = []
         self._stream = stream
         self._edits: list[_Edit] = []
-        self._infos_left = 0
-        """Chunk infos that the bag header counts, and that have not been read."""
-        self._total = 0
-        """Messages of the chunk infos that have been read."""
+        self._infos_left = 0  # chunk infos that the bag header counts and that have not been read yet
+        self._total = 0  # messages counted by the chunk infos read so far
 
     def run(self) -> Iterator[int]:
         """Read the chunks; yield the position of each. Raise BagFormatError if it is not a bag, BagEncryptedError."""
@@ -153,7 +151,7 @@ class Repair:
         self._report_lost()
 
     def apply(self) -> None:
-        """Make the file end after the last chunk that was recovered, without the damage before it. Raise OSError."""
+        """Truncate the file after the last recovered chunk, and remove the damaged ranges before it. Raise OSError."""
         chunks = iter(self.chunks)
         moved: list[ChunkInfo] = []
         chunk = next(chunks, None)
@@ -171,7 +169,7 @@ class Repair:
         self._edits, self.headers = [], {}
 
     def _read_header(self, limit: int) -> int:
-        """Return where the first chunk is; a bag header that is damaged has the size of all others."""
+        """Return the position of the first chunk; a damaged bag header is assumed to have the usual size."""
         start = len(records.MAGIC)
         self._stream.seek(start)
         try:
@@ -184,7 +182,7 @@ class Repair:
         return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position, and what belongs to it; return the position after it. Raise BagFormatError."""
+        """Read the record at a position, and a chunk's index records; return the position after them. Raise BagFormatError."""
         self._stream.seek(position)
         record = records.read_record(self._stream, limit)
         if record.op == records.OP_CONNECTION:
@@ -198,7 +196,7 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # The header of a chunk is completed when the chunk is: its writer was killed.
+            # A chunk's header is completed together with the chunk, so its writer was killed.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
@@ -211,7 +209,7 @@ class Repair:
                 raise BagFormatError("a record of the chunk is damaged")
             self._check_connections(content)
             if content.has_wrong_time:
-                # Chunks after this one may need the connections that are in it.
+                # Later chunks may need the connections in this one.
                 self._add_connections(content)
                 raise BagFormatError("a message of the chunk has a time that no index can hold")
         except (BagFormatError, BagCompressionError) as error:
@@ -222,7 +220,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if a connection is another one than in the chunks before: not what it was written for."""
+        """Raise BagFormatError if a connection differs from that in previous chunks, so that the chunk is not to be trusted."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (
@@ -235,12 +233,12 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # In the order of the file, as ROS writes them into the index.
+        # In file order, as ROS writes them into the index.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 
     def _add(self, record: Record, content: _Content, limit: int) -> int:
-        """Add a whole chunk; return the position after its index records."""
+        """Add a complete chunk; return the position after its index records."""
         self._add_connections(content)
         if not content.messages:
             return record.end
@@ -249,7 +247,7 @@ class Repair:
         return self.end
 
     def _keep_index(self, record: Record, content: _Content, limit: int) -> int:
-        """Have a chunk's index records written again where they are damaged; return the position after them."""
+        """Schedule a chunk's index records to be rewritten if they are damaged; return the position after them."""
         end, entries = _read_index(self._stream, record.end, limit)
         is_whole = entries == content.entries
         if is_whole and is_record(self._stream, end, limit):
@@ -260,7 +258,7 @@ class Repair:
             found = next_chunk(self._stream, record.end, limit)
             following = limit if found is None else found
         if is_whole and following > end:
-            return end  # the damage is behind the index
+            return end  # the damage is after the index
         if following > expected:
             self.problems.append(
                 f"index of the chunk at byte {record.position}: {following - expected} bytes are left out"
@@ -269,7 +267,7 @@ class Repair:
         return following
 
     def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
-        """Return the position of the next chunk behind damage; ``limit`` if there is none."""
+        """Return the position of the next chunk after damage; ``limit`` if there is none."""
         following = next_chunk(self._stream, position + 1, limit)
         end = limit if following is None else following
         is_saved = self._read_partial(position, end, limit)
@@ -283,9 +281,10 @@ class Repair:
         return end
 
     def _read_partial(self, position: int, end: int, limit: int) -> bool:
-        """Recover the messages of a chunk that is not compressed and whose size is wrong; return whether there are any.
+        """Recover the messages of an uncompressed chunk whose size is wrong; return whether there are any.
 
-        At the end of the file every whole message; before it only all of them: then its index records tell how many.
+        At the end of the file recover every complete message; before it only all messages or none, checked against the chunk's
+        index records.
         """
         record = _partial_chunk(self._stream, position, limit)
         if record is None:
@@ -299,7 +298,7 @@ class Repair:
         data_end = record.data_position + content.end
         _, entries = _read_index(self._stream, data_end, limit)
         if end < limit and _times(entries) != _times(content.entries):
-            return False  # wrong offsets alone do no harm: the index is written again
+            return False  # wrong offsets alone do no harm, since the index is rewritten
         self._add_connections(content)
         self.chunks.append(content.info(position))
         self.end = end
@@ -315,7 +314,7 @@ class Repair:
         return True
 
     def _report_lost(self) -> None:
-        """Add a line about how many messages are missing, where the bag's own index still has their number."""
+        """Add a line with the number of missing messages, if the bag's own index still contains the total."""
         lost = self._total - sum(sum(chunk.counts.values()) for chunk in self.chunks)
         if self._infos_left == 0 and lost > 0:
             self.problems.append(f"{lost} of {self._total} messages are lost")
@@ -328,7 +327,7 @@ _BLOCK = 4 * 1024 * 1024
 
 
 def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[_Entry]]:
-    """Read the index records at a position; return where they end, and their entries, sorted."""
+    """Return the position after the index records at a position, and their sorted entries."""
     found: list[_Entry] = []
     try:
         while position < limit:
@@ -340,7 +339,7 @@ def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[
             found += [(time, number, at) for time, at in zip(*read_entries(stream, record), strict=True)]
             position = stream.tell()
     except BagFormatError:
-        pass  # the caller sees by the entries whether some are missing
+        pass  # the caller compares the entries to detect missing ones
     return position, sorted(found)
 
 
@@ -349,7 +348,7 @@ def _times(entries: list[_Entry]) -> list[int]:
 
 
 def _whole_records(data: bytes) -> int:
-    """Return how many bytes of data are whole records of a chunk, and not what comes after it."""
+    """Return the length of the complete message and connection records at the start of the data."""
     at = 0
     try:
         for record in records.parse_records(data):
@@ -372,15 +371,15 @@ def _content(data: bytes) -> _Content:
 
 
 class _Any:
-    """Ranks of all connections: their ids."""
+    """The ranks of all connections: their ids."""
 
     def get(self, number: int, /) -> int | None:
-        """Return the rank."""
+        """Return the rank of a connection."""
         return number
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data ends too early; None if it is something else."""
+    """Return the record of an uncompressed chunk whose data is cut off; None if it is something else."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

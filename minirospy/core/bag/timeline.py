@@ -1,4 +1,4 @@
-"""A bag by time: how many messages where, and the message of a moment, for those who show it rather than play it."""
+"""A bag by time: message counts per interval, and the message at a given time, for display rather than playback."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Timeline", "TopicTimes"]
 
 
 class TopicTimes(NamedTuple):
-    """A topic: its connections in the bag, and the times of the messages of each, in order, in nanoseconds."""
+    """A topic: its connections in the bag, and the sorted times of each one's messages, in nanoseconds."""
 
     name: str
     connections: list[Connection]
@@ -21,7 +21,7 @@ class TopicTimes(NamedTuple):
 
     @property
     def messages(self) -> int:
-        """Return how many messages there are."""
+        """The number of messages."""
         return sum(map(len, self.times))
 
     @property
@@ -31,7 +31,7 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """The index of a bag by topic. ``topics``: those with messages, by name. Raise BagFormatError."""
+    """The index of a bag by topic. ``topics``: name -> the topics that have messages. Raise BagFormatError."""
 
     def __init__(self, reader: BagReader) -> None:
         self._reader = reader
@@ -47,12 +47,12 @@ class Timeline:
 
     @property
     def span(self) -> tuple[int, int] | None:
-        """Return the times of the first and the last message; None without messages."""
+        """Return the times of the first and the last message; None if there are no messages."""
         every = [times for topic in self.topics.values() for times in topic.times]
         return (min(times[0] for times in every), max(times[-1] for times in every)) if every else None
 
     def density(self, topic: str, start: int, end: int, bins: int) -> list[int]:
-        """Return how many messages of a topic are in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
+        """Return the number of a topic's messages in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
         counts = [0] * bins
         borders = [start + (end + 1 - start) * number // bins for number in range(bins + 1)]
         for times in self.topics[topic].times:
@@ -62,7 +62,7 @@ class Timeline:
         return counts
 
     def message_at(self, topic: str, time: int) -> StoredMessage | None:
-        """Return the last message of a topic that is not later than ``time``. Raise BagFormatError."""
+        """Return the last message of a topic at or before ``time``. Raise BagFormatError."""
         newest: tuple[int, Connection] | None = None
         known = self.topics[topic]
         for connection, times in zip(known.connections, known.times, strict=True):
@@ -79,12 +79,12 @@ class Timeline:
         return last
 
     def time_at(self, topic: str, time: int) -> int | None:
-        """Return the time of that message."""
+        """Return the time of the last message of a topic at or before ``time``."""
         found = [times[at - 1] for times in self.topics[topic].times if (at := bisect_right(times, time))]
         return max(found, default=None)
 
     def count_at(self, time: int) -> int:
-        """Return how many messages there are at exactly this time."""
+        """Return the number of messages at exactly this time."""
         return sum(
             bisect_right(times, time) - bisect_left(times, time)
             for topic in self.topics.values()
@@ -92,7 +92,7 @@ class Timeline:
         )
 
     def time_after(self, time: int) -> int | None:
-        """Return the time of the first message after ``time``; None if that is the last."""
+        """Return the time of the first message after ``time``; None if there is none."""
         found = [
             times[at]
             for topic in self.topics.values()
@@ -102,7 +102,7 @@ class Timeline:
         return min(found, default=None)
 
     def time_before(self, time: int) -> int | None:
-        """Return the time of the last message before ``time``; None if that is the first."""
+        """Return the time of the last message before ``time``; None if there is none."""
         found = [
             times[at - 1]
             for topic in self.topics.values()

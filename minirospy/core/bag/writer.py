@@ -1,9 +1,9 @@
-"""Messages with their times in, the bytes of a bag out.
+"""Write bags: messages with their times in, the bytes of a bag out.
 
-A chunk is gathered in memory and written whole, its index behind it: a file whose writer was killed ends with at most one
-chunk that is cut off, and :mod:`minirospy.core.bag.repair` saves all that are before it. A small message is copied once, into
-the chunk; a large one that comes as ``bytes`` is written from where it is. Memory: the chunk, and some 200 bytes for
-each connection of each chunk that has been written. Source: http://wiki.ros.org/Bags/Format/2.0.
+A chunk is collected in memory and written at once, followed by its index: if the writer is killed, at most the last
+chunk is incomplete, and :mod:`minirospy.core.bag.repair` recovers all before it. A small message is copied once, into
+the chunk; a large one passed as ``bytes`` is written without a copy. Memory use: the chunk, and some 200 bytes for
+each connection of each written chunk. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations
@@ -42,30 +42,27 @@ __all__ = ["CHUNK_THRESHOLD", "BagWriter", "Buffer", "Continued"]
 
 Buffer = bytes | bytearray | memoryview
 
-CHUNK_THRESHOLD = 768 * 1024
-"""A chunk is complete when its data has more bytes than this, before compression. ROS's default."""
+CHUNK_THRESHOLD = 768 * 1024  # bytes of data before compression; a larger chunk is complete. ROS's default
 
-_LARGE = 64 * 1024
-"""A message of so many bytes is written from where it is, instead of being copied into the chunk."""
+_LARGE = 64 * 1024  # bytes; a message of at least this size is not copied into the chunk
 
 _BILLION = 10**9
-_OVERHEAD = 46
-"""Bytes of a message's record besides its body."""
+_OVERHEAD = 46  # bytes of a message's record in addition to its body
 _ENTRY = struct.Struct("<III")
 _TIME = struct.Struct("<II")
 _UINT32 = struct.Struct("<I")
 
 
 class _Stream:
-    """The messages of one connection: what is in front of each, and their index in the current chunk."""
+    """The messages of one connection: the prefix of each, and their index in the current chunk."""
 
     __slots__ = ("connection", "entries", "in_order", "last", "prefix", "record")
 
     def __init__(self, connection: Connection, *, is_stored: bool) -> None:
         self.connection = connection
         self.prefix = message_prefixes(connection.id)[0]
+        # The connection's record, until it is in a chunk
         self.record = b"" if is_stored else encode_connection(connection)
-        """The connection's record, until a chunk has it."""
         self.clear()
 
     def clear(self) -> None:
@@ -75,7 +72,7 @@ class _Stream:
         self.in_order = True
 
     def sort(self) -> tuple[int, int]:
-        """Put the entries in the order of time; return the first and the last time."""
+        """Sort the entries by time; return the first and the last time."""
         if not self.in_order:
             ordered = sorted(_ENTRY.iter_unpack(self.entries), key=lambda entry: entry[:2])
             self.entries = bytearray().join(_ENTRY.pack(*entry) for entry in ordered)
@@ -83,7 +80,7 @@ class _Stream:
         return to_nanoseconds(*first), to_nanoseconds(*last)
 
     def encode_index(self) -> bytes:
-        """Return the record that is behind a chunk for each of its connections."""
+        """Return the index record to write after the current chunk."""
         fields = {
             "op": bytes((OP_INDEX_DATA,)),
             "conn": _UINT32.pack(self.connection.id),
@@ -94,7 +91,7 @@ class _Stream:
 
 
 class _Complete(NamedTuple):
-    """A chunk that waits to be written: how to get its data, their size, and what the indexes say."""
+    """A chunk that waits to be written: functions that return its data, its size, and the contents of its index."""
 
     is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]
@@ -106,7 +103,7 @@ class _Complete(NamedTuple):
 
 
 class Continued(NamedTuple):
-    """The index of a bag that is to be continued, and its position."""
+    """The index of a bag to be continued, and its position."""
 
     connections: Iterable[Connection]
     chunks: Iterable[ChunkInfo]
@@ -116,13 +113,13 @@ class Continued(NamedTuple):
 class BagWriter:
     """Writes a bag of version 2.0 into a binary stream, which it does not close. For one thread at a time.
 
-    ``chunk_threshold`` in bytes may be changed at any time. ``executor``: where chunks are compressed in parallel; without
-    one, the calling thread does it. ``most_waiting``: if more chunks are waiting for that, :meth:`write` waits, too.
-    ``continued``: append to the bag that the stream has, in place of its index. Raise BagCompressionError if the compression
-    is unknown or its library missing.
+    ``chunk_threshold`` in bytes may be changed at any time. ``executor`` compresses chunks in parallel; without
+    one, the calling thread does. ``most_waiting``: if more chunks than this wait for compression, :meth:`write` waits, too.
+    ``continued``: append to the bag in the stream, overwriting its index. Raise BagCompressionError if the compression
+    is unknown or its library is missing.
 
-    After an OSError of the stream, such as a full disk, :meth:`salvage` makes a readable bag of what has been written;
-    for that the stream must be without a buffer. Buffers gain nothing here: chunks are written whole.
+    After an OSError of the stream, such as a full disk, :meth:`salvage` makes the written part a readable bag;
+    this requires an unbuffered stream. Buffering gains nothing here, since each chunk is written at once.
     """
 
     def __init__(
@@ -136,18 +133,15 @@ class BagWriter:
         continued: Continued | None = None,
     ) -> None:
         self.chunk_threshold = chunk_threshold
-        self.chunks: list[ChunkInfo] = []
-        """The chunks that have been written."""
+        self.chunks: list[ChunkInfo] = []  # the chunks already written
         self._stream = stream
         self._executor = executor
         self._most_waiting = most_waiting
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
-        self._waiting = 0
-        """Bytes of the complete chunks, before compression."""
-        self._written = (0, 0)
-        """Bytes of the data of the written chunks: before compression, and as they are stored."""
+        self._waiting = 0  # bytes of the complete chunks, before compression
+        self._written = (0, 0)  # bytes of data in the written chunks: before compression, and as stored
         self._closed = False
         self._small = bytearray()
         self._pieces: list[Buffer] = []
@@ -159,8 +153,7 @@ class BagWriter:
             self._header_position = stream.tell() + len(MAGIC)
             header = encode_bag_header(BagHeader(0, 0, 0))
             self._put([MAGIC, header])
-            self._position = self._header_position + len(header)
-            """Where the next chunk goes in the stream."""
+            self._position = self._header_position + len(header)  # of the next chunk in the stream
         else:
             self._continue(*continued)
 
@@ -184,9 +177,9 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Bytes of the bag so far; what is not compressed yet counts as if it shrank like the chunks before it.
+        """The bytes of the bag so far; uncompressed data is counted with the compression ratio of the previous chunks.
 
-        Without a chunk before it, it does not count: how much it will shrink is not known.
+        Before the first chunk is written, the data in memory counts as 0, since the ratio is unknown.
         """
         if self._compression == NONE:
             return self._position + self.gathered
@@ -195,7 +188,7 @@ class BagWriter:
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory that the stream has not been given yet."""
+        """The bytes in memory that are not written to the stream yet."""
         return self._size + self._waiting
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
@@ -216,10 +209,11 @@ class BagWriter:
         return number
 
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message that came at ``time``, in nanoseconds; its bytes are those of ``body``, then of ``tail``.
+        """Write a message received at ``time``, in nanoseconds; its bytes are those of ``body``, then of ``tail``.
 
-        Only ``bytes`` are kept until the chunk is written, and must be plain. Raise BagFormatError if the message or its time
-        does not fit, OSError if the stream fails.
+        ``bytes`` are kept until the chunk is written, other buffers are copied. Raise BagFormatError if the message or
+        its time
+        exceeds a limit, OSError if the stream fails.
         """
         stream = self._streams[connection]
         length = len(body) + len(tail)
@@ -282,11 +276,11 @@ class BagWriter:
         self._write_complete(self._most_waiting)
 
     def write_ready(self) -> None:
-        """Write the complete chunks whose compression has ended. Raise OSError."""
+        """Write the complete chunks whose compression is done. Raise OSError."""
         self._write_complete(len(self._complete))
 
     def flush(self) -> None:
-        """Write all messages so far into the stream, and flush it. Raise OSError."""
+        """Write all messages to the stream, and flush it. Raise OSError."""
         self.finish_chunk()
         self._write_complete(0)
         self._stream.flush()
@@ -301,11 +295,11 @@ class BagWriter:
         self._closed = True
 
     def salvage(self, written: int | None = None) -> int:
-        """Close a bag whose stream has failed; return how many messages are lost.
+        """Close a bag whose stream has failed; return the number of lost messages.
 
-        Chunks that are not whole go, and as many before them as the index needs room for. ``written``: bytes of the bag that
-        are known to have reached the disk, if not all before the fault have. Raise OSError if even an empty bag does not
-        fit.
+        Removes incomplete chunks, and as many before them as necessary to make room for the index. ``written``: bytes of the
+        bag that are known to have reached the disk, if not all before the fault have. Raise OSError if even an empty bag does
+        not fit.
         """
         lost = sum(len(one.entries) // _ENTRY.size for one in self._used)
         lost += sum(sum(one.counts.values()) for one in self._complete)
@@ -316,7 +310,7 @@ class BagWriter:
         self._closed = True
 
         while True:
-            # The last chunk ends where the next one would start.
+            # The end of the last chunk is where the next one would start.
             while self.chunks and self._position > end:
                 dropped = self.chunks.pop()
                 lost += sum(dropped.counts.values())
@@ -338,7 +332,7 @@ class BagWriter:
     def _set_compression(self, name: str) -> None:
         check_compression(name)
         self._compression = name
-        # Noise becomes longer where it is compressed, and no reader of ours takes more.
+        # Random data grows when compressed, and minirospy's readers accept no larger chunks.
         self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
 
     def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
@@ -346,7 +340,7 @@ class BagWriter:
         self._next_id = max(self._streams, default=-1) + 1
         self.chunks.extend(chunks)
 
-        # First the header: a program that ends now leaves a bag that says it has no index.
+        # Write the header first: if the program is killed now, the bag is marked as not closed.
         self._header_position = len(MAGIC)
         self._stream.seek(self._header_position)
         self._put([encode_bag_header(BagHeader(0, 0, 0))])
@@ -361,7 +355,7 @@ class BagWriter:
         self._used = []
 
     def _make_room(self, stream: _Stream, length: int) -> None:
-        """Have the message start a new chunk: the format counts a chunk's bytes in 32 bits. Raise BagFormatError."""
+        """Start a new chunk for the message, since the format has 32 bits for a chunk's size. Raise BagFormatError."""
         if len(stream.record) + _OVERHEAD + length > self._limit:
             raise BagFormatError(
                 f"a message of {length} bytes on {stream.connection.topic} is too large: "
@@ -376,11 +370,11 @@ class BagWriter:
         if self._small:
             self._pieces.append(self._small)
             self._small = bytearray()
-        # What is not bytes may be changed by its owner before it is written.
+        # Copy other types than bytes, since the caller may change them before they are written.
         self._pieces.append(body if type(body) is bytes else bytes(body))
 
     def _data(self, pieces: list[Buffer]) -> tuple[Callable[[], bool], Callable[[], list[Buffer]]]:
-        """Return two functions: whether the chunk's data, as it is written, is ready, and one that waits for it."""
+        """Return two functions: whether the chunk's data is ready to be written, and one that waits for it and returns it."""
         name = self._compression
         if name == NONE:
             return (lambda: True), (lambda: pieces)
@@ -392,7 +386,7 @@ class BagWriter:
         return future.done, (lambda: [future.result()])
 
     def _write_complete(self, left: int) -> None:
-        """Write the complete chunks that are ready, and wait for the others until so many are left."""
+        """Write the complete chunks that are ready, and wait for others until at most ``left`` remain."""
         while self._complete:
             chunk = self._complete[0]
             if len(self._complete) <= left and not chunk.is_ready():
@@ -412,7 +406,7 @@ class BagWriter:
         connections = self.connections
         self._put([encode_connection(one) for one in connections])
         self._put([b"".join(map(encode_chunk_info, self.chunks))])
-        # What the header promises has to be there first.
+        # The index must be on disk before the header refers to it.
         self._stream.flush()
         self._stream.seek(self._header_position)
         self._put([encode_bag_header(BagHeader(self._position, len(connections), len(self.chunks)))])
@@ -423,6 +417,6 @@ class BagWriter:
         write = self._stream.write
         for piece in pieces:
             count = write(piece)
-            # A stream without a buffer may take a part.
+            # An unbuffered stream may write only a part.
             while count is not None and count < len(piece):
                 count += write(memoryview(piece)[count:])

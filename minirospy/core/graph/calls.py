@@ -38,21 +38,18 @@ __all__ = [
     "uris",
 ]
 
-SUCCESS, FAILURE, ERROR = 1, 0, -1
-"""Status codes of an answer."""
+SUCCESS, FAILURE, ERROR = 1, 0, -1  # status codes of an answer
 
-Answer = list[object]
-"""``[status code, text, value]``."""
+Answer = list[object]  # ``[status code, text, value]``
 
-_MAX_CHARACTERS = 4096
-"""Of a name, a type or a URI."""
+_MAX_CHARACTERS = 4096  # in a name, a type or a URI
 
 _MAX_URIS = 20_000
-"""Of a list: to check them takes some milliseconds, in which a node answers nobody. No master has as many for a topic."""
+"""URIs per list; checking them takes some milliseconds, which block the node. No master has as many for a topic."""
 
 
 class CallRefused(MinirospyError):
-    """An argument is not acceptable; the text is the answer's."""
+    """An argument is not acceptable; ``str()`` is the text of the answer."""
 
 
 class Parameter(NamedTuple):
@@ -63,17 +60,16 @@ class Parameter(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method: what is called with the caller_id and the arguments, and the value of an answer that refuses."""
+    """A method: the function to call with the caller_id and the arguments, and the value of an answer that refuses."""
 
     function: Callable[..., Answer | Steps[Answer]]
     refused: object
     parameters: tuple[Parameter, ...] = ()
-    optional: int = 0
-    """How many of the last parameters may be left out."""
+    optional: int = 0  # number of trailing parameters that may be omitted
 
 
 class Dispatcher:
-    """Checks calls and makes them. An answer may come in steps."""
+    """Checks the arguments of calls and calls the methods. An answer may be computed in steps."""
 
     def __init__(
         self,
@@ -81,12 +77,12 @@ class Dispatcher:
         *,
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """``refusals``: what methods raise besides CallRefused."""
+        """Take ``refusals``, the exceptions that methods raise in addition to CallRefused."""
         self.methods = methods
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
     def dispatch(self, name: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
         method = self.methods.get(name)
         if method is None:
             return self._dispatch_system(name, args)
@@ -124,7 +120,7 @@ class Dispatcher:
             return [ERROR, str(refusal), refused]
 
     def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
-        """Call what XML-RPC servers have: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
+        """Call a standard method of XML-RPC servers: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
         if name == "system.listMethods":
             return sorted(self.methods)
         if name == "system.multicall":
@@ -167,21 +163,21 @@ def anything(value: object, name: str, caller_id: str) -> object:
 
 
 def some(value: object, name: str, caller_id: str) -> object:
-    """Return any value that is not empty."""
+    """Return any non-empty value."""
     if not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be specified and non-empty")
     return value
 
 
 def text(value: object, name: str, caller_id: str) -> str:
-    """Return a text that is not empty."""
+    """Return a non-empty string."""
     if not isinstance(value, str) or not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be a non-empty string")
     return value
 
 
 def global_name(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a topic or a service, resolved as the caller sees it."""
+    """Return the name of a topic or a service, resolved for the caller."""
     resolved = node_name(value, name, caller_id)
     if resolved == "/":
         raise CallRefused(f"ERROR: parameter [{name}] cannot be the global namespace")
@@ -189,21 +185,21 @@ def global_name(value: object, name: str, caller_id: str) -> str:
 
 
 def node_name(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a node, resolved as the caller sees it."""
+    """Return the name of a node, resolved for the caller."""
     found = _short_text(value, name)
-    # rosmaster accepts many names that are not legal: many robots have topics with a dash.
+    # rosmaster accepts many illegal names: many robots have topics with a dash.
     if ":" in found or " " in found or has_controls(found):
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return _resolve(found, caller_id)
 
 
 def parameter_key(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a parameter, resolved as the caller sees it; rosmaster lets any characters in."""
+    """Return the name of a parameter, resolved for the caller; rosmaster allows any characters."""
     return _resolve(plain_key(value, name, caller_id), caller_id)
 
 
 def plain_key(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a parameter as it is given."""
+    """Return the name of a parameter without resolving it."""
     if not isinstance(some(value, name, caller_id), str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return _short_text(value, name)
@@ -225,20 +221,20 @@ def api_uri(value: object, name: str, caller_id: str) -> str:
     if not found.startswith(("http://", "rosrpc://")):
         raise CallRefused(f"ERROR: parameter [{name}] is not an RPC URI")
     if " " in found or has_controls(found):
-        # It becomes part of the requests to the node, and of lines of logs.
+        # It is used in requests to the node, and in log lines.
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return found
 
 
 def subgraph(value: object, name: str, caller_id: str) -> str:
-    """Return a namespace, resolved as the caller sees it; "" is the whole graph."""
+    """Return a namespace, resolved for the caller; "" is the whole graph."""
     if not isinstance(value, str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return names.resolve(_short_text(value, name), caller_id) if value else ""
 
 
 def global_key(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a parameter that starts at the root."""
+    """Return the global name of a parameter."""
     found = text(value, name, caller_id)
     if found[0] != "/":
         raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")
@@ -275,5 +271,5 @@ def _resolve(name: str, caller_id: str) -> str:
 
 
 def parameters(**readers: Callable[[object, str, str], object]) -> tuple[Parameter, ...]:
-    """Return the parameters of a method, by their names."""
+    """Return the parameters of a method, from names and their readers."""
     return tuple(Parameter(name, read) for name, read in readers.items())

@@ -1,7 +1,7 @@
-"""The life of an action's goal, as tables: the transitions of the server, and those of a client by the statuses that it receives.
+"""The states of an action's goal, as tables: the transitions in the server, and those in a client on received statuses.
 
-In: a state and an event. Out: the next state, or the states to pass through, or None if that cannot be.
-Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself where that page leaves things open.
+In: a state and an event. Out: the next state, or the sequence of states, or None if the transition is invalid.
+Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that page.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = [
 
 
 class GoalState(IntEnum):
-    """The status of a goal, as the server publishes it: the numbers of actionlib_msgs/GoalStatus."""
+    """The status of a goal published by the server: the numbers of actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -55,7 +55,7 @@ class ClientState(IntEnum):
 
 
 class SimpleState(IntEnum):
-    """The same, as the simple client sees it: actionlib.SimpleGoalState."""
+    """The state of a goal in the simple client: actionlib.SimpleGoalState."""
 
     PENDING = 0
     ACTIVE = 1
@@ -63,7 +63,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """A server's action on a goal, or a request for one. The value names the resulting state, for a person."""
+    """A server's action on a goal, or a request for one. The value is a description of the resulting state, for messages."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"
@@ -74,7 +74,7 @@ class GoalEvent(Enum):
 
 
 class SimpleStep(Enum):
-    """The meaning of a change of the client's state for the simple client."""
+    """The effect of a change of the client's state on the simple client."""
 
     NONE = "nothing"
     ACTIVATE = "the goal has become active"
@@ -92,7 +92,7 @@ TERMINAL = frozenset(
         GoalState.LOST,
     }
 )
-"""Where a goal's life ends."""
+"""The final states of a goal."""
 
 _G = GoalState
 _C = ClientState
@@ -111,7 +111,7 @@ SERVER_STEPS: Mapping[GoalEvent, Mapping[int, GoalState]] = {
     GoalEvent.ABORT: {_G.PREEMPTING: _G.ABORTED, _G.ACTIVE: _G.ABORTED},
     GoalEvent.SUCCEED: {_G.PREEMPTING: _G.SUCCEEDED, _G.ACTIVE: _G.SUCCEEDED},
 }
-"""The server's side. A state that an event does not name stays as it is, and the event is a mistake."""
+"""The server's transitions. In a state that is not listed for an event, the event is invalid and the state is kept."""
 
 _Steps = Mapping[int, tuple[ClientState, ...]]
 
@@ -153,7 +153,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
         _G.ABORTED: _TO_RESULT,
         _G.PREEMPTING: (_C.PREEMPTING,),
     },
-    # A status may be older than the result whose status the client has seen already.
+    # A delayed status may be older than the result, whose status the client has already processed.
     _C.WAITING_FOR_RESULT: {_G.ACTIVE: _STAYS, **_ENDED},
     _C.WAITING_FOR_CANCEL_ACK: {
         _G.PENDING: _STAYS,
@@ -183,10 +183,10 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
     },
     _C.DONE: _ENDED,
 }
-"""The client's side: the states that it passes through, in order, when it receives a goal's status.
+"""The client's transitions: the states that it passes through, in order, when it receives a goal's status.
 
-A status may have been missed (a list replaces the one before), so one may lead over several states. What is
-not named cannot follow.
+A client may miss a status, since each list replaces the previous one, so a status may lead through several states.
+A status that is not listed is invalid in that state.
 """
 
 _NONE: Mapping[int, SimpleStep] = dict.fromkeys(ClientState, SimpleStep.NONE)
@@ -207,13 +207,13 @@ SIMPLE_STEPS: Mapping[int, Mapping[int, SimpleStep]] = {
         _C.DONE: SimpleStep.WRONG,
     },
 }
-"""The simple client's side: its state, and the client's state that has come."""
+"""The simple client's transitions: its state, and the client's new state."""
 
 _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.PENDING}
 
 
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
-    """Return what a client in ``state`` passes through when it receives ``status``; None if that cannot follow.
+    """Return the states that a client in ``state`` passes through on receiving ``status``; None if the status is invalid.
 
     Raise KeyError on a status that servers do not publish.
     """
@@ -223,9 +223,9 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 
 
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
-    """Return whether a cancel means a goal: by its id, as one up to the cancel's stamp, or as one of all (neither given).
+    """Return whether a cancel request applies to a goal: by id, by a stamp up to the request's, or to all (neither given).
 
-    Stamps are nanoseconds; zero is none.
+    Stamps are nanoseconds; zero means none.
     """
     if not cancel_id and not cancel_stamp:
         return True
@@ -233,5 +233,5 @@ def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -
 
 
 def visible_state(status: int) -> int:
-    """Return the simple client's view of a goal's status: one that is being cancelled is still pending or active."""
+    """Return the goal's status in the simple client: a goal being cancelled still counts as pending or active."""
     return int(_VISIBLE.get(status, status))

@@ -1,7 +1,7 @@
 """The Master API and the Parameter Server API: a table of methods, and the ``[status code, text, value]`` answers.
 
-Pure: what a call makes the master do goes through :meth:`MasterApi.notify` and :attr:`MasterApi.record`. An answer that takes
-long comes in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; texts
+Pure: the effects of a call go through :meth:`MasterApi.notify` and :attr:`MasterApi.record`. A slow answer is computed
+in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; texts
 and corner cases are those of real rosmaster (tests/runtime/master/master_calls.py).
 """
 
@@ -46,31 +46,26 @@ __all__ = ["PARAMETERS", "MasterApi", "Notice", "key_of_node", "nothing"]
 
 _log = logging.getLogger(__name__)
 
-_FEW = 200
-"""Nodes that may be notified in one step."""
+_FEW = 200  # nodes to notify in one step
 
-_ROWS = 500
-"""Of a table that are collected in one step."""
+_ROWS = 500  # rows of a table to collect in one step
 
-PARAMETERS = ""
-"""For :meth:`MasterApi.defer`: no topic has this name."""
+PARAMETERS = ""  # stands for parameters in :meth:`MasterApi.defer`; no topic has this name
 
+# Amessage from the master to a node after a change
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
-"""What a change makes the master send to a node."""
 
 
 class MasterApi(ABC):
-    """One method per call of the API; ``serve`` is what the XML-RPC server calls."""
+    """One method per call of the API; the XML-RPC server calls ``serve``."""
 
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
-        self.log: Callable[[str], object] = nothing
-        """Gets a line for each registration."""
-        self.record: Callable[..., object] = nothing
-        """Receives each change, as it is written to the journal."""
+        self.log: Callable[[str], object] = nothing  # called with a line for each registration
+        self.record: Callable[..., object] = nothing  # called with each change, in the form for the journal
         self.store: Callable[[object], Steps[int]] = _store_nothing
-        """Writes a large value to the journal, and returns the number that a change refers to it by."""
+        """Writes a large value to the journal, and returns the number by which a change refers to it."""
 
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)
@@ -122,10 +117,10 @@ class MasterApi(ABC):
 
     @abstractmethod
     def notify(self, action: Notice) -> None:
-        """Do what a change of the tables requires."""
+        """Send the notice that a change of the tables requires."""
 
     def notify_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
-        """Do what a change of the tables requires, which may be much."""
+        """Send the notices that a change of the tables requires, which may be many."""
         for number, action in enumerate(actions):
             self.notify(action)
             if number % _FEW == _FEW - 1:
@@ -133,18 +128,18 @@ class MasterApi(ABC):
 
     @abstractmethod
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notices to a node about a topic or PARAMETERS, whose answer it is receiving now."""
+        """Delay notices about a topic or PARAMETERS to a node that is receiving an answer about it now."""
 
     @abstractmethod
     def stop(self) -> None:
-        """Somebody asked the master to stop."""
+        """Request the master to stop."""
 
     @abstractmethod
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
-        """Return the state of this master: minirospy's own, for `minirospy master --status`."""
+        """Return this master's status, for `minirospy master --status`; not part of ROS's API."""
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
     # --- about the master
@@ -171,7 +166,7 @@ class MasterApi(ABC):
         return [SUCCESS, "node api", uri] if uri else [ERROR, f"unknown node [{node}]", ""]
 
     def lookup_service(self, caller_id: str, service: str) -> Answer:
-        """Return where a service is called."""
+        """Return the URI of a service."""
         uri = self.registry.service_uri(service)
         return [SUCCESS, f"rosrpc URI: [{uri}]", uri] if uri else [ERROR, "no provider", ""]
 
@@ -183,7 +178,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the same in steps."""
         if self.registry.is_large:
-            # Clients that wait for theirs hold no list meanwhile.
+            # One at a time, so that waiting clients do not each have a list in memory.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
@@ -260,7 +255,7 @@ class MasterApi(ABC):
         return [SUCCESS, f"Registered [{caller_id}] as provider of [{service}]", 1]
 
     def unregister_service(self, caller_id: str, service: str, uri: str) -> Answer:
-        """Unregister a service, which is called at ``uri``."""
+        """Unregister the service at ``uri``."""
         if self.registry.unregister_service(caller_id, service, uri):
             self.record("-srv", caller_id, service, uri)
             self.log(f"-SERVICE [{service}] {caller_id} {uri}")
@@ -277,9 +272,9 @@ class MasterApi(ABC):
             return self._get(name)
 
         def get() -> Steps[Answer]:
-            # Here, in a step: to count the items takes its time.
+            # Count the items in a step, since this takes time.
             if not self.parameters.is_small_at(name):
-                # A value that clients wait for is copied whenever another one changes it.
+                # One at a time: a value that is being sent must be copied whenever another client changes it.
                 yield ALONE
             return self._get(name)
 
@@ -302,7 +297,7 @@ class MasterApi(ABC):
         return self._run(steps, self.parameters.count_subscriptions())
 
     def _set_large(self, caller_id: str, name: str, value: object) -> Steps[Answer]:
-        # One at a time: the value is in the tree, or it is freed, before the next one comes.
+        # One at a time: a value is stored in the tree or freed before the next one is processed.
         yield ALONE
         weight = yield from _weigh(name, value)
         yield from self.parameters.make_room(weight)
@@ -344,7 +339,7 @@ class MasterApi(ABC):
         return self._run(delete(), self.parameters.count_subscriptions())
 
     def search_param(self, caller_id: str, key: str) -> Answer:
-        """Return the nearest parameter of a name, upwards from the caller's namespace."""
+        """Return the closest parameter of a name, upwards from the caller's namespace."""
         if key.startswith("~"):
             return [FAILURE, "Internal failure: invalid key", 0]
         if not caller_id.startswith("/"):
@@ -365,8 +360,8 @@ class MasterApi(ABC):
         return finish(collect()) if self.parameters.is_small else collect()
 
     def subscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
-        """Tell a node of changes of a parameter; its value now."""
-        # First: it is refused where there are too many, and replaces nothing.
+        """Subscribe a node to a parameter's changes; return its present value."""
+        # First, so that a refusal because of a limit has no side effects.
         value = self.parameters.subscribe(name, caller_id, uri)
         try:
             actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
@@ -380,7 +375,7 @@ class MasterApi(ABC):
         return [SUCCESS, f"Subscribed to parameter [{name}]", value]
 
     def unsubscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
-        """Tell it no more."""
+        """Unsubscribe a node from a parameter's changes."""
         if self.parameters.unsubscribe(name, caller_id, uri):
             self.registry.unregister_parameter(caller_id, key_of_node(name), uri)
             self.record("-par", caller_id, name, uri)
@@ -390,13 +385,13 @@ class MasterApi(ABC):
     # --- helpers
 
     def _run(self, steps: Steps[Answer], actions: int) -> Answer | Steps[Answer]:
-        """Return the answer immediately where it takes few actions, else the steps to it."""
+        """Return the answer immediately if it needs few actions, otherwise the steps that compute it."""
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
-        """Do the first action, and return the others.
+        """Perform the first action, and return the others.
 
-        It may stop a node whose name another one took: its parameters are dropped before the change is noted.
+        The first one may stop a node whose name was taken over: its parameters are dropped before the change is recorded.
         """
         others = iter(actions)
         for action in islice(others, 1):
@@ -437,9 +432,9 @@ def _store_nothing(_: object) -> Steps[int]:
 
 
 def nothing(*_: object) -> None:
-    """Do nothing, in place of a journal or a log."""
+    """Do nothing; the default for a journal or a log."""
 
 
 def key_of_node(key: str) -> str:
-    """Return a parameter's name among a node's entries, which hold topics and services too."""
+    """Return a parameter's name in a node's table, which contains topics and services too."""
     return key.rstrip("/") or "/"

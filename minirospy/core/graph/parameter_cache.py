@@ -1,7 +1,7 @@
-"""The parameters that a node has read before: values in, notifications of changes in, values out.
+"""The cache of parameters that a node has read: values and change notifications in, values out.
 
-Pure. A change makes the node forget what it concerns, and the next read queries the master: so updates that overtake
-each other, and the empty dictionary that means "deleted" as well as "empty", do no harm.
+Pure. A change only invalidates the affected values, and the next read queries the master. So updates that overtake each
+other do no harm, nor does the ambiguous empty dictionary, which means "deleted" as well as "empty".
 Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
 """
 
@@ -17,14 +17,13 @@ class _Missing(Enum):
     NOT_SET = "not set"
 
 
-NOT_SET: Final = _Missing.NOT_SET
-"""In place of the value of a parameter that is not set; None could be a value."""
+NOT_SET: Final = _Missing.NOT_SET  # the value of a parameter that is not set; None could be a value
 
 
 class ParameterCache:
-    """Values by global name; the value NOT_SET says that the master has none.
+    """Values by global name; the value NOT_SET means that the master has none.
 
-    :meth:`store` and :meth:`changed` from several threads want a lock around them.
+    If several threads call :meth:`store` and :meth:`changed`, the caller must use a lock.
     """
 
     def __init__(self) -> None:
@@ -33,20 +32,20 @@ class ParameterCache:
 
     @property
     def changes(self) -> int:
-        """Return the number of changes: to be read before the master is queried, and given to :meth:`store`."""
+        """The number of changes: read it before querying the master, and pass it to :meth:`store`."""
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return what was stored for ``key`` and has not changed since. Raise LookupError."""
+        """Return the value stored for ``key``, if it has not changed since. Raise LookupError."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:
-        """Keep the master's answer, unless there was a change since it was asked."""
+        """Store the master's answer, unless there was a change since the query."""
         if changes == self._changes:
             self._values[key] = value
 
     def changed(self, key: str) -> None:
-        """Forget what a change of ``key`` concerns: itself, what is below it, and what it is a part of."""
+        """Invalidate the values affected by a change of ``key``: itself, those below it, and the namespaces that contain it."""
         changed = _with_slash(key)
         self._changes += 1
         for known in list(self._values):

@@ -1,7 +1,7 @@
 """The parameter server's tree, and the nodes to notify of a change.
 
 Pure: calls in, values and updates out. Keys are global names. Source:
-http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster where that is silent.
+http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster for details missing there.
 """
 
 from __future__ import annotations
@@ -19,32 +19,30 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-_MAX_DEPTH = 56
-"""Namespaces and dictionaries inside each other: XML-RPC's 64 levels hold it and the answer around it."""
+_MAX_DEPTH = 56  # nested namespaces and dictionaries; an answer around them must fit into XML-RPC's 64 levels
 
 _MAX_INT = 2**31
 
 _STEP_ITEMS = 1000
+# Approximate sizes of a number, an empty list, and a dictionary or an entry of it
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
-"""What a number, a list without its items, and a dictionary and each entry of it take in memory, about."""
 
-MAX_BYTES = 96 * 1024 * 1024
-"""What all parameters together may take in memory."""
+MAX_BYTES = 96 * 1024 * 1024  # of memory for all parameters together
 
+# Part of MAX_BYTES that is reserved for values of at most SMALL bytes
 RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
-"""What is left of it to values of no more than SMALL bytes."""
 
+# Subscriptions to parameters, of all nodes and of one host and port
 MAX_SUBSCRIPTIONS, MAX_OF_ONE = 20_000, 10_000
-"""Subscriptions to parameters, of all nodes and of one host and port."""
 
+# Part of MAX_SUBSCRIPTIONS that is reserved for hosts and ports with at most FEW subscriptions
 FEW_RESERVE, FEW = 5_000, 100
-"""What is left of them to hosts and ports that have no more than FEW."""
 
 _FEW_BYTES, _MANY_BYTES = 50_000, 1_000_000
 
 
 class ParametersFullError(MinirospyError):
-    """A parameter or a subscription would be beyond a limit, which ``limit`` names."""
+    """A parameter or a subscription would exceed a limit, described by ``limit``."""
 
     def __init__(self, limit: str) -> None:
         super().__init__(limit)
@@ -55,7 +53,7 @@ class ParametersFullError(MinirospyError):
 
 
 class ParameterUpdate(NamedTuple):
-    """Notify the node at ``uri`` of the value of ``key`` (which ends in a slash), {} where it is not set."""
+    """Notify the node at ``uri`` of the value of ``key`` (which ends in a slash), {} if it is not set."""
 
     uri: str
     key: str
@@ -70,23 +68,23 @@ class _Subscriber:
 class ParameterTree:
     """Parameters in namespaces, as nested dictionaries.
 
-    What :meth:`get` returns is never changed afterwards: it may be written to a client in steps, while others set
+    The result of :meth:`get` is never changed afterwards: it may be serialized in steps, while other clients set
     parameters. So a dictionary that was returned is copied before it is changed.
     """
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
+        # The ids of the dictionaries that were not returned to any caller since their creation: these may be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
-        # Their keys, sorted: those below a namespace are next to each other.
+        # The keys of subscriptions, sorted, so that those below a namespace are adjacent.
         self._keys: list[str] = []
         self._shares = Shares(MAX_SUBSCRIPTIONS, MAX_OF_ONE, FEW_RESERVE, FEW)
-        # URI of a node -> its keys, and under how many names it subscribed to each.
+        # URI of a node -> its keys, each with the number of node names that subscribed to it.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most
         self._reserve = reserve
-        # No less than what all values take in memory.
+        # An upper bound of the memory that all values take.
         self._bytes = 0
 
     def get(self, key: str) -> object:
@@ -104,12 +102,12 @@ class ParameterTree:
 
     @property
     def is_small(self) -> bool:
-        """Return whether all parameters together are few."""
+        """Return whether the number of all parameters is small."""
         return self._bytes < _FEW_BYTES
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of their names takes so much memory that only one is made at a time."""
+        """Return whether a list of all names takes so much memory that only one is built at a time."""
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
@@ -117,14 +115,14 @@ class ParameterTree:
         return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:
-        """Return whether there surely is room for a value of ``weight`` bytes."""
+        """Return whether there is certainly room for a value of ``weight`` bytes."""
         return self._bytes + weight <= self._most_for(weight)
 
     def _most_for(self, weight: int) -> int:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Count again, since values that were replaced are still counted. Raise ParametersFullError."""
+        """Recount the memory, since replaced values are still counted. Raise ParametersFullError."""
         if not self.has_room(weight):
             before = self._bytes
             counted = yield from weigh_in_steps("/", self.get("/"))
@@ -135,8 +133,8 @@ class ParameterTree:
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
         """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
 
-        A value in the way of a namespace is replaced by it. Raise ValueError if the root would become
-        something else than a dictionary.
+        A value at the position of a required namespace is replaced by it. Raise ValueError if the root would not be a
+        dictionary.
         """
         path = _split(key)
         if path:
@@ -158,10 +156,10 @@ class ParameterTree:
         return self._updates(path)
 
     def search(self, namespace: str, key: str) -> str | None:
-        """Return the name of the nearest parameter ``key``, upwards from ``namespace``.
+        """Return the name of the closest parameter ``key``, upwards from ``namespace``; None if there is none.
 
-        Only the first part of ``key`` has to exist, as the API demands: a node may look for a namespace
-        whose parameters come later. None if there is none.
+        Only the first part of ``key`` has to exist, as the API demands: a node may search for a namespace
+        whose parameters are set later.
         """
         if key.startswith("/"):
             return key if self.has(key) else None
@@ -175,17 +173,17 @@ class ParameterTree:
             namespace = namespace_of(base)
 
     def names(self) -> list[str]:
-        """Return the names of all parameters, namespaces left out."""
+        """Return the names of all parameters, without namespaces."""
         return finish(self.names_in_steps())
 
     def names_in_steps(self) -> Steps[list[str]]:
-        """Return the same, of a tree that may be large."""
+        """Return the same in steps, since the tree may be large."""
         found: list[str] = []
         left = _STEP_ITEMS
         root = self.get("/")
         assert isinstance(root, dict)
-        # The namespaces around the present one. No function that calls itself: its list would be in a cycle of
-        # references, and the master's garbage collector does not look at what lives long.
+        # The namespaces around the present one. This is not a recursive function, since such a closure is in a
+        # reference cycle with its list, and the master's garbage collector does not examine old objects.
         around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
 
         while around:
@@ -222,7 +220,7 @@ class ParameterTree:
         return self.get(key) if self.has(key) else {}
 
     def unsubscribe(self, key: str, caller_id: str, uri: str) -> bool:
-        """Notify it no more; return whether it was subscribed."""
+        """Unsubscribe a node from a key; return whether it was subscribed."""
         full = _with_slash(_split(key))
         if _Subscriber(caller_id, uri) not in self._subscribers.get(full, {}):
             return False
@@ -230,14 +228,14 @@ class ParameterTree:
         return True
 
     def unsubscribe_node(self, caller_id: str, uri: str) -> None:
-        """Forget a node that is gone."""
+        """Remove all subscriptions of a node."""
         gone = _Subscriber(caller_id, uri)
         for key in self.subscribed_keys(uri):
             if gone in self._subscribers[key]:
                 self._drop(key, gone)
 
     def count_subscriptions(self) -> int:
-        """Return how many subscriptions there are."""
+        """Return the number of subscriptions."""
         return self._shares.total
 
     def subscribed_keys(self, uri: str) -> list[str]:
@@ -245,7 +243,7 @@ class ParameterTree:
         return list(self._keys_of.get(uri, ()))
 
     def subscriptions(self) -> Iterator[tuple[str, str, str]]:
-        """(node, URI, key) of each subscription; keys end in a slash."""
+        """Yield (node, URI, key) of each subscription; keys end in a slash."""
         return (
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
@@ -272,7 +270,7 @@ class ParameterTree:
         return value
 
     def _enter(self, path: list[str]) -> dict[str, object]:
-        """Return the dictionary at ``path``, which is made where it is not there, to be changed."""
+        """Return the dictionary at ``path``, created if it does not exist, in a form that may be changed."""
         table = self._root = self._owned(self._root)
         for name in path:
             inner = table.get(name)
@@ -301,21 +299,21 @@ class ParameterTree:
             del self._keys[bisect_left(self._keys, key)]
 
     def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
-        """Yield the updates that a change requires, one by one: there may be many."""
+        """Yield the updates that a change requires one by one, since there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
-            # Who set it knows it.
+            # The node that set it knows the value.
             for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)
 
-        # Who set the namespace is notified too: what it keeps of a parameter inside is out of date.
+        # The node that set the namespace is notified too: its cached value of a parameter inside is outdated.
         at = bisect_right(self._keys, changed)
         while at < len(self._keys) and self._keys[at].startswith(changed):
             key = self._keys[at]
             for each in list(self._subscribers[key]):
                 yield ParameterUpdate(each.uri, key)
-            # Others may have subscribed meanwhile.
+            # The subscriptions may have changed meanwhile.
             at = bisect_right(self._keys, key)
 
 
@@ -323,16 +321,16 @@ _UNSET = object()
 
 
 def weigh_in_steps(key: str, value: object) -> Steps[int]:
-    """Return about how many bytes of memory a value takes.
+    """Return approximately how many bytes of memory a value takes.
 
-    Raise ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.
+    Raise ValueError if no answer could contain it: it would make the namespaces above ``key`` unreadable.
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")
-    # The namespaces around it, which may not be there yet.
+    # The namespaces around the value, which may not exist yet.
     weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
     left = _STEP_ITEMS
-    # The containers around the present item: how deep their items are, and those that are still to come.
+    # The containers around the present item: the depth of their items, and the remaining ones.
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:
         depth, items = around[-1]

@@ -1,7 +1,7 @@
-"""The master's registry: which nodes publish, subscribe and serve what.
+"""The master's registry: the publishers, subscribers and services of each node.
 
 Pure: calls in, (answer, actions) out. Names are global. Source: http://wiki.ros.org/ROS/Master_API, and real
-rosmaster where that is silent.
+rosmaster for details missing there.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
-    """Send the subscriber at ``uri`` the full list of a topic's publishers, as it is when it is sent."""
+    """Send the subscriber at ``uri`` the complete list of a topic's publishers at the time of sending."""
 
     uri: str
     topic: str
 
 
 class NodeShutdown(NamedTuple):
-    """Stop the node at ``uri``: another one has taken its name."""
+    """Stop the node at ``uri``, since another node has taken its name."""
 
     uri: str
     name: str
@@ -50,14 +50,14 @@ Action = PublisherUpdate | NodeShutdown
 
 
 class Registered(NamedTuple):
-    """The URIs of the other side (a publisher's subscribers, a subscriber's publishers), and what to do."""
+    """The URIs of the peers (a publisher's subscribers, a subscriber's publishers), and the actions to perform."""
 
     peers: list[str]
     actions: Iterable[Action]
 
 
 class _NodeEntry:
-    """A node's name and URI, and what it has registered: name -> what it is there, as bits."""
+    """A node's name and URI, and its registrations: name -> kinds of registration, as bits."""
 
     __slots__ = ("entries", "holder", "name", "size", "uri")
 
@@ -65,8 +65,7 @@ class _NodeEntry:
         self.name = name
         self.uri = uri
         self.holder = intern(holder_of(uri))
-        self.size = 0
-        """The bytes that are counted for it."""
+        self.size = 0  # bytes counted for this node
         self.entries: dict[str, int] = {}
 
     def add(self, name: str, kind: int) -> None:
@@ -91,13 +90,12 @@ class _Service(NamedTuple):
 class Registry:
     """The publishers, subscribers and services of a graph. Tables keep the order of registration.
 
-    Actions come one by one, as they are needed: there may be many of them.
+    Actions are yielded one by one, on demand, since there may be many.
     """
 
     def __init__(self, shares: Shares | None = None) -> None:
-        """``shares``: the bytes that the nodes of each host and port may take."""
-        self.changes = 0
-        """Grows whenever publishers, subscribers or services may have changed."""
+        """Take ``shares``, the bytes that the nodes of each host and port may use."""
+        self.changes = 0  # grows whenever publishers, subscribers or services may have changed
         self._shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _NodeEntry] = {}
         self._publishers: dict[str, dict[str, str]] = {}
@@ -108,7 +106,7 @@ class Registry:
     # --- registering
 
     def register_publisher(self, node: str, topic: str, type_: str, uri: str) -> Registered:
-        """``node``, whose Slave API is at ``uri``, publishes ``topic``."""
+        """Register ``node``, whose Slave API is at ``uri``, as a publisher of ``topic``."""
         actions = self._claim(node, uri, topic, PUBLISHES, type_)
         entry = self._enter(node, topic, PUBLISHES)
         _row(self._publishers, topic)[entry.name] = entry.uri
@@ -122,14 +120,14 @@ class Registry:
         return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
     def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
-        """``node`` publishes ``topic`` no more; None if that was not registered from ``uri``."""
+        """Unregister ``node`` as a publisher of ``topic``; return None if it was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, PUBLISHES)
         return self._updates(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
-        """``node`` subscribes to ``topic``; type "*" takes any and does not become the topic's."""
+        """Register ``node`` as a subscriber of ``topic``; type "*" matches any type and does not become the topic's."""
         actions = self._claim(node, uri, topic, SUBSCRIBES, type_)
         entry = self._enter(node, topic, SUBSCRIBES)
         _row(self._subscribers, topic)[entry.name] = entry.uri
@@ -139,14 +137,14 @@ class Registry:
         return Registered(list(publishers.values()) if publishers else [], actions)
 
     def unregister_subscriber(self, node: str, topic: str, uri: str) -> bool:
-        """``node`` subscribes no more; whether that was registered from ``uri``."""
+        """Unregister ``node`` as a subscriber; return whether it was registered from ``uri``."""
         if self._subscribers.get(topic, {}).get(node) != uri:
             return False
         self._drop(self._subscribers, topic, node, SUBSCRIBES)
         return True
 
     def register_service(self, node: str, service: str, service_uri: str, uri: str) -> Iterable[Action]:
-        """``node`` offers ``service`` at ``service_uri``; the last one to register has it."""
+        """Register ``service`` of ``node`` at ``service_uri``; it replaces an earlier provider."""
         actions = self._claim(node, uri, service, SERVES, service_uri)
         before = self._services.get(service)
         if before:
@@ -159,7 +157,7 @@ class Registry:
         return actions
 
     def unregister_service(self, node: str, service: str, service_uri: str) -> bool:
-        """``node`` offers ``service`` no more; whether it was offered at ``service_uri``."""
+        """Unregister ``service`` of ``node``; return whether it was offered at ``service_uri``."""
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
@@ -168,19 +166,19 @@ class Registry:
         return True
 
     def register_parameter(self, node: str, key: str, uri: str) -> Iterable[Action]:
-        """``node`` is to be notified of a parameter: the tree holds the subscription, this table the node."""
+        """Record that ``node`` has subscribed to a parameter; the subscription itself is in the parameter tree."""
         actions = self._claim(node, uri, key, PARAMETER)
         self._enter(node, key, PARAMETER)
         return actions
 
     def unregister_parameter(self, node: str, key: str, uri: str) -> None:
-        """``node`` is not notified any more."""
+        """Remove the record of ``node``'s subscription to a parameter."""
         entry = self._nodes.get(node)
         if entry and entry.uri == uri:
             self._leave(node, key, PARAMETER)
 
     def forget(self, node: str, uri: str) -> Iterable[Action]:
-        """Drop all that ``node`` has registered from ``uri``: it is gone."""
+        """Remove all registrations of ``node`` from ``uri``, since it is gone."""
         entry = self._nodes.get(node)
         if entry is None or entry.uri != uri:
             return ()
@@ -188,24 +186,24 @@ class Registry:
         return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Remember the type of a topic that nobody registers now."""
+        """Set the type of a topic that has no registrations now."""
         self._types.keep(topic, type_)
 
     # --- queries
 
     @property
     def is_small(self) -> bool:
-        """Return whether all registrations together are few."""
+        """Return whether the number of all registrations is small."""
         return self._shares.total < _FEW_BYTES
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of them takes so much memory that only one is made at a time."""
+        """Return whether a list of all registrations takes so much memory that only one is built at a time."""
         return self._shares.total > _MANY_BYTES
 
     @property
     def is_crowded(self) -> bool:
-        """Return whether nearly so much is registered that room is left to those with few registrations only."""
+        """Return whether only the reserve for nodes with few registrations is left."""
         return self._shares.total > self._shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
@@ -214,16 +212,16 @@ class Registry:
         return entry.uri if entry else None
 
     def nodes(self) -> dict[str, str]:
-        """Node -> the URI of its Slave API."""
+        """Return node -> URI of its Slave API, for all nodes."""
         return {name: entry.uri for name, entry in self._nodes.items()}
 
     def service_uri(self, service: str) -> str | None:
-        """Return where a service is called."""
+        """Return the URI of a service."""
         entry = self._services.get(service)
         return entry.uri if entry else None
 
     def count_subscribers(self, topic: str) -> int:
-        """Return how many nodes subscribe to a topic."""
+        """Return the number of nodes that subscribe to a topic."""
         return len(self._subscribers.get(topic, ()))
 
     def publisher_uris(self, topic: str) -> list[str]:
@@ -236,11 +234,11 @@ class Registry:
         return entry.names(SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
-        """Return the type of each topic that was ever registered with one."""
+        """Return the type of each topic that was ever registered with a type."""
         return dict(self.type_rows())
 
     def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """(topic, type) of each published topic below the namespace ``subgraph``."""
+        """Return (topic, type) of each published topic below the namespace ``subgraph``."""
         return list(self.published_rows(subgraph))
 
     def publishers(self) -> dict[str, list[str]]:
@@ -256,11 +254,11 @@ class Registry:
         return dict(self.service_rows())
 
     def type_rows(self) -> Iterator[tuple[str, str]]:
-        """Yield what :meth:`topic_types` returns. The table may change meanwhile."""
+        """Yield the items of :meth:`topic_types`. The table may change meanwhile."""
         return self._types.rows()
 
     def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
-        """Yield what :meth:`published_topics` returns. The table may change meanwhile."""
+        """Yield the items of :meth:`published_topics`. The table may change meanwhile."""
         prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
         return (
             (topic, self._types[topic])
@@ -281,31 +279,31 @@ class Registry:
         return ((service, [entry.node]) for service, entry in list(self._services.items()))
 
     def count_topics(self) -> int:
-        """Return how many topics are published or subscribed to."""
+        """Return the number of topics that are published or subscribed to."""
         return len(self._publishers.keys() | self._subscribers.keys())
 
     def count_services(self) -> int:
-        """Return how many services are offered."""
+        """Return the number of services."""
         return len(self._services)
 
     def publications(self) -> Iterator[tuple[str, str]]:
-        """(node, topic) of each publication, in the order of the tables. They may change meanwhile."""
+        """Yield (node, topic) of each publication, in the order of the tables, which may change meanwhile."""
         return _pairs(self._publishers)
 
     def all_subscriptions(self) -> Iterator[tuple[str, str]]:
-        """(node, topic) of each subscription. The table may change meanwhile."""
+        """Yield (node, topic) of each subscription. The table may change meanwhile."""
         return _pairs(self._subscribers)
 
     def offers(self) -> Iterator[tuple[str, str, str]]:
-        """(node, service, URI) of each service."""
+        """Yield (node, service, URI) of each service."""
         return ((entry.node, service, entry.uri) for service, entry in self._services.items())
 
     # --- helpers
 
     def _claim(self, node: str, uri: str, name: str, kind: int, text: str = "") -> Iterable[Action]:
-        """Make ``node`` known at ``uri``, where it registers ``name`` with a type or a service's URI.
+        """Record that ``node`` at ``uri`` registers ``name`` with a type or a service's URI.
 
-        What is registered under its name at another address is dropped and stopped. Raise RegistryFullError.
+        Registrations of the same node name at another address are removed and that node is stopped. Raise RegistryFullError.
         """
         entry = self._nodes.get(node)
         is_new = entry is None or entry.uri != uri
@@ -332,7 +330,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the bytes that a type or a service's URI takes beyond the one that it may replace."""
+        """Return the bytes for a type or a service's URI, minus those of the one that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)
@@ -346,7 +344,7 @@ class Registry:
         self._count(self._nodes[node], size)
 
     def _clear(self, entry: _NodeEntry) -> list[str]:
-        """Take a node out of every table; the topics that it published."""
+        """Remove a node from every table; return the topics that it published."""
         self.changes += 1
         published = entry.names(PUBLISHES)
         for topic in published:
@@ -391,7 +389,7 @@ class Registry:
             self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
-        """Yield an update for each subscriber of the topics, as they are when it is their turn."""
+        """Yield an update for each subscriber of the topics, as they are at the time of yielding."""
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)
@@ -415,6 +413,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # The quickest copy of many small tables: a journal that is rewritten starts with it.
+    # This is the fastest copy of many small tables; rewriting a journal starts with it.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -1,6 +1,6 @@
-"""The limits of the registry: how much memory registrations take, and how much of it the nodes of one client get.
+"""The limits of the registry: the memory that registrations take, and the share for the nodes of one host and port.
 
-Pure. Sizes are those of CPython on 64 bits: a name that is registered is in up to four tables.
+Pure. Sizes are those of CPython on 64 bits: a registered name is in up to four tables.
 """
 
 from __future__ import annotations
@@ -23,32 +23,27 @@ __all__ = [
 
 _MIB = 1024 * 1024
 
-MAX_BYTES = 64 * _MIB
-"""What all registrations together may take in memory: about 60,000 nodes of one topic each."""
+MAX_BYTES = 64 * _MIB  # of memory for all registrations together: about 60,000 nodes with one topic each
 
-MAX_OF_ONE = 32 * _MIB
-"""The same of one host and port."""
+MAX_OF_ONE = 32 * _MIB  # the same for one host and port
 
 RESERVE = 16 * _MIB
-"""What is left to hosts and ports that have no more than FEW_OF_ONE, some 300 topics and services."""
+"""Part of MAX_BYTES that is reserved for hosts and ports with at most FEW_OF_ONE, some 300 topics and services."""
 
 FEW_OF_ONE = _MIB // 4
 
-MAX_ENTRIES = 10_000
-"""Topics, services and parameters that one node may register."""
+MAX_ENTRIES = 10_000  # topics, services and parameters per node
 
+# Approximate sizes of a node and of each name that it registers, without their strings
 _NODE_BYTES, _NAME_BYTES = 400, 150
-"""What a node and each name that it registers take beside their texts, about."""
 
-PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8
-"""What a name may be to a node."""
+PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration of a name, as bits
 
-_KIND_BYTES = {PUBLISHES: 200, SUBSCRIBES: 200, SERVES: 200, PARAMETER: 400}
-"""What that takes."""
+_KIND_BYTES = {PUBLISHES: 200, SUBSCRIBES: 200, SERVES: 200, PARAMETER: 400}  # size of each kind
 
 
 class RegistryFullError(MinirospyError):
-    """A registration would be beyond a limit, which ``limit`` names."""
+    """A registration would exceed a limit, described by ``limit``."""
 
     def __init__(self, limit: str) -> None:
         super().__init__(limit)
@@ -59,12 +54,12 @@ class RegistryFullError(MinirospyError):
 
 
 def new_shares() -> Shares:
-    """Return the bytes that the nodes of each host and port may take, none of them in use."""
+    """Return the shares of registration memory for each host and port, none of them in use."""
     return Shares(MAX_BYTES, MAX_OF_ONE, RESERVE, FEW_OF_ONE)
 
 
 def describe(excess: Excess, shares: Shares) -> str:
-    """Return a limit as text."""
+    """Return a description of a limit."""
     match excess:
         case Excess.ALL:
             return f"{shares.most // _MIB} MiB for all registrations"
@@ -75,9 +70,9 @@ def describe(excess: Excess, shares: Shares) -> str:
 
 
 def text_cost(text: str) -> int:
-    """Return the bytes that a text takes.
+    """Return the bytes that a string takes.
 
-    Not by sys.getsizeof: Python adds a copy as UTF-8 to a text while it is in use, once a journal needed it.
+    sys.getsizeof would be inexact: Python caches a string's UTF-8 form once it is needed, such as for the journal.
     """
     return 50 + len(text) if text.isascii() else 80 + 8 * len(text)
 
@@ -88,10 +83,10 @@ def node_cost(name: str, uri: str) -> int:
 
 
 def name_cost(name: str, kind: int, kinds: int) -> int:
-    """Return the bytes that a node takes for being ``kind`` under a name where it is ``kinds`` already."""
+    """Return the bytes for registering a name as ``kind`` if it is already registered as ``kinds``."""
     if kinds & kind:
         return 0
     text = text_cost(name)
-    # The parameter server has its own copy.
+    # The parameter server has its own copy of the name.
     size = _KIND_BYTES[kind] + (text if kind == PARAMETER else 0)
     return size if kinds else size + _NAME_BYTES + text

@@ -1,7 +1,7 @@
-"""Fair shares of what all clients together may have the master hold.
+"""Fair shares of a resource of the master, such as memory, among its clients.
 
-Pure. ROS 1 has no users, and on loopback all clients have one address: a holder is the host and port of a node's
-Slave API, of which each process has its own.
+Pure. ROS 1 has no users, and on loopback all clients have the same address. So a holder is the host and port of a
+node's Slave API, which differ for each process.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ __all__ = ["Excess", "Shares", "holder_of"]
 
 
 class Excess(Enum):
-    """The limit that a holder would be beyond."""
+    """The limit that a holder would exceed."""
 
     ALL = "what all together may hold"
     ONE = "what one may hold"
@@ -20,24 +20,22 @@ class Excess(Enum):
 
 
 class Shares:
-    """The share of each holder in something that is limited: bytes, or entries.
+    """The share of each holder in a limited resource, such as bytes or entries.
 
-    One holder gets ``largest`` of ``most``. The last ``reserve`` is kept for those that have no more than ``small``,
-    so these find room whatever the others hold.
+    One holder gets at most ``largest`` of ``most``. The last ``reserve`` is kept for holders with at most ``small``,
+    so these always find room.
     """
 
     def __init__(self, most: int, largest: int, reserve: int, small: int) -> None:
-        self.total = 0
-        """What all of them hold."""
+        self.total = 0  # the sum over all holders
         self.most = most
         self.largest = largest
         self.small = small
-        self.shared = most - reserve
-        """What holders of more than ``small`` have together."""
+        self.shared = most - reserve  # limit for all holders of more than ``small`` together
         self._held: dict[str, int] = {}
 
     def excess(self, holder: str, more: int) -> Excess | None:
-        """Return the limit that does not let a holder have ``more``, or None."""
+        """Return the limit that prevents a holder from getting ``more``, or None."""
         held, total = self._held.get(holder, 0) + more, self.total + more
         if total > self.most:
             return Excess.ALL
@@ -48,7 +46,7 @@ class Shares:
         return None
 
     def add(self, holder: str, more: int) -> None:
-        """Count what a holder gets, or gives back (below zero)."""
+        """Count an amount that a holder gets, or returns (if negative)."""
         self.total += more
         held = self._held.get(holder, 0) + more
         if held:

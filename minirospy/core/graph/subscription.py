@@ -1,6 +1,6 @@
-"""The connection plan of one subscribed topic: which publishers to connect, which to leave, when to retry.
+"""The connection plan of one subscribed topic: which publishers to connect or disconnect, and when to retry.
 
-Pure: what happened goes in, what to do comes out.
+Pure: events in, actions out.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from itertools import count, islice
 
 __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
-MAX_PUBLISHERS = 1000
-"""Publishers of one topic that a node connects to."""
+MAX_PUBLISHERS = 1000  # publishers of one topic that a node connects to
 
+# New publishers to connect together, and the seconds between groups, so that not all refusals come together
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
-"""New publishers that are connected together, and the seconds between: else all that refuse would fail together, too."""
 
 _FIRST_DELAY = 0.1
 _LONGEST_DELAY = 8.0
@@ -37,22 +36,21 @@ class Disconnect:
 
 
 class SubscriptionPlan:
-    """The publishers that the master named, and how often each has failed.
+    """The publishers in the master's list, and the number of failures of each.
 
-    A link that ends while the master still names its publisher is tried again, with pauses that double:
-    the master reports a publisher that left, not a cable that was pulled. One that refused is called
-    again at the next update of the topic: it may publish another type by then.
+    A link that closes while the master still lists its publisher is retried, with pauses that double: the master reports
+    unregistered publishers, but not broken cables. A publisher that refused is called again at the next update of the
+    topic, since it may publish another type by then.
     """
 
     def __init__(self) -> None:
-        self._failures: dict[str, int] = {}
-        """By the URIs that the master named last, in its order."""
+        self._failures: dict[str, int] = {}  # keys are the URIs of the master's last list, in its order
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list: the full one, or with ``keep`` one that lacks some publishers that still exist.
+        """Apply the master's list: the complete one, or with ``keep`` one that lacks some existing publishers.
 
-        Of a list of more than MAX_PUBLISHERS the others are ignored: anybody may send one.
+        Publishers beyond MAX_PUBLISHERS are ignored, since any process may send a list.
         """
         wanted = dict.fromkeys(islice(uris, MAX_PUBLISHERS))
         if keep:
@@ -65,7 +63,7 @@ class SubscriptionPlan:
         return [*map(Disconnect, gone), *map(Connect, new, delays)]
 
     def failures(self, uri: str) -> int:
-        """Return how often in a row the link to ``uri`` has failed."""
+        """Return the number of consecutive failures of the link to ``uri``."""
         return self._failures.get(uri, 0)
 
     def worked(self, uri: str) -> None:
@@ -74,7 +72,7 @@ class SubscriptionPlan:
             self._failures[uri] = 0
 
     def refused(self, uri: str) -> None:
-        """Record that the publisher at ``uri`` refuses this subscriber: the same answer would come again."""
+        """Record that the publisher at ``uri`` refuses this subscriber; a retry would get the same answer."""
         if uri in self._failures:
             self._refusals.add(uri)
 

@@ -1,6 +1,6 @@
-"""The types of topics: of those that are registered, and of some that nobody registers any more, as rosmaster has it.
+"""The types of topics: of registered topics and, as in rosmaster, of some that are no longer registered.
 
-Pure. A type that is in use is counted for one of the nodes that register its topic.
+Pure. The memory of a type in use is counted for one of the nodes that register its topic.
 """
 
 from __future__ import annotations
@@ -13,30 +13,27 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-_MAX_OLD = 10_000
-_MAX_OLD_BYTES = 4 * 1024 * 1024
-"""Topics whose types are remembered although nobody registers them any more."""
+_MAX_OLD = 10_000  # unregistered topics whose types are kept
+_MAX_OLD_BYTES = 4 * 1024 * 1024  # of these types
 
-_TYPE_BYTES = 100
-"""What a type takes in memory beside its text, about."""
+_TYPE_BYTES = 100  # approximate size of a type without its string
 
 
 class _Type(NamedTuple):
     text: str
-    node: str
-    """The node for which it is counted; "" where none registers the topic."""
+    node: str  # the node for which it is counted; "" if no node registers the topic
 
 
 class TopicTypes:
     """Topic -> type, in the order of the first registrations.
 
-    ``count`` gets a node, and the bytes that are added to what it holds, or taken from it.
+    ``count`` is called with a node and the bytes added to its share, or removed from it if negative.
     """
 
     def __init__(self, count: Callable[[str, int], object]) -> None:
         self._count = count
         self._types: dict[str, _Type] = {}
-        # The topics that nobody registers, the newest at the end, and the bytes of their types.
+        # The unregistered topics, the latest last, and the bytes of their types.
         self._old: dict[str, None] = {}
         self._old_bytes = 0
 
@@ -56,7 +53,7 @@ class TopicTypes:
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return the bytes that a type takes beyond the one that it may replace, for a node that registers the topic."""
+        """Return the bytes for a type minus those of the one that it replaces, for a node that registers the topic."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))
@@ -75,13 +72,13 @@ class TopicTypes:
         self._count(node, _size_of(type_))
 
     def add(self, topic: str, type_: str, node: str) -> None:
-        """Set it unless it is known."""
+        """Set a topic's type unless it is known."""
         before = self._types.get(topic)
         if not (before and before.node):
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Remember the type of a topic that nobody registers now, as the newest of those."""
+        """Keep the type of a topic that is no longer registered, as the latest of these."""
         before = self._types.get(topic)
         if before and before.node:
             return
@@ -99,7 +96,7 @@ class TopicTypes:
             self._remove_old(oldest, self._types.pop(oldest).text)
 
     def leave(self, topic: str, node: str, others: Iterable[str]) -> None:
-        """Count a type for one of ``others``, which register the topic too, once ``node`` has left it."""
+        """Count a type for one of the ``others`` that register the topic, once ``node`` has unregistered it."""
         heir = next(iter(others), "")
         if heir == node or not self.is_counted_for(topic, node):
             return

@@ -1,6 +1,6 @@
 """`python -m minirospy.core.idl [SOURCE [TARGET]]`: compile definitions into Python modules.
 
-SOURCE is a folder of packages (default: minirospy's own ``msgs``), TARGET the folder that gets them (default:
+SOURCE is a folder of packages (default: minirospy's own ``msgs``), TARGET the output folder (default:
 minirospy's own overlay).
 """
 
@@ -21,7 +21,7 @@ _PACKAGE = Path(__file__).parents[2]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return the exit status as defined in minirospy.command.command."""
     return Command("minirospy.core.idl", _parser, _compile).main(argv)
 
 

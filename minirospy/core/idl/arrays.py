@@ -1,7 +1,7 @@
-"""The arrays of numbers of a message -> numpy arrays.
+"""Convert a message's arrays of numbers to numpy arrays.
 
-An array that came as bytes becomes one of numpy without any number of Python in between, read-only as genpy's are.
-Arrays of uint8 and char stay bytes. Nothing here imports numpy before a message needs it.
+An array of received bytes becomes a numpy array without creating Python numbers, read-only like genpy's.
+Arrays of uint8 and char remain bytes. numpy is imported only when a message needs it.
 Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
 """
 
@@ -22,12 +22,12 @@ _DTYPES = {
     "float64": "float64",
     **{f"{sign}int{bits}": f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
-# Arrays of these stay what they are.
+# Arrays of these types are not converted.
 _KEPT = {"uint8", "char", "string", "time", "duration"}
 
 
 def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
-    """Return the message, just read from bytes, with each of its arrays of numbers as a numpy array."""
+    """Convert the arrays of numbers in a just deserialized message to numpy arrays; return the message."""
     raw = getattr(message, "_raw", {})
 
     for name, base, is_array in _fields(_class_of(message)):
@@ -36,11 +36,11 @@ def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
             value = getattr(message, name)
             for inner in value if is_array else (value,):
                 if _is_plain(inner):
-                    # So are the others of its type.
+                    # The other elements have the same type.
                     break
                 arrays_from_bytes(inner, numpy)
         elif name in raw:
-            # Bytes are in ROS's order, on every machine.
+            # ROS's byte order is little-endian, on every machine.
             setattr(message, name, numpy.frombuffer(raw[name], numpy.dtype(dtype).newbyteorder("<")))
         else:
             values = numpy.array(getattr(message, name), dtype)
@@ -68,7 +68,7 @@ def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
 
 
 def _is_plain(message: Message) -> bool:
-    """Return whether no message of this one's type can hold an array of numbers."""
+    """Return whether no message of this type can contain an array of numbers."""
     return all(
         field.base not in _DTYPES and not field.is_array and _is_plain(getattr(message, field.name))
         for field in _fields(_class_of(message))

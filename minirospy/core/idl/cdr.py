@@ -1,11 +1,11 @@
-"""CDR, in which ROS 2 serializes messages, from and to the bytes of ROS 1, without any object in between.
+"""Convert between CDR, the serialization of ROS 2, and that of ROS 1, without creating message objects.
 
-Two specs of one message, ROS 1's and ROS 2's, become a layout: what both have, in order. From it two functions are
-generated, straight lines of Python that move bytes. A message of ROS 1 has no padding; in CDR each number is aligned to its
-own size, a text counts and ends with a NUL, and a struct without members takes a byte. How far a position is aligned is
-known at most places when the code is generated; where it is not, after texts, it is computed.
+The specs of a message in ROS 1 and in ROS 2 are merged into a layout: their common fields, in order. Two functions are
+generated from it, straight-line Python code that moves bytes. A message of ROS 1 has no padding; in CDR each number is
+aligned to its own size, a string's length includes a trailing NUL, and a struct without members takes a byte. The
+alignment of most positions is known when the code is generated; otherwise, as after strings, it is computed.
 
-Written is plain CDR version 1, little-endian; read is either byte order.
+Output is plain CDR version 1, little-endian; input may have either byte order.
 Source: OMG DDS-XTypes 1.3, 7.4.1 (XCDR version 1), and http://wiki.ros.org/msg.
 """
 
@@ -35,14 +35,13 @@ __all__ = [
 ]
 
 CDR_HEADER = bytes((0, 1, 0, 0))
-"""Encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
+"""The encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
 
-_SPARE = 10_000
-"""Elements without bytes that a message may have beyond one for each of its bytes."""
+_SPARE = 10_000  # limit of elements without bytes, in addition to one for each byte of the message
 
 
 class Side(Enum):
-    """Which of the two messages has an item: the other one's is written as zeros, and left out when read."""
+    """Which of the two messages has an item; in the other one it is written as zeros, and skipped when read."""
 
     BOTH = 0
     ROS1 = 1
@@ -58,13 +57,13 @@ class Fixed(NamedTuple):
 
 
 class Text(NamedTuple):
-    """A string."""
+    """A string item."""
 
     side: Side = Side.BOTH
 
 
 class Sequence(NamedTuple):
-    """Elements, each of which is laid out as ``items``; ``length`` is None if it varies."""
+    """Elements that each have the layout ``items``; ``length`` is None if it varies."""
 
     items: tuple[Item, ...]
     length: int | None = None
@@ -76,9 +75,9 @@ Layout = tuple[Item, ...]
 
 
 class Transcoder(NamedTuple):
-    """Bytes of one kind -> bytes of the other. Both raise DeserializationError on bytes that end too early.
+    """Functions that convert bytes in either direction. Both raise DeserializationError on bytes that end too early.
 
-    ``to_cdr(data, header)``: the header as CDR_HEADER, whose options may be set.
+    ``to_cdr(data, header)``: ``header`` is like CDR_HEADER, possibly with options set.
     """
 
     to_cdr: Callable[[bytes | memoryview, bytes], bytes]
@@ -86,9 +85,9 @@ class Transcoder(NamedTuple):
 
 
 def make_transcoder(name: str, layout: Layout) -> Transcoder:
-    """Return the functions that convert a message of this layout; ``name`` is shown in tracebacks.
+    """Return the functions that convert a message with this layout; ``name`` appears in tracebacks.
 
-    Raise DefinitionError if Python cannot make functions of it.
+    Raise DefinitionError if Python cannot compile them.
     """
     to_cdr = _compiled(f"{name} to CDR", _Generator(is_cdr_source=False, swaps=False).function(layout))
     little = _compiled(f"{name} from CDR", _Generator(is_cdr_source=True, swaps=False).function(layout))
@@ -103,7 +102,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
                 f"{name}: these bytes are not plain CDR version 1: they start with {bytes(data[:4]).hex()}"
             )
         if not big:
-            # Of a machine with the other byte order, which is rare: generated when it is met.
+            # From a machine with the other byte order, which is rare, so this is generated on first use.
             generated = _Generator(is_cdr_source=True, swaps=True).function(layout)
             big.append(_compiled(f"{name} from big-endian CDR", generated))
         return big[0](data)
@@ -115,7 +114,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """What is known of a position in CDR: its remainder after division by ``modulus``, one of 1, 2, 4, 8."""
+    """Knowledge about a position in CDR: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
 
     modulus: int
     remainder: int
@@ -124,7 +123,7 @@ class _Position(NamedTuple):
         return _Position(self.modulus, (self.remainder + size) % self.modulus)
 
     def after_any(self, width: int) -> _Position:
-        """Return what is known after any number of ``width`` bytes."""
+        """Return the knowledge about the position after any number of items of ``width`` bytes."""
         modulus = min(self.modulus, width)
         return _Position(modulus, self.remainder % modulus)
 
@@ -132,11 +131,11 @@ class _Position(NamedTuple):
         return self.after(-self.remainder % width) if width <= self.modulus else _Position(width, 0)
 
     def padding(self, width: int) -> int | None:
-        """Return the bytes up to the next multiple of ``width``, None if that depends on the message."""
+        """Return the number of bytes to the next multiple of ``width``; None if it depends on the message."""
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:
-        """Return what is known where it is either of the two."""
+        """Return the knowledge that holds for both positions."""
         modulus = min(self.modulus, other.modulus)
         while (self.remainder - other.remainder) % modulus:
             modulus //= 2
@@ -147,13 +146,13 @@ _UNKNOWN = _Position(1, 0)
 
 
 class _Walk:
-    """Follows positions through layouts; remembers what it found, since layouts are nested."""
+    """Computes positions through layouts; caches the results, since layouts are nested."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, _Position], _Position] = {}
 
     def after(self, layout: Layout, start: _Position) -> _Position:
-        """Return what is known after a layout."""
+        """Return the knowledge about the position after a layout."""
         key = (id(layout), start)
         if key not in self._known:
             position = start
@@ -163,7 +162,7 @@ class _Walk:
         return self._known[key]
 
     def in_loop(self, layout: Layout, start: _Position) -> _Position:
-        """Return what is known before each element, and after the last."""
+        """Return the knowledge about the position before each element, and after the last one."""
         while True:
             both = start.or_(self.after(layout, start))
             if both == start:
@@ -186,33 +185,33 @@ class _Walk:
 
 
 class Block(NamedTuple):
-    """Elements that lie in CDR as in ROS 1, without padding: of ``size`` bytes, aligned to ``width``."""
+    """Elements that have the same bytes in CDR as in ROS 1, without padding: of ``size`` bytes, aligned to ``width``."""
 
     width: int
     size: int
 
 
 def _is_nothing(item: Item) -> bool:
-    """Return whether an item has no bytes on either side: an array of length 0."""
+    """Return whether an item has no bytes in either message: an array of length 0."""
     return (isinstance(item, Fixed) and not item.number) or (isinstance(item, Sequence) and item.length == 0)
 
 
 def block_of(layout: Layout) -> Block | None:
-    """Return how elements of this layout follow each other, where all their bytes are the same on both sides."""
+    """Return the size and alignment of this layout's elements, if all their bytes are the same in both messages."""
     offset, width = 0, 0
     for item in layout:
         if not isinstance(item, Fixed) or item.side is not Side.BOTH or offset % item.width:
             return None
         width = max(width, item.width)
         offset += item.width * item.number
-    # Padding depends on the first member: only if that is the widest, it is the padding of all.
+    # Padding depends on the first member; only if it is the widest one, the elements need no padding in between.
     if not offset or offset % width or not isinstance(layout[0], Fixed) or layout[0].width != width:
         return None
     return Block(width, offset)
 
 
 def _least_size(layout: Layout, absent: Side) -> int:
-    """Return the bytes that a layout takes at least in the message that lacks the items of ``absent``; no padding."""
+    """Return the minimum size of a layout in the message that lacks the items of ``absent``, without padding."""
     size = 0
     for item in layout:
         if item.side is absent:
@@ -230,18 +229,17 @@ def _least_size(layout: Layout, absent: Side) -> int:
 
 
 class _Generator:
-    """Writes one function. ``end`` is the position in the source, ``at`` that in the CDR that is written."""
+    """Generates one function. ``end`` is the position in the source, ``at`` the position in the CDR being written."""
 
     def __init__(self, *, is_cdr_source: bool, swaps: bool) -> None:
         self._source = Source()
         self._is_cdr_source = is_cdr_source
         self._swaps = swaps
-        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2
-        """Items that the source lacks."""
+        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items that the source lacks
         self._walk = _Walk()
         self._position = _Position(8, 0)
+        # Pending ``copy``, ``skip`` or ``zeros``, each with a number of bytes
         self._tokens: list[tuple[str, int]] = []
-        """``copy``, ``skip`` or ``zeros`` and a number of bytes, not written yet."""
 
     def function(self, layout: Layout) -> str:
         line = self._source.line
@@ -258,7 +256,7 @@ class _Generator:
                 line("add = parts.append")
                 self._items(layout)
                 self._flush()
-            # Where Python has 32 bits, an offset of 2 GiB and more is an OverflowError.
+            # On 32-bit Python an offset of 2 GiB or more raises an OverflowError.
             with self._source.block("except (struct.error, OverflowError) as error:"):
                 line('raise DeserializationError("the message ends too early") from error')
             with self._source.block("if end > len(data):"):
@@ -306,7 +304,7 @@ class _Generator:
             self._align(4)
             self._position = _UNKNOWN
         if not self._is_read(item):
-            # An empty text: in CDR its NUL.
+            # An empty string; in CDR it consists of a NUL.
             self._tokens.append(("zeros", 4) if self._is_cdr_source else ("bytes 01000000 00", 5))
             return
 
@@ -343,7 +341,7 @@ class _Generator:
         self._loop(item, count)
 
     def _block(self, block: Block, count: str, *, is_fixed: bool) -> None:
-        """Elements whose bytes are the same on both sides: one slice."""
+        """Generate one slice for elements whose bytes are the same in both messages."""
         line = self._source.line
         start = self._position
 
@@ -359,7 +357,7 @@ class _Generator:
         if is_fixed or start.padding(block.width) == 0:
             write()
         else:
-            # A sequence without elements is not followed by padding.
+            # An empty sequence is not followed by padding.
             with self._source.block(f"if {count}:"):
                 write()
         self._position = start.or_(start.aligned(block.width)).after_any(block.width)
@@ -376,7 +374,7 @@ class _Generator:
         with self._source.block(f"for _ in range({count}):"):
             self._items(item.items)
             self._flush()
-            # An element whose items have no bytes.
+            # The body of the loop may be empty, if the element's items have no bytes.
             line("pass")
         self._position = position
 
@@ -399,7 +397,7 @@ class _Generator:
             self._source.line(f"end += {'4 ' if width == 8 else ''}-end & {mask}")
             return
         if self._tokens[-1:] == [("zeros", 1)]:
-            # The NUL of a text, and padding after it.
+            # The NUL of a string, and the padding after it.
             self._tokens.pop()
             self._flush()
             self._source.line(f"add(_NUL[~at & {mask}])")
@@ -410,7 +408,7 @@ class _Generator:
         self._source.line(f"at += -at & {mask}")
 
     def _length(self, side: Side, kind: str) -> str:
-        """Read a length after what waits, and write it; return its local name."""
+        """Read a length after the pending tokens, and write it; return its local name."""
         count = self._source.local("count")
         if side is Side.BOTH and kind == "text":
             self._tokens.append((f"length {count} {'less' if self._is_cdr_source else 'more'}", 4))
@@ -422,7 +420,7 @@ class _Generator:
         return count
 
     def _flush(self) -> None:
-        """Write the lines for what waits."""
+        """Generate the lines for the pending tokens."""
         tokens, self._tokens = _joined(self._tokens), []
         if not tokens:
             return
@@ -488,7 +486,7 @@ _SPELLED = 16
 
 
 def _joined(tokens: list[tuple[str, int]]) -> list[tuple[str, int]]:
-    """Return tokens with neighbours of one kind made one."""
+    """Return the tokens with adjacent ones of the same kind merged."""
     found: list[tuple[str, int]] = []
     for kind, size in tokens:
         if found and found[-1][0] == kind and kind in ("copy", "skip", "zeros"):
@@ -505,7 +503,7 @@ def _times(count: str, size: int) -> str:
 
 
 def _swapped(data: bytes | memoryview, width: int) -> bytes:
-    """Return numbers of ``width`` bytes in the other byte order."""
+    """Return numbers of ``width`` bytes with their byte order reversed."""
     if width == 1:
         return bytes(data)
     if len(data) % width:
@@ -520,7 +518,7 @@ _PADDING = tuple(bytes(count) for count in range(8))
 
 
 def _compiled(name: str, source: str) -> Callable[..., bytes]:
-    """Execute the source of a function, which holds no text of a definition: sizes and names made here."""
+    """Execute the source of a function, which contains no text of a definition, only sizes and names generated here."""
     file = f"<generated {name}>"
     names: dict[str, object] = {
         "DeserializationError": DeserializationError,

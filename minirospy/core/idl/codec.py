@@ -1,9 +1,9 @@
-"""A message's ``serialize`` and ``deserialize``, as straight lines of Python.
+"""Generate a message's ``serialize`` and ``deserialize`` as straight-line Python code.
 
-The fields are laid out as the bytes have them, nested messages opened up. Values of fixed size that follow each
-other, and the length of what comes after them, share one compiled ``struct``; an array of messages of fixed size
-is one ``iter_unpack``. Reading takes no byte that is not there: ``struct`` refuses, a slice comes out short and is
-found at the end, and a count of elements that only slices read, or that take no bytes, is checked before the loop.
+The fields are in the order of the bytes, with nested messages expanded. Consecutive values of fixed size, and the
+length of the following field, share one compiled ``struct``; an array of messages of fixed size
+is one ``iter_unpack``. Reading never goes beyond the data: ``struct`` raises, a slice that is too short is detected
+at the end, and the count of elements that consist of slices, or of no bytes, is checked before the loop.
 """
 
 from __future__ import annotations
@@ -19,54 +19,53 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000
-"""Elements without bytes that a message may have beyond one for each of its bytes."""
+_SPARE = 10_000  # limit of elements without bytes, in addition to one for each byte of the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
 class _Leaf(NamedTuple):
-    """A field as the bytes have it; ``path`` is the Python expression that it is read from or assigned to."""
+    """A field in the order of the bytes; ``path`` is the Python expression that it is read from or assigned to."""
 
     path: str
     type: FieldType
 
     @property
     def letters(self) -> str:
-        """Its format characters for ``struct``, where its size is fixed; else nothing."""
+        """The field's format characters for ``struct`` if its size is fixed; else ""."""
         if not self.type.is_array:
             return PRIMITIVES[self.type.base]
         return f"{self.type.length}s" if self.type.is_bytes and self.type.length else ""
 
     @property
     def has_length(self) -> bool:
-        """Return whether its bytes begin with a length."""
+        """Return whether its bytes start with a length."""
         return not self.letters and self.type.length is None
 
     @property
     def is_numbers(self) -> bool:
-        """Return whether it is an array that ``struct`` packs in one go."""
+        """Return whether it is an array that ``struct`` packs at once."""
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
-        """Return the expressions of what ``struct`` holds of it."""
+        """Return the expressions of the field's values in ``struct``."""
         if self.type.base in _TIMES:
             return [f"{self.path}.secs", f"{self.path}.nsecs"]
         return [self.path]
 
     def packed(self) -> list[str]:
-        """Return the same, for ``struct`` to pack: a bool of numpy is not an integer to it, a sum with one is."""
+        """Return the expressions to pack with ``struct``: it rejects numpy's bool, but accepts its sum with an integer."""
         return [f"{self.path} + 0"] if self.type.base == "bool" and not self.type.is_array else self.values()
 
 
 class _Chunk(NamedTuple):
-    """Leaves of fixed size, and the leaf of another kind that comes after them."""
+    """Fields of fixed size, and the following field of another kind."""
 
     run: tuple[_Leaf, ...]
     tail: _Leaf | None
 
 
 def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Return whether a message may be large and mostly bytes, so that a copy of all of it is to be avoided."""
+    """Return whether a message may be large and mostly bytes, so that it should not be copied as a whole."""
     return any(
         (field.type.is_array and field.type.base in ("uint8", "char", "int8", "byte"))
         or (not field.type.is_primitive and keeps_buffer(lookup(field.type.base), lookup))
@@ -75,7 +74,7 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
-    """Return the fields that stay bytes until they are read, arrays of numbers of any length -> their format character."""
+    """Return the format characters of the fields that stay bytes until they are read: arrays of numbers of any length."""
     return {
         python_name(field.name): PRIMITIVES[field.type.base]
         for field in spec.fields
@@ -143,13 +142,13 @@ def _chunks(fields: tuple[Field, ...], path: str, lookup: Lookup) -> Iterator[_C
 
 
 def _is_fixed(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Return whether a message is one run, so that its size is known, and is not nothing."""
+    """Return whether a message has a known, fixed size above zero."""
     leaves = list(_leaves(spec.fields, "", lookup))
     return bool(leaves) and all(leaf.letters for leaf in leaves)
 
 
 def _size(letters: str) -> int:
-    """Return the bytes of some letters; a number before ``s`` counts bytes."""
+    """Return the number of bytes for some format characters; a number before ``s`` counts bytes."""
     size, count = 0, ""
     for letter in letters:
         if letter.isdigit():
@@ -160,7 +159,7 @@ def _size(letters: str) -> int:
 
 
 def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
-    """Return the bytes that a message takes at least."""
+    """Return the minimum size of a message in bytes."""
     size = 0
     for leaf in _leaves(spec.fields, "", lookup):
         if leaf.letters:
@@ -177,7 +176,7 @@ def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
 
 
 def _has_elements_without_bytes(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Return whether an array somewhere in a message has elements that may take no bytes."""
+    """Return whether an array anywhere in a message has elements that may take no bytes."""
     return any(
         not field.type.is_primitive
         and (
@@ -192,7 +191,7 @@ def _has_elements_without_bytes(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 class _Writer:
-    """Lines that hand the bytes of fields to ``write``."""
+    """Generates the lines that pass the bytes of fields to ``write``."""
 
     def __init__(self, source: Source, lookup: Lookup, write: str) -> None:
         self._source = source
@@ -216,7 +215,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the call that packs values; an inner message that several of them come from is fetched once."""
+        """Return the call that packs values; an inner message that several values belong to is fetched once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -233,7 +232,7 @@ class _Writer:
         return f"{self._source.struct(letters)}.pack({', '.join(arguments)})"
 
     def _fixed(self, leaf: _Leaf) -> list[str]:
-        """Return the values of a leaf of fixed size; of an array of bytes its length is checked, which struct does not."""
+        """Return the values of a field of fixed size; check the length of an array of bytes, since struct does not."""
         if not leaf.type.is_array:
             return leaf.packed()
         name = self._bytes(leaf)
@@ -245,7 +244,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return a local name that holds a leaf's value, ready to be counted."""
+        """Return a local name for a field's value, in the form whose length is written."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])
@@ -319,7 +318,7 @@ class _Writer:
 
 
 class _Reader:
-    """Lines that take fields from ``data``, from ``end`` on."""
+    """Generates the lines that read fields from ``data``, starting at ``end``."""
 
     def __init__(self, source: Source, lookup: Lookup, keeps_buffer: bool) -> None:
         self._source = source
@@ -350,7 +349,7 @@ class _Reader:
                 self._line('raise genpy.DeserializationError("the message ends too early")')
 
         if raw:
-            # The slots are emptied: reading one of them then calls __getattr__.
+            # Delete the slots' values: reading one of them then calls __getattr__.
             self._line(" = ".join(f"self.{name}" for name in raw) + " = []")
             self._line("del " + ", ".join(f"self.{name}" for name in raw))
             self._line("self._raw = {" + ", ".join(f'"{name}": {local}' for name, local in raw.items()) + "}")
@@ -359,7 +358,7 @@ class _Reader:
         self._source.line(text)
 
     def _create(self, spec: MessageSpec, path: str, owner: str = "") -> dict[str, str]:
-        """Make the messages and times inside the message at ``path``: path of each -> the local that holds it."""
+        """Generate the messages and times inside the message at ``path``; return path of each -> its local name."""
         names = {}
         for field in spec.fields:
             if field.type.is_array or (field.type.is_primitive and field.type.base not in _TIMES):
@@ -378,7 +377,7 @@ class _Reader:
     def _fields(
         self, chunks: list[_Chunk], names: dict[str, str], lazy: dict[str, str] | None = None
     ) -> dict[str, str]:
-        """Read what chunks describe. Of lazy arrays only the bytes: the field's name -> the local that holds them."""
+        """Generate reading of the chunks. Of lazy arrays read only the bytes; return field name -> local name of its bytes."""
         raw: dict[str, str] = {}
         for chunk in chunks:
             count = self._run(chunk, names, "data, end")
@@ -398,7 +397,7 @@ class _Reader:
         return f"{names.get(owner, owner)}{dot}{name}"
 
     def _run(self, chunk: _Chunk, names: dict[str, str], arguments: str) -> str:
-        """Read a run, and the length of what follows; the local name of that length, or the length itself."""
+        """Generate reading a run and the length of what follows; return the length's local name, or the length itself."""
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
 
@@ -433,7 +432,7 @@ class _Reader:
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
-        """Return the next bytes; ``whole`` where they are kept, so that they must not hold on to the buffer."""
+        """Return an expression for the next bytes; ``whole``: the bytes are kept, so they must not reference the buffer."""
         self._slices = True
         part = f"data[end : (end := end + {size})]"
         return f"bytes({part})" if whole and self._keeps_buffer else part
@@ -467,7 +466,7 @@ class _Reader:
         spec = None if type_.is_primitive else self._lookup(type_.base)
         least = _least_size(spec, self._lookup) if spec else 0
         if spec and not least:
-            # Elements without bytes: a short message could ask for any number of them.
+            # Elements without bytes: otherwise a short message could contain any number of them.
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
@@ -489,7 +488,7 @@ class _Reader:
             return
 
         if least and type_.length is None:
-            # Elements whose bytes are slices: those come out short, and only the end of the message shows it.
+            # Elements that consist of slices: a slice that is too short is detected only at the end of the message.
             with self._source.block(f"if {_times(count, least)} > len(data) - end:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
         with self._source.block(f"for _ in range({count}):"):
@@ -501,7 +500,7 @@ class _Reader:
     def _fixed_elements(
         self, base: str, spec: MessageSpec | None, values: str, each: str, count: str
     ) -> None:
-        """Elements of fixed size: one ``iter_unpack`` over the bytes of all of them."""
+        """Generate one ``iter_unpack`` over the bytes of all elements, which have a fixed size."""
         leaves = list(_leaves(spec.fields, each, self._lookup)) if spec else [_Leaf(each, FieldType(base))]
         letters = "".join(leaf.letters for leaf in leaves)
         assigned = [

@@ -1,4 +1,4 @@
-"""md5sums and full texts: what two sides compare to know that they mean the same type.
+"""md5sums and full texts, which two nodes compare to check that they use the same type.
 
 Source: http://wiki.ros.org/ROS/Technical%20Overview ("Message serialization and msg MD5 sums").
 """
@@ -12,7 +12,7 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # As hashlib without OpenSSL, whose loading takes 2 ms, and whose FIPS mode refuses MD5.
+    # Like hashlib without OpenSSL, which takes 2 ms to load, and refuses MD5 in FIPS mode.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:
     from hashlib import md5
@@ -27,14 +27,13 @@ __all__ = [
     "service_md5",
 ]
 
-Lookup = Callable[[str], MessageSpec]
-"""``pkg/Name`` -> its spec; raises NotFoundError."""
+Lookup = Callable[[str], MessageSpec]  # maps ``pkg/Name`` to its spec; raises NotFoundError
 
 _SEPARATOR = "=" * 80
 
 
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return what the md5sum counts: constants, then fields, nested types replaced by their md5sums.
+    """Return the text for the md5sum: constants, then fields, with nested types replaced by their md5sums.
 
     Raise DefinitionError if a message contains itself.
     """
@@ -47,12 +46,12 @@ def message_md5(spec: MessageSpec, lookup: Lookup) -> str:
 
 
 def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
-    """Return a service's md5sum: over request and response together."""
+    """Return a service's md5sum, over request and response together."""
     return _md5(md5_text(spec.request, lookup) + md5_text(spec.response, lookup))
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
-    """Return all types that a message needs, each once, a type before those that it needs itself."""
+    """Return all types that a message uses, each once, a type before those that it uses itself."""
     found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:
@@ -66,12 +65,12 @@ def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
 
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return a message's text and that of all types that it needs, each after a line of 80 ``=``."""
+    """Return a message's text and those of all types that it uses, each after a line of 80 ``=``."""
     return joined_texts(spec.text, ((name, lookup(name).text) for name in dependencies(spec, lookup)))
 
 
 def joined_texts(text: str, needed: Iterable[tuple[str, str]]) -> str:
-    """Return a text, and the name and text of each type that it needs."""
+    """Return a text followed by the name and text of each type that it uses."""
     return "\n".join((text, *(f"{_SEPARATOR}\nMSG: {name}\n{inner}" for name, inner in needed)))
 
 
@@ -83,7 +82,7 @@ def _md5(text: str) -> str:
 def _md5_text(
     spec: MessageSpec, lookup: Lookup, around: tuple[str, ...], known: dict[str, str] | None = None
 ) -> str:
-    """``around``: the messages that this one is a part of; ``known``: the md5sums computed so far."""
+    """Take ``around``, the messages that contain this one, and ``known``, the md5sums computed so far."""
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
     if len(around) > MAX_LEVELS:

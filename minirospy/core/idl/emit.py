@@ -1,10 +1,10 @@
-"""Spec -> Python source: one readable module a message or service.
+"""Generate Python source from specs: one readable module per message or service.
 
-A generated module imports public names of ``genpy`` alone, so that it works beside real ROS too. How its
-``serialize`` and ``deserialize`` are made: ``codec``.
+A generated module imports only public names of ``genpy``, so that it also works with real ROS. The code of
+``serialize`` and ``deserialize`` is generated in ``codec``.
 
-Definitions may come from strangers: names are written only after ``validate`` has checked them, all other text by
-``repr``. Every message that the source is made of passes :func:`_checked`.
+Definitions may be untrusted: names are emitted only after ``validate`` has checked them, all other text through
+``repr``. Every message used in the source passes :func:`_checked`.
 """
 
 from __future__ import annotations
@@ -93,19 +93,19 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""What a module needs besides its classes: name -> lines, in the order in which they are written."""
+"""Helper functions for a module: name -> lines, in the order in which they are emitted."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return the module of a message. Raise DefinitionError if a name cannot be one in Python."""
+    """Return the module of a message. Raise DefinitionError if a name is not legal in Python."""
     check_types(spec, lookup)
     return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Return the source of a message's class, which finds the classes of its fields among its globals.
+    """Return the source of a message's class, which expects the classes of its fields in its globals.
 
-    Raise DefinitionError if a name cannot be one in Python.
+    Raise DefinitionError if a name is not legal in Python.
     """
     check_types(spec, lookup)
     module = _Module(_checked(lookup), imports=False)
@@ -114,9 +114,9 @@ def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
 
 
 def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
-    """Return the module of a service: request, response, and the class that joins them.
+    """Return the module of a service: request, response, and the class that combines them.
 
-    Raise DefinitionError if a name cannot be one in Python.
+    Raise DefinitionError if a name is not legal in Python.
     """
     check_type_name(spec.full_name)
     for message in (spec.request, spec.response):
@@ -125,7 +125,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Return the ``__init__`` of a package's msg or srv folder. Module ``_Name`` holds ``Name`` with each of ``parts`` after it.
+    """Return the ``__init__`` of a package's msg or srv folder. Module ``_Name`` has ``Name`` with each suffix in ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError as :func:`emit_message`.
     """
@@ -138,7 +138,7 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
         "import importlib",
         "from typing import Any",
         "",
-        # Short, since a wheel has hundreds of these.
+        # Compact, since a wheel has hundreds of these.
         f"_NAMES = {' '.join(names)!r}.split()",
         f'_MODULES = {{name + part: "_" + name for name in _NAMES for part in {tuple(parts)!r}}}',
         "__all__ = sorted(_MODULES)",
@@ -160,15 +160,14 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
 
 
 class ClassSource(NamedTuple):
-    """The source of a class, and what it expects among its globals."""
+    """The source of a class, and the classes that it expects in its globals."""
 
     source: str
-    classes: dict[str, str]
-    """``pkg/Name`` -> the global name under which the source finds that class."""
+    classes: dict[str, str]  # ``pkg/Name`` -> the global name of that class in the source
 
 
 def _checked(lookup: Lookup) -> Lookup:
-    """Return ``lookup`` with :func:`check_spec` on all that it returns, each message once."""
+    """Return ``lookup`` with :func:`check_spec` applied to its results, to each message once."""
     seen: dict[str, MessageSpec] = {}
 
     def checked(name: str) -> MessageSpec:
@@ -183,7 +182,7 @@ def _checked(lookup: Lookup) -> Lookup:
 
 
 class _Module:
-    """Write one module; without ``imports`` the classes of its fields are among its globals already."""
+    """Generates one module; without ``imports`` the classes of its fields must be in its globals already."""
 
     def __init__(self, lookup: Lookup, *, imports: bool = True) -> None:
         self._lookup = lookup
@@ -192,7 +191,7 @@ class _Module:
 
     @property
     def classes(self) -> dict[str, str]:
-        """The classes of the fields: ``pkg/Name`` -> the module's name of it."""
+        """The classes of the fields: ``pkg/Name`` -> name in the module."""
         return dict(self._source.classes)
 
     def source(self, messages: list[MessageSpec], service: ServiceSpec | None, origin: str) -> str:
@@ -205,7 +204,7 @@ class _Module:
         )
 
     def _head(self, origin: str, own: set[str]) -> list[str]:
-        """Everything above the classes: imports, compiled structs, helpers."""
+        """Return the lines before the classes: imports, compiled structs, helpers."""
         helpers = self._source.helpers
         if "_packed" in helpers:
             self._source.struct("I")
@@ -329,9 +328,9 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Return whether ``struct`` puts no padding between these letters, some of which are floats.
+    """Return whether ``struct`` adds no padding between these format characters, some of which are floats.
 
-    Not those of 32 bits: in the machine's own order one that is too large would be infinity, not an OverflowError.
+    False for 32-bit floats: in native byte order a value that is too large would become infinity, not an OverflowError.
     """
     kinds = {letter for letter in letters if letter.isalpha()}
     return "d" in kinds and kinds <= set("dqQ")

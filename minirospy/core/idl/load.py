@@ -1,6 +1,6 @@
-"""Definitions on disk and classes in memory: finding, compiling, importing.
+"""Find, compile and import message definitions and classes.
 
-A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes come from the generated modules, or are made from
+A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes come from the generated modules, or are created from
 a full text at run time.
 """
 
@@ -51,15 +51,15 @@ _SEPARATOR = "=" * 80
 class Catalogue:
     """The definitions of some packages: package name -> its folder. Specs are parsed once.
 
-    A package's definitions are the files in its folders msg, srv and action, or, where ``definitions`` names the
-    package, just those.
+    A package's definitions are the files in its folders msg, srv and action, or only those in ``definitions`` if it
+    contains the package.
     """
 
     def __init__(
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # By package and kind: a package may have hundreds, and each is looked up by its name.
+        # By package and kind, since a package may have hundreds, and each is looked up by its name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -69,7 +69,7 @@ class Catalogue:
 
     @classmethod
     def below(cls, *roots: Path) -> Catalogue:
-        """Return every folder in ``roots`` that holds definitions; an earlier root hides a later one's package."""
+        """Return a catalogue of the packages in ``roots`` that have definitions; an earlier root hides later ones."""
         found: dict[str, Path] = {}
         for root in roots:
             for folder in sorted(root.iterdir()) if root.is_dir() else []:
@@ -90,7 +90,7 @@ class Catalogue:
         return self._specs[full_name]
 
     def messages(self, package: str) -> list[MessageSpec]:
-        """Return all messages of a package, those of its actions included, by name."""
+        """Return all messages of a package by name, including those of its actions."""
         names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
@@ -137,7 +137,7 @@ class Catalogue:
             return self._specs[full_name]
         if name in _OF_OTHER_LANGUAGES and name not in files:
             raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
-        import difflib  # only for the error
+        import difflib  # needed only for the error
 
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
@@ -155,8 +155,7 @@ _OF_OTHER_LANGUAGES = {
     "double": "float64",
     "str": "string",
     "boolean": "bool",
-}
-"""Names of types in C++ and Python -> the types of ROS."""
+}  # name of a type in C++ or Python -> type of ROS
 
 
 def read_definition(path: Path) -> str:
@@ -168,10 +167,10 @@ def read_definition(path: Path) -> str:
 
 
 def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
-    """Return a package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
+    """Compile a package's definitions to Python: file below the package's folder (``msg/_Bool.py``) -> its text.
 
-    With them go stubs with the types of fields and constructors, and the empty ``py.typed``, which makes mypy use them
-    (PEP 561). Raise DefinitionError, NotFoundError.
+    The result includes stubs with the types of fields and constructors, and the empty ``py.typed``, which makes mypy use
+    them (PEP 561). Raise DefinitionError, NotFoundError.
     """
     from minirospy.core.idl.emit import emit_message, emit_package, emit_service
     from minirospy.core.idl.stubs import emit_stub
@@ -195,16 +194,16 @@ def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
 
 
 def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: bool = False) -> list[Path]:
-    """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
+    """Compile a package's definitions into ``root``/<package>/{msg,srv}; return the files that were written.
 
-    With ``on_demand`` only the ``__init__`` modules and the stubs are written, and each message's module is made when it is
-    first imported. A file whose text would be the same is left alone. Raise DefinitionError, NotFoundError.
+    With ``on_demand`` only the ``__init__`` modules and the stubs are written, and each message's module is compiled when it
+    is first imported. Files that would not change are left alone. Raise DefinitionError, NotFoundError.
     """
     sources = compile_package(catalogue, package)
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # Of an earlier build, which compiled it ahead.
+            # Left from an earlier build that compiled the modules in advance.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -214,13 +213,13 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
 
 
 def _on_demand(sources: dict[str, str]) -> dict[str, str]:
-    """Return the files of a package whose modules are made when they are imported."""
+    """Return the files of a package whose modules are compiled when they are imported."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # What emit_package writes into each such file is here in one place.
+            # Replaces the code of emit_package, which would be repeated in each such file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
@@ -243,9 +242,10 @@ def _is_module(name: str) -> bool:
 
 
 def write_if_changed(path: Path, text: str) -> bool:
-    """Write a file unless it says that already; whether it was written.
+    """Write a file unless it already has this text; return whether it was written.
 
-    Its time is a later second than before: by second and size Python decides whether a compiled module is of this source.
+    Its modification time is at least a second later than before, since Python recognizes an outdated compiled module by
+    the source's time in seconds and its size.
     """
     data = text.encode()
     earliest = 0
@@ -289,13 +289,13 @@ def service_class(name: str) -> ServiceClass:
 
 
 def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full text: the message's own, and those of all types that it needs. Raise DefinitionError."""
+    """Return the specs in a full text: the message's own, and those of all types that it uses. Raise DefinitionError."""
     from minirospy.core.idl.parse import parse_message
 
     if len(text) > MAX_TEXT:
         raise DefinitionError(full_name, 1, f"its definition has more than {MAX_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
-    # The newline before a line of "=" belongs to it: a text that ends without one stays so.
+    # The separator includes the newline before it, so a text without a trailing newline keeps none.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
         name, body = full_name, part
         if number:
@@ -308,9 +308,9 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
-    """Return the specs of a full text that the message needs, each after those that it needs, and the message's md5sum.
+    """Return the specs in a full text that the message uses, each after those that it uses itself, and the message's md5sum.
 
-    No class is made of them. Raise DefinitionError.
+    No class is created. Raise DefinitionError.
     """
     from minirospy.core.idl.digest import message_md5
 
@@ -326,7 +326,7 @@ def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str
 
 
 def class_from_text(full_name: str, text: str) -> type[Message]:
-    """Return a message class from a full text, as a publisher sends it, for a type that is not installed.
+    """Return a message class created from a full text, as sent by a publisher, for a type that is not installed.
 
     Raise DefinitionError.
     """
@@ -335,54 +335,54 @@ def class_from_text(full_name: str, text: str) -> type[Message]:
 
 @lru_cache(maxsize=256)
 def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
-    """Return the class of a full text and those of all types that it needs, by name. Raise DefinitionError."""
+    """Return the classes of a full text's message and of all types that it uses, by name. Raise DefinitionError."""
     from minirospy.core.idl.emit import emit_class
 
     specs, _ = checked_text(full_name, text)
     made: dict[str, type[Message]] = {}
     for name, spec in specs.items():
         made[name] = _run(emit_class(spec, specs.__getitem__), name, made)
-    # Sent on as it came, even where ours would be written otherwise.
+    # Pass the text on unchanged, even if minirospy would generate a different one.
     made[full_name]._full_text = text
     return types.MappingProxyType(made)
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class, in whose fields are classes made before."""
+    """Execute the source of a class, whose fields use the classes created before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():
         module.__dict__[alias] = made[type_]
     source = emitted.source
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    # Its names have passed `validate`, all other text is in it by `repr`: nothing of a peer's is code.
+    # Names were checked by `validate`, all other text is quoted by `repr`: a peer's text is never executed.
     try:
         exec(compile(source, file, "exec"), module.__dict__)
     except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
-        # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
+        # Python's own limits, such as for nested loops: arrays of arrays of arrays.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
-    # As genpy calls it: programs that read bags look for `_sensor_msgs__Image`.
+    # genpy's naming: programs that read bags look for `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
     _running[id(found)] = found
-    # Its source goes with it: a publisher may send any number of definitions.
+    # Remove the source together with the class, since a publisher may send any number of definitions.
     weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found
 
 
+# Id -> class created at run time, so that unpickling a message finds its class
 _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
-"""The classes that were made at run time, by their ids: a message that is unpickled finds its own."""
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return how pickle and copy make a message whose class no module has: from its class's text."""
+    """Return how pickle and copy recreate a message whose class is in no module: from its class's full text."""
     kind = type(message)
     return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
 
 
 def _unpickled(key: int, type_: str, text: str) -> Message:
-    """Return a new message of a class made at run time; in another process its class is made again."""
+    """Return a new message of a class created at run time; another process creates the class again."""
     found = _running.get(key)
     if found is None or (found._type, found._full_text) != (type_, text):
         found = class_from_text(type_, text)
@@ -392,7 +392,7 @@ def _unpickled(key: int, type_: str, text: str) -> Message:
 def _imported(name: str, kind: str) -> Any:
     """Return the class ``pkg/Name`` of an installed package, or None.
 
-    The name may come from a peer, and to import a module is to execute it: so only a package with a folder (or module)
+    The name may come from a peer, and importing a module executes it. So only a package with a folder (or module)
     ``msg`` or ``srv`` is imported, never any other module that happens to have the name.
     """
     if name == "Header" and kind == "msg":
@@ -415,25 +415,25 @@ def _imported(name: str, kind: str) -> Any:
 
 
 def _has_definitions(package: str, kind: str) -> bool:
-    """Return whether a package holds a module of generated classes, without importing either."""
+    """Return whether a package contains a module of generated classes, without importing either."""
     if f"{package}.{kind}" in sys.modules:
         return True
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # ValueError: a module that was put into sys.modules by hand has no spec.
+        # A module that was added to sys.modules by hand has no spec, which raises ValueError.
         found = None
     if found is None:
         return package in sys.modules
     if found.submodule_search_locations is None:
         return False
-    # A package may spread over several entries of sys.path once it has been imported (pkgutil.extend_path).
+    # An imported package may extend over several entries of sys.path (pkgutil.extend_path).
     folders = [*found.submodule_search_locations, *(os.path.join(entry, package) for entry in sys.path)]
     return importlib.machinery.PathFinder.find_spec(f"{package}.{kind}", folders) is not None
 
 
 def _known(kind: str) -> set[str]:
-    """Return the types of minirospy's own packages, and of all on sys.path that hold generated modules."""
+    """Return the types of minirospy's own packages, and of all packages on sys.path with generated modules."""
     from minirospy.core.idl.own_packages import own_definitions
 
     files = [(path.parent.parent, path.stem) for path in own_definitions().glob(f"*/{kind}/*.{kind}")]

@@ -1,4 +1,4 @@
-"""The base of generated messages: the base class, checks, the text of a message, and filling from values.
+"""The base of generated messages: the base class, checks, a message as text, and filling a message from values.
 
 The names and rules are genpy's, since user code relies on them: http://docs.ros.org/api/genpy/html/.
 """
@@ -45,12 +45,12 @@ _INTEGERS = {
     "char": (0, 256),
 }
 _SEQUENCES = (list, tuple)
-# The older name of the type is one of packages from before 2011.
+# roslib/Header is the type's name in packages from before 2011.
 _HEADER_TYPES = ("std_msgs/Header", "roslib/Header")
 _TIME_SLOTS = ["secs", "nsecs"]
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.]*", re.ASCII)
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
-# From this length on YAML folds a text with spaces in it.
+# From this length on YAML folds a string that contains spaces.
 _FOLDED = 76
 
 
@@ -75,7 +75,7 @@ class Message:
     _connection_header: dict[str, str]
 
     def __init__(self, *args: object, **kwds: object) -> None:
-        """Set all fields in order, or some by name; None represents a field's default.
+        """Set all fields in order, or some by name; None means a field's default.
 
         Raise TypeError on a wrong number of values, AttributeError on a name that is not a field.
         """
@@ -124,8 +124,8 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError on the first field whose value does not fit; else for ``exc`` itself."""
-        # Of an error it is the field that cannot be written; else all that genpy does not take.
+        """Raise SerializationError for the first field with an invalid value; otherwise for ``exc`` itself."""
+        # After an error find the field that cannot be written; otherwise everything that genpy refuses.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
@@ -148,16 +148,16 @@ class Message:
 
 
 def _equal(value: object, other: object) -> bool:
-    """Return whether two values of a field are equal, as genpy compares: a list equals a tuple of the same items."""
+    """Return whether two values of a field are equal as in genpy: a list equals a tuple with the same items."""
     if type(value) is not type(other) and type(value) in _SEQUENCES and type(other) in _SEQUENCES:
         return tuple(cast("Sequence[object]", value)) == tuple(cast("Sequence[object]", other))
     return bool(value == other)
 
 
 def number_header(message: protocols.Message, sequence: int) -> None:
-    """Set ``seq`` of a message that starts with a header, as rospy does before it sends one; ``frame_id`` None is "0".
+    """Set ``seq`` of a message that starts with a header, as rospy does before sending; replace ``frame_id`` None by "0".
 
-    A header of a wrong type is left to ``serialize``, which names the field.
+    A header of a wrong type is left to ``serialize``, whose error names the field.
     """
     if is_stamped(message) and is_message(message.header):
         message.header.seq = sequence
@@ -166,17 +166,17 @@ def number_header(message: protocols.Message, sequence: int) -> None:
 
 
 def check_type(field_name: str, field_type: str, field_val: object) -> None:
-    """Raise SerializationError unless the value fits a field of this type (``int8``, ``string[]``, ``pkg/Name``).
+    """Raise SerializationError unless the value is valid for a field of this type (``int8``, ``string[]``, ``pkg/Name``).
 
-    As genpy: it takes neither a bool for a number nor text beyond ASCII, which both can be sent.
+    Like genpy, refuse a bool as a number and non-ASCII strings, although both can be sent.
     """
     _check_field(field_name, field_type, field_val, _STRICT_CHECKS)
 
 
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
-    """Return the message that publish() or a service call was given: itself, or made from field values.
+    """Return the message passed to publish() or a service call, or create it from the passed field values.
 
-    Raise TypeError or AttributeError if they do not fit.
+    Raise TypeError or AttributeError if they do not match.
     """
     if args and kwds:
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
@@ -188,7 +188,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # Of another generator, or made from another text: the bytes are the same.
+            # From another generator, or created from another text: the bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
@@ -199,10 +199,10 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 
 
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
-    """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
+    """Fill ``msg`` from values in their YAML form: a list of its fields' values, or a list of one dictionary of them.
 
-    ``keys`` are words that represent values ("now", "auto"). Raise MessageException if a name or a number
-    of values does not fit, ValueError on values that cannot be fields.
+    ``keys`` are words that stand for values ("now", "auto"). Raise MessageException if a name or the number
+    of values does not match, ValueError on values that cannot be fields.
     """
     if not is_message(msg) or isinstance(msg, type):
         raise ValueError(f"msg must be a Message instance: {msg}")
@@ -224,7 +224,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots; write them to ``buff``, too."""
+    """Return the names of a message's fields in order, nested ones with dots; also write them to ``buff`` if given."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -249,10 +249,10 @@ def strify_message(
     field_filter: Callable[[protocols.Message], Sequence[str]] | None = None,
     fixed_numeric_width: int | None = None,
 ) -> str:
-    """Return the text of a value as `rostopic echo` prints it: YAML.
+    """Return a value as text in the format of `rostopic echo`: YAML.
 
-    ``field_filter`` chooses the fields of a message; ``fixed_numeric_width`` pads numbers;
-    ``time_offset`` is taken off times.
+    ``field_filter`` selects the fields of a message; ``fixed_numeric_width`` pads numbers;
+    ``time_offset`` is subtracted from times.
     """
     if isinstance(val, bool) or val is None:
         return str(val)
@@ -287,7 +287,7 @@ def _message_text(message: protocols.Message, indent: str, options: _Options) ->
         value = getattr(message, name)
         type_ = types[name]
         if type_.startswith("uint8[") and isinstance(value, bytes | bytearray | memoryview):
-            # Bytes are numbers to the reader; genpy leaves a char[] as it is.
+            # Bytes are shown as numbers; genpy leaves a char[] unchanged.
             value = list(value)
         elif type_.startswith("uint8[") and isinstance(value, str):
             value = [ord(letter) for letter in value]
@@ -327,7 +327,7 @@ def _number(value: object, width: int | None) -> str:
 
 
 def _number_or_text(value: object, width: int | None) -> str:
-    """Return the text of an item of a list that starts with a number: the others may be strings."""
+    """Return an item as text, for a list whose first item is a number but that may also contain strings."""
     if isinstance(value, str):
         return repr(value) if width is None else _quoted(value)
     return _number(value, width)
@@ -342,7 +342,7 @@ def _quoted(text: str) -> str:
 
 
 def _items(texts: Sequence[object]) -> list[str]:
-    """Return the lines of a list of strings, as YAML writes it."""
+    """Return the lines of a list of strings in YAML."""
     if all(
         isinstance(text, str) and _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN for text in texts
     ):
@@ -359,7 +359,7 @@ _Check = Callable[[str, str, object], None]
 
 
 def _check_field(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
-    """Raise SerializationError unless a value fits its field, and those of its fields theirs, by ``checks``."""
+    """Raise SerializationError unless a value is valid for its field, including nested fields, according to ``checks``."""
     if type_.endswith("]"):
         _check_array(name, type_.removesuffix("]"), value, checks)
     elif type_ in checks:
@@ -381,7 +381,7 @@ def _check_message_type(name: str, expected: str, found: str) -> None:
 
 
 def _is_array(value: object) -> bool:
-    """Return whether a value is an array of numpy's, not a number."""
+    """Return whether a value is a numpy array and not a number."""
     return getattr(value, "ndim", 0) != 0
 
 
@@ -422,8 +422,7 @@ _CHECKS: dict[str, _Check] = {
     "time": _check_time,
     "duration": _check_time,
     **dict.fromkeys(_INTEGERS, _check_integer),
-}
-"""What can be written."""
+}  # check whether a value can be written
 
 
 def _check_strict_integer(name: str, type_: str, value: object) -> None:
@@ -456,8 +455,7 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-}
-"""What genpy's check takes; numpy's numbers, too, which its messages can hold all the same."""
+}  # check like genpy, but also allow numpy's numbers, which genpy's messages can contain anyway
 
 
 def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
@@ -489,7 +487,7 @@ def _fill(message: protocols.Message, values: object, words: Mapping[str, object
         for name, value in values.items():
             if name not in types:
                 raise MessageException(f"No field name [{path}{name}]")
-            # YAML reads a key without a value as null: an empty string was meant.
+            # YAML reads a key without a value as null; an empty string was meant.
             _fill_field(message, name, types[name], "" if value is None else value, words, path)
         return
     if not isinstance(values, list | tuple):
@@ -540,7 +538,7 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
     filled = []
     for value in values:
         element = element_class()
-        # genpy counts the path from the element on.
+        # genpy's path in errors starts at the element.
         _fill(element, value, words, "")
         filled.append(element)
     return filled
@@ -567,7 +565,7 @@ def _filled_time(current: TVal, value: object, words: Mapping[str, object], path
         case bool():
             pass
         case int():
-            # A plain number is nanoseconds, as genpy has it.
+            # As in genpy, a plain number is nanoseconds.
             return type(current)(0, value)
         case TVal():
             return value

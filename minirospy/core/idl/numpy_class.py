@@ -1,6 +1,6 @@
-"""Classes of messages whose arrays of numbers are numpy arrays: what `rospy.numpy_msg` makes.
+"""Create message classes whose arrays of numbers are numpy arrays, for `rospy.numpy_msg`.
 
-Nothing here imports numpy before a class is made. Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
+numpy is imported only when a class is created. Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 @lru_cache(maxsize=256)
 def numpy_class(message_class: type[_M]) -> type[_M]:
-    """Return the class of a message whose arrays are numpy arrays: the same type to every peer.
+    """Return a message class whose arrays are numpy arrays; for peers it is the same type.
 
     Raise NumpyMissingError.
     """
@@ -40,7 +40,7 @@ def numpy_class(message_class: type[_M]) -> type[_M]:
     if getattr(message_class, "_takes_numpy", False):
         return message_class
 
-    # What genpy generated writes with ndarray.tostring, which numpy 2.3 has no more.
+    # genpy's generated code uses ndarray.tostring, which numpy 2.3 has removed.
     is_ours = getattr(message_class, "serialize_numpy", None) is BaseMessage.serialize_numpy
     makes_methods = _own_methods if is_ours or not hasattr(numpy.ndarray, "tostring") else _genpy_methods
     fields = {
@@ -66,7 +66,7 @@ def _own_methods(message_class: type[Message], numpy: ModuleType) -> dict[str, o
         message_class.deserialize(self, data)
         return arrays_from_bytes(self, numpy)
 
-    # Their serialize takes numpy arrays as it takes lists.
+    # minirospy's serialize accepts numpy arrays like lists.
     return {"deserialize": deserialize}
 
 

@@ -1,8 +1,8 @@
-"""Definitions -> modules, when they are first imported: for the many packages of which a program uses a few types.
+"""Compile definitions to modules at their first import, for the many packages of which a program uses only a few types.
 
-A package that is compiled so has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`load_package`; from then on
-``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python keeps the result in ``__pycache__`` as it does with
-any module. Where that folder cannot be written to, the module is compiled again in each process.
+Such a package has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`load_package`; from then on
+``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python caches the result in ``__pycache__`` like
+that of any module. If that folder is not writable, each process compiles the module again.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ __all__ = ["load_package"]
 def load_package(
     module: str, fingerprint: int, names: str
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """Let the modules of ``pkg.msg`` or ``pkg.srv`` be imported; return its ``__getattr__``, ``__dir__`` and ``__all__``.
+    """Make the modules of ``pkg.msg`` or ``pkg.srv`` importable.
 
-    ``names``: its messages or services, with spaces between. ``fingerprint`` changes with the text of any module of the package.
+    Return the package's ``__getattr__``, ``__dir__`` and ``__all__``. ``names``: its messages or services, separated by
+    spaces. ``fingerprint`` changes with the text of any of its modules.
     """
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
@@ -53,7 +54,7 @@ def load_package(
 
 
 class _Finder:
-    """The last of ``sys.meta_path``: a module that exists as a file is found before it."""
+    """The last entry of ``sys.meta_path``, so that a module that exists as a file is found first."""
 
     def __init__(self) -> None:
         self.packages: dict[str, int] = {}
@@ -61,7 +62,7 @@ class _Finder:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of ``pkg.msg._Name`` or ``pkg.srv._Name`` where the package defines it."""
+        """Return the spec of ``pkg.msg._Name`` or ``pkg.srv._Name`` if the package defines it."""
         package, _, rest = fullname.partition(".")
         kind, _, module = rest.partition(".")
         if package not in self.packages or not path or not module.startswith("_"):
@@ -74,14 +75,14 @@ class _Finder:
 
 
 class _Loader(SourceFileLoader):
-    """Reads from a definition what SourceFileLoader reads from a file, and leaves the rest to it: compiling, the cache."""
+    """Compiles the source from a definition; SourceFileLoader does the rest, such as caching."""
 
     def __init__(self, fullname: str, path: str, fingerprint: int) -> None:
         super().__init__(fullname, path)
         self._fingerprint = fingerprint
 
     def path_stats(self, path: str | bytes) -> dict[str, int]:
-        """Return what a cached module is compared with: the source's size is not known before it is made."""
+        """Return the values that a cached module is compared with; the source's size is not known in advance."""
         return {"mtime": self._fingerprint, "size": 0}
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:

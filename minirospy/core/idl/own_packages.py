@@ -1,4 +1,4 @@
-"""The packages of definitions that come with minirospy: where they are, and which are modules of the wheel."""
+"""The message packages that come with minirospy: their folder, and those compiled in advance in the wheel."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COMPILED_AHEAD = frozenset(
         "visualization_msgs",
     ]
 )
-"""Packages whose modules are files of the wheel: those of ROS itself and of the workshop, which most programs import."""
+"""Packages with modules as files in the wheel: those of ROS itself and of the workshop, which most programs import."""
 
 _OURS = Path(__file__).parents[2]
 

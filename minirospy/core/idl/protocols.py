@@ -1,7 +1,7 @@
 """The protocols of messages, services and actions, for code that works with all of them.
 
-Protocols, since the classes come from several generators: ours, real genpy's in packages that were built with ROS, and
-those made at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
+These are protocols since the classes come from several generators: minirospy's, real genpy's in packages built with ROS,
+and classes created at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
 """
 
 from __future__ import annotations
@@ -27,15 +27,14 @@ __all__ = [
     "is_stamped",
 ]
 
-Buffer: TypeAlias = bytes | bytearray | memoryview
-"""Bytes that a message is read from."""
+Buffer: TypeAlias = bytes | bytearray | memoryview  # the bytes that a message is read from
 
 
 class Writer(Protocol):
-    """The target of ``serialize``: a BytesIO, a list of pieces."""
+    """The target of ``serialize``, such as a BytesIO or a list of pieces."""
 
     def write(self, data: bytes, /) -> object:
-        """Take the next bytes."""
+        """Append the next bytes."""
 
 
 class Message(Protocol):
@@ -49,7 +48,7 @@ class Message(Protocol):
     _slot_types: list[str]
     _connection_header: dict[str, str]
 
-    # Any, not object: pyright takes a class with other parameters for another type otherwise.
+    # Any, not object: otherwise pyright regards a class with other parameters as incompatible.
     def __init__(self, *args: Any, **kwds: Any) -> None:
         """Set all fields in order, or some by name."""
 
@@ -72,7 +71,7 @@ class GoalStatus(Message, Protocol):
 
     @property
     def goal_id(self) -> GoalID:
-        """Whose status it is."""
+        """The id of the goal that has this status."""
 
     status: int
     text: str
@@ -91,11 +90,11 @@ class Stamped(Message, Protocol):
 
     @property
     def header(self) -> Header:
-        """Sequence number, time and frame."""
+        """The message's sequence number, time and frame."""
 
 
 class ServiceClass(Protocol):
-    """A service's class itself, which joins those of its request and response; it has no instances."""
+    """A service's class, which has the classes of its request and response; it has no instances."""
 
     @property
     def _type(self) -> str: ...
@@ -111,11 +110,11 @@ class ServiceClass(Protocol):
 
 
 class ActionGoal(Stamped, Protocol):
-    """The message of an action client."""
+    """The message from an action client to send a goal."""
 
     @property
     def goal_id(self) -> GoalID:
-        """The goal's name and time."""
+        """The goal's id and time."""
 
     @property
     def goal(self) -> Message:
@@ -123,7 +122,7 @@ class ActionGoal(Stamped, Protocol):
 
 
 class ActionResult(Stamped, Protocol):
-    """The message of an action server at the end of a goal."""
+    """The message from an action server at the end of a goal."""
 
     @property
     def status(self) -> GoalStatus:
@@ -131,11 +130,11 @@ class ActionResult(Stamped, Protocol):
 
     @property
     def result(self) -> Message:
-        """Return the outcome."""
+        """Return the result."""
 
 
 class ActionFeedback(Stamped, Protocol):
-    """The message of an action server during a goal."""
+    """The message from an action server during a goal."""
 
     @property
     def status(self) -> GoalStatus:
@@ -143,27 +142,27 @@ class ActionFeedback(Stamped, Protocol):
 
     @property
     def feedback(self) -> Message:
-        """Return its progress."""
+        """Return the goal's progress."""
 
 
 class Action(Message, Protocol):
-    """An action: a message that names those of its goal, result and feedback. An action's class is ``type[Action]``."""
+    """An action: a message with a goal, a result and a feedback message. An action's class is ``type[Action]``."""
 
     @property
     def action_goal(self) -> ActionGoal:
-        """A goal."""
+        """A goal message."""
 
     @property
     def action_result(self) -> ActionResult:
-        """A result."""
+        """A result message."""
 
     @property
     def action_feedback(self) -> ActionFeedback:
-        """A feedback."""
+        """A feedback message."""
 
 
 def is_message(value: object) -> TypeGuard[Message]:
-    """Return whether a field's value, or what somebody gave us, is a message."""
+    """Return whether a value, such as a field's or an argument, is a message."""
     return hasattr(value, "_slot_types")
 
 

@@ -1,4 +1,4 @@
-"""The conversion of a service handler's return value into the response."""
+"""Convert a service handler's return value to the response."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["to_response"]
 
 
 def to_response(response_class: type[Message], returned: object) -> Message:
-    """Return a response of ``response_class`` made from what a handler returned.
+    """Return a response of ``response_class`` made from a handler's return value.
 
-    That is a response, a dictionary of some of its fields, a list or tuple of all their values, or the value of its
-    only field. Raise ServiceException with rospy's words.
+    That may be a response, a dictionary of some of its fields, a list or tuple of all their values, or the value of its
+    only field. Raise ServiceException with rospy's text.
     """
-    # A class of the same type may come from elsewhere: a reloaded module, a foreign generator.
+    # The same type may have another class: of a reloaded module, or a third-party generator.
     if getattr(type(returned), "_type", None) == response_class._type:
         return cast("Message", returned)
     if returned is None:

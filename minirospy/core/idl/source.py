@@ -1,4 +1,4 @@
-"""The text of a generated module while it is written: lines, blocks, and the names that they share."""
+"""Collect the text of a generated module: lines, blocks, and their shared names."""
 
 from __future__ import annotations
 
@@ -14,21 +14,19 @@ _RESERVED = {*keyword.kwlist, "self", "serialize", "deserialize"}
 
 
 def python_name(field: str) -> str:
-    """Return a field's name in Python: a word that Python keeps for itself gets an underscore."""
+    """Return a field's name in Python: a keyword gets a trailing underscore."""
     return field + "_" if field in _RESERVED else field
 
 
 class Source:
-    """Collects lines; what they need from the module's head is noted as it is first used."""
+    """Collects lines; also records the structs, classes and helpers that the module's head must define."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.structs: dict[str, str] = {}
-        """Format characters for ``struct`` -> the module's name of the compiled struct."""
-        self.classes: dict[str, str] = {}
-        """``pkg/Name`` -> the module's name of that class."""
-        self.helpers: set[str] = set()
-        """Names of the helpers of ``emit`` that the module needs."""
+        """Format characters for ``struct`` -> name of the compiled struct in the module."""
+        self.classes: dict[str, str] = {}  # ``pkg/Name`` -> name of that class in the module
+        self.helpers: set[str] = set()  # names of the helpers of ``emit`` that the module needs
         self._indent = ""
         self._taken: set[str] = set()
         self._last: dict[str, int] = {}
@@ -39,7 +37,7 @@ class Source:
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
-        """Lines written inside belong to ``head``."""
+        """Add the line ``head``, and indent the lines added inside the context."""
         self.line(head)
         self._indent += "    "
         yield
@@ -53,27 +51,27 @@ class Source:
             yield
 
     def struct(self, letters: str) -> str:
-        """Return the name of the compiled struct of these letters (``If``: an unsigned int, then a float)."""
+        """Return the name of the compiled struct for these format characters (``If``: an unsigned int, then a float)."""
         short = _SAME.sub(lambda match: f"{len(match[0])}{match[1]}", letters)
         return self.structs.setdefault(short, f"_struct_{short}")
 
     def use(self, helper: str) -> str:
-        """Note that the module needs a helper."""
+        """Record that the module needs a helper; return its name."""
         self.helpers.add(helper)
         return helper
 
     def class_(self, full_name: str) -> str:
-        """Return the name of a message's class, one that nothing else in the module has."""
+        """Return the name of a message's class, unique within the module."""
         if full_name not in self.classes:
             name = "_" + full_name.replace("/", "_")
-            # a/b_C and a_b/C look the same, and struct/I looks like a compiled struct.
+            # a/b_C and a_b/C would be equal, and struct/I would look like a compiled struct.
             while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
                 name += "_"
             self.classes[full_name] = name
         return self.classes[full_name]
 
     def local(self, stem: str) -> str:
-        """Return a local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
+        """Return a local name that is unused in this function. It ends in a digit, so that it hides no other name."""
         number = self._last.get(stem, 0) + 1
         while f"{stem}{number}" in self._taken:
             number += 1

@@ -1,4 +1,4 @@
-"""The spec tree: what a .msg, .srv or .action text says."""
+"""The spec tree: the contents of a .msg, .srv or .action text."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PRIMITIVES = {
 
 
 class FieldType(NamedTuple):
-    """A field's type: a primitive or ``pkg/Name``; ``length`` of an array is None if it varies."""
+    """A field's type: a primitive or ``pkg/Name``; for an array, ``length`` is None if it varies."""
 
     base: str
     is_array: bool = False
@@ -46,19 +46,19 @@ class FieldType(NamedTuple):
 
     @property
     def is_bytes(self) -> bool:
-        """Return whether Python holds it as bytes."""
+        """Return whether Python stores it as bytes."""
         return self.is_array and self.base in ("uint8", "char")
 
 
 class Field(NamedTuple):
-    """A field, with its name as in the definition."""
+    """A field; its name is that of the definition."""
 
     name: str
     type: FieldType
 
 
 class Constant(NamedTuple):
-    """A constant: its value, and its text as in the definition, which the md5sum counts."""
+    """A constant: its value, and its text in the definition, which is part of the md5sum."""
 
     name: str
     type: str
@@ -67,7 +67,7 @@ class Constant(NamedTuple):
 
 
 class MessageSpec(NamedTuple):
-    """A message."""
+    """A message definition."""
 
     package: str
     name: str
@@ -77,17 +77,17 @@ class MessageSpec(NamedTuple):
 
     @property
     def full_name(self) -> str:
-        """``pkg/Name``."""
+        """The full name ``pkg/Name``."""
         return f"{self.package}/{self.name}"
 
     @property
     def has_header(self) -> bool:
-        """Return whether it starts with a header that publishers fill in."""
+        """Return whether the message starts with a header that publishers fill in."""
         return bool(self.fields) and self.fields[0] == Field("header", FieldType("std_msgs/Header"))
 
 
 class ServiceSpec(NamedTuple):
-    """A service."""
+    """A service definition."""
 
     package: str
     name: str
@@ -97,12 +97,12 @@ class ServiceSpec(NamedTuple):
 
     @property
     def full_name(self) -> str:
-        """``pkg/Name``."""
+        """The full name ``pkg/Name``."""
         return f"{self.package}/{self.name}"
 
 
 class ActionSpec(NamedTuple):
-    """An action: the seven messages that it consists of (http://wiki.ros.org/actionlib)."""
+    """An action definition: its seven messages (http://wiki.ros.org/actionlib)."""
 
     package: str
     name: str

@@ -1,7 +1,7 @@
-"""Specs -> a stub (``__init__.pyi``): the fields of messages and the arguments of their constructors, for editors and checkers.
+"""Generate stubs (``__init__.pyi``) with the fields of messages and their constructors' arguments, for editors and checkers.
 
-The constructor of a message takes all fields in order, or some by name, so each argument has a default. Arrays may be
-any collection: a tuple, an array of numpy. PEP 484, section Stub Files.
+The constructor of a message accepts all fields in order, or some by name, so each argument has a default. Arrays may be
+any collection, such as a tuple or a numpy array. Source: PEP 484, section Stub Files.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _TYPES = {"bool": "bool", "float32": "float", "float64": "float", "string": "str
 
 
 def emit_stub(messages: Sequence[MessageSpec], services: Sequence[ServiceSpec] = ()) -> str:
-    """Return the stub of a package's msg or srv folder. Its names have been checked by ``emit``."""
+    """Return the stub of a package's msg or srv folder. ``emit`` must have checked its names."""
     stub = _Stub(messages, has_services=bool(services))
     for message in messages:
         stub.message(message)
@@ -40,7 +40,7 @@ class _Stub:
         """Write the class of a message."""
         fields = [(python_name(field.name), field.type) for field in spec.fields]
         constants = [(python_name(constant.name), constant.type) for constant in spec.constants]
-        # Inside of the class, the name of a field or a constant hides a type of the same name.
+        # Inside the class, the name of a field or a constant hides a type of the same name.
         self._hidden = {name for name, _ in fields} | {name for name, _ in constants}
         lines = [f"    {name}: {self._type(FieldType(type_))}" for name, type_ in constants]
         lines += [f"    {name}: {self._type(type_)}" for name, type_ in fields]
@@ -50,7 +50,7 @@ class _Stub:
         self._class(f"{spec.name}(_genpy.Message)", lines)
 
     def service(self, spec: ServiceSpec) -> None:
-        """Write the class of a service, which joins request and response."""
+        """Write the class of a service, which combines request and response."""
         self._hidden = set()
         self._class(
             spec.name,
@@ -63,7 +63,7 @@ class _Stub:
         )
 
     def text(self) -> str:
-        """Return the whole stub."""
+        """Return the complete stub."""
         return "\n".join(
             [
                 *(["import builtins as _builtins"] if self._builtins else []),
@@ -87,7 +87,7 @@ class _Stub:
         return f"{self._builtin('list')}[{one}]" if type_.is_array else one
 
     def _argument(self, type_: FieldType) -> str:
-        """Return what a constructor takes for a field."""
+        """Return the type of a constructor's argument for a field."""
         if not type_.is_array:
             return self._one(type_)
         self._arrays = True

@@ -1,4 +1,4 @@
-"""The hash by which ROS 2 tells definitions of one name apart (RIHS01), of fields as text. Pure.
+"""The hash of a type's fields by which ROS 2 distinguishes definitions of one name (RIHS01). Pure.
 
 Source: https://github.com/ros-infrastructure/rep/pull/381 (REP 2016), and rosidl's description of types.
 """
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 __all__ = ["Fields", "type_hash"]
 
 Fields = Mapping[str, str]
-"""Names of fields -> their types: ``uint8``, ``double[3]``, ``sequence<std_msgs/Header>``, ``sequence<float64, 3>``."""
+"""Field name -> type: ``uint8``, ``double[3]``, ``sequence<std_msgs/Header>``, ``sequence<float64, 3>``."""
 
 _IDS = {
     "int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8, "uint64": 9, "float32": 10,
@@ -25,8 +25,8 @@ _EMPTY = {"structure_needs_at_least_one_member": "uint8"}
 def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
     """Return ``RIHS01_`` and 64 digits for a type.
 
-    ``name`` and the types of fields are ``pkg/Name`` for messages, else ``pkg/srv/Name_Request`` and the like; ``fields``
-    returns those of a type, and may raise. Raise ValueError on a field of a type that messages lack.
+    ``name`` and the types of fields are ``pkg/Name`` for messages, else ``pkg/srv/Name_Request`` and similar; ``fields``
+    returns the fields of a type, and may raise. Raise ValueError on a field of a type that messages cannot have.
     """
     known: dict[str, object] = {}
 
@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type: its number, the elements that it holds at most, and the name of a message."""
+    """Return a field's type: its number, its maximum number of elements, and the name if it is a message."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

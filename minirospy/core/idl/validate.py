@@ -1,9 +1,9 @@
-"""Checks of all text that becomes Python source: names of types and fields, and sizes, before anything is generated.
+"""Check all text that becomes Python source (names of types and fields, and sizes) before anything is generated.
 
 A definition may come from a file or from any publisher's connection header; its names are written into source that is
-executed. So they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which leaves no
-character that could end a name or a text in Python. And a short text may mean much: a type with two fields of a type
-with two fields of ..., or an array of a billion numbers. So what a type unfolds to is counted first.
+executed. So they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which allows no
+character that could end a name or a string in Python. Also, a short text may expand to very much: a type with two
+fields of a type with two fields of ..., or an array of a billion numbers. So the expanded size is computed first.
 """
 
 from __future__ import annotations
@@ -20,27 +20,23 @@ from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
 
 __all__ = ["MAX_LEVELS", "MAX_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
 
-MAX_TEXT = 1 << 20
-"""Characters of a full text: the largest of real packages have some 30,000."""
+MAX_TEXT = 1 << 20  # characters in a full text; the largest of real packages have some 30,000
 
-MAX_LEVELS = 50
-"""How deep messages may be nested in each other."""
+MAX_LEVELS = 50  # levels of nested messages
 
-_MAX_FIELDS = 4_000
-"""Fields of a message, those of its inner messages included, as the generated source has them."""
+_MAX_FIELDS = 4_000  # fields of a message including its inner messages, which the generated source expands
 
+# The same for all types used by a message; the largest of MoveIt's has some 17,000
 _MAX_FIELDS_IN_ALL = 32_000
-"""The same, of all types together that a message needs: the largest of MoveIt's has some 17,000."""
 
-_MAX_BYTES = 1 << 27
-"""Memory of a message's arrays of fixed length."""
+_MAX_BYTES = 1 << 27  # of memory for a message's arrays of fixed length
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SHOWN = 80
 
 
 def is_type_name(name: str) -> bool:
-    """Return whether a text is ``pkg/Name`` by ROS's grammar, and neither part is a Python keyword."""
+    """Return whether a string is ``pkg/Name`` by ROS's grammar, and neither part is a Python keyword."""
     package, slash, short = name.partition("/")
     return bool(slash) and all(
         _NAME.fullmatch(part) and not keyword.iskeyword(part) for part in (package, short)
@@ -48,7 +44,7 @@ def is_type_name(name: str) -> bool:
 
 
 def check_type_name(name: str, where: str = "") -> None:
-    """Raise DefinitionError unless :func:`is_type_name`; ``where`` names the text that has it."""
+    """Raise DefinitionError unless :func:`is_type_name`; ``where`` is the name of the text that contains it."""
     if is_type_name(name):
         return
     shown = _shown(name)
@@ -59,7 +55,7 @@ def check_type_name(name: str, where: str = "") -> None:
 
 
 def check_spec(spec: MessageSpec) -> None:
-    """Raise DefinitionError unless all names of a message are fit for generated source."""
+    """Raise DefinitionError unless all names of a message are safe in generated source."""
     check_type_name(spec.full_name)
 
     seen: set[str] = set()
@@ -76,10 +72,10 @@ def check_spec(spec: MessageSpec) -> None:
 
 
 def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list[str]:
-    """Return the names of a message and of all types that it needs, each after those that it needs itself.
+    """Return the names of a message and of all types that it uses, each after those that it uses itself.
 
-    Raise DefinitionError if a name is not legal, where a message contains itself, and where it is too large or too
-    deeply nested to make a class of; as well what ``lookup`` raises.
+    Raise DefinitionError if a name is not legal, if a message contains itself, or if it is too large or too
+    deeply nested for a class; also the exceptions of ``lookup``.
     """
     specs = {spec.full_name: spec}
     check_spec(spec)
@@ -96,7 +92,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # graphlib names the first one twice.
+        # graphlib lists the first one twice.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 
@@ -112,7 +108,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
 
 
 class _Size(NamedTuple):
-    """The size of an unfolded message."""
+    """The size of an expanded message."""
 
     fields: int
     levels: int
@@ -129,7 +125,7 @@ def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
             each = 64 + inner.bytes
             levels = max(levels, inner.levels + 1)
         fields += 1 + (inner.fields if inner else 0)
-        # Of an array without a fixed length a new message has no element.
+        # An array without a fixed length has no elements in a new message.
         memory += each * (1 if not field.type.is_array else field.type.length or 0)
     return _Size(fields, levels, memory)
 
@@ -144,7 +140,7 @@ def _check_size(where: str, size: _Size) -> None:
 
 
 def _shown(text: str) -> str:
-    """Return a text from a peer for an error's line: printable, and not endless."""
+    """Return a peer's text for a one-line error: printable and shortened."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
-    # A letter of another script may look like one of ours.
+    # A letter of another script may look like an ASCII letter.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

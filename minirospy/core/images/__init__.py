@@ -1,1 +1,1 @@
-"""Images as arrays: encodings, views of messages, compression. By numpy; OpenCV or Pillow where they are needed."""
+"""Images as arrays: encodings, views of messages, compression. Uses numpy; OpenCV or Pillow only if needed."""

@@ -1,4 +1,4 @@
-"""Compressed images: by OpenCV where it is installed, else by Pillow (`pip install "minirospy[images]"`)."""
+"""Compressed images: with OpenCV if it is installed, else with Pillow (`pip install "minirospy[images]"`)."""
 
 from __future__ import annotations
 
@@ -22,27 +22,24 @@ _FORMATS = {
     "webp": "WEBP",
     "jp2": "JPEG2000",
 }
-_QUALITY = 95
-"""Of JPEG, as OpenCV has it."""
+_QUALITY = 95  # of JPEG, OpenCV's default
 
 
 MAX_PIXELS = 100_000_000
-"""Pixels of an image that is decoded: a file of some kilobytes may have ten times as many, and take gigabytes."""
+"""Pixels of a decoded image: a file of some kilobytes may have ten times as many, and take gigabytes."""
 
 
 class Options(NamedTuple):
     """Options of the compression."""
 
-    quality: int = _QUALITY
-    """Of JPEG, from 1 to 100."""
+    quality: int = _QUALITY  # of JPEG, from 1 to 100
     progressive: bool = False
     optimize: bool = False
-    level: int | None = None
-    """Of PNG, from 0 to 9, the smallest file; None for the library's own."""
+    level: int | None = None  # of PNG, from 0 to 9, the smallest file; None for the library's default
 
 
 def opencv() -> Any:
-    """Return the module cv2; None if it is not installed."""
+    """Return the module cv2, or None if it is not installed."""
     try:
         import cv2  # type: ignore[import-not-found]
     except ImportError:
@@ -51,16 +48,16 @@ def opencv() -> Any:
 
 
 def require_library() -> None:
-    """Raise ValueError with what to install where there is neither OpenCV nor Pillow."""
+    """Raise ValueError with installation instructions if neither OpenCV nor Pillow is installed."""
     if opencv() is None:
         _pillow()
 
 
 def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Pixels:
-    """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA.
+    """Decode a compressed image, with its channels in OpenCV's order: gray, BGR or BGRA.
 
-    Raise ValueError if it is not one, or has more pixels than ``max_pixels``, before anything is decoded. With a lower limit than
-    usual, an image whose size cannot be known before is refused, too.
+    Raise ValueError if it is not an image, or has more pixels than ``max_pixels``, before decoding anything. If the limit is
+    lower than the default, also refuse an image whose size cannot be determined in advance.
     """
     import numpy as np
 
@@ -100,7 +97,7 @@ def _check_size(size: tuple[int, int], max_pixels: int) -> None:
 
 
 def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
-    """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raise ValueError."""
+    """Encode an image, gray, BGR or BGRA, in a format such as jpg or png. Raise ValueError."""
     options = options or Options()
     import numpy as np
 
@@ -141,7 +138,7 @@ def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
 
 
 def _swapped(image: Pixels) -> Pixels:
-    """Return an image with red and blue exchanged: BGR is OpenCV's order, RGB that of Pillow."""
+    """Return an image with red and blue exchanged, since OpenCV uses BGR and Pillow RGB."""
     import numpy as np
 
     if image.ndim == 2:

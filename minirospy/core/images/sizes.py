@@ -1,6 +1,6 @@
-"""The width and height of a compressed image, from its head. Pure: nothing is decompressed.
+"""Read the width and height of a compressed image from its header. Pure: nothing is decompressed.
 
-A file of some kilobytes may have 10,000 x 10,000 pixels, for which a decoder takes a gigabyte: servers look here first. Sources:
+A file of some kilobytes may have 10,000 x 10,000 pixels, which take a decoder a gigabyte: servers check this first. Sources:
 PNG (third edition), ITU T.81 (JPEG), GIF89a, RFC 9649 (WebP), TIFF 6.0, ITU T.800 (JPEG 2000), netpbm, BMP.
 """
 
@@ -13,16 +13,16 @@ __all__ = ["size_of"]
 
 _NETPBM = re.compile(rb"P[1-6](?:\s+|#[^\n]*\n)+(\d{1,9})(?:\s+|#[^\n]*\n)+(\d{1,9})\s")
 _JPEG_FRAMES = {0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD, 0xCE, 0xCF}
-"""Markers of a JPEG that have the size behind them."""
+"""JPEG markers that are followed by the image's size."""
 _JPEG_PLAIN = {0x01, 0xFF, *range(0xD0, 0xD9)}
-"""Markers without a length: a fill byte, restarts, the start of the image."""
+"""JPEG markers without a length: a fill byte, restarts, the start of the image."""
 _MAX_MARKERS = 10_000
 _TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
 _TIFF_SHORT, _TIFF_LONG = 3, 4
 
 
 def size_of(data: bytes) -> tuple[int, int] | None:
-    """Return width and height; None if the format is unknown or its head is broken."""
+    """Return width and height; None if the format is unknown or its header is invalid."""
     try:
         for magic, read in _READERS.items():
             if data.startswith(magic):
@@ -46,7 +46,7 @@ def _bmp(data: bytes) -> tuple[int, int]:
     if head == 12:
         return _pair("<HH", data, 18)
     width, height = _pair("<ii", data, 18)
-    # Of a negative height the first row is the upper one.
+    # A negative height means that the rows start at the top.
     return abs(width), abs(height)
 
 
@@ -98,7 +98,7 @@ def _tiff(data: bytes) -> tuple[int, int] | None:
 
 
 def _jpeg_2000(data: bytes) -> tuple[int, int] | None:
-    # The marker SIZ follows the start of the codestream immediately.
+    # The marker SIZ directly follows the start of the codestream.
     at = data.find(b"\xff\x4f\xff\x51")
     if at < 0:
         return None
@@ -121,5 +121,4 @@ _READERS = {
     b"MM\0*": _tiff,
     b"\0\0\0\x0cjP  ": _jpeg_2000,
     b"\xff\x4f\xff\x51": _jpeg_2000,
-}
-"""The first bytes of a format -> what reads its size."""
+}  # first bytes of a format -> function that reads its size

@@ -1,1 +1,1 @@
-"""Coordinate frames: the tree of transforms over time, and lookups in it. Pure: no socket, no thread, no clock."""
+"""Coordinate frames: the tree of transforms over time, and lookups in it. Pure: no sockets, threads or clocks."""

@@ -1,7 +1,7 @@
 """The transform buffer of tf2: transforms in, lookups between any two frames of the tree out.
 
 Results, exceptions and their texts are those of tf2's BufferCore. Stamps are nanoseconds since the epoch, and exact;
-tf2_py rounds them to what a float of seconds holds. Not locked: one thread at a time.
+tf2_py rounds them to a float of seconds. Not thread-safe.
 Source: http://wiki.ros.org/tf2/Design, http://docs.ros.org/en/noetic/api/tf2/html/classtf2_1_1BufferCore.html.
 """
 
@@ -29,7 +29,7 @@ _ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 class StampedTransform(NamedTuple):
-    """The answer to a lookup: the pose of the source frame in the target frame, at ``stamp``."""
+    """The result of a lookup: the pose of the source frame in the target frame, at ``stamp``."""
 
     stamp: int
     translation: Vector
@@ -37,7 +37,7 @@ class StampedTransform(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """The samples on the way between two frames, each way up to where they meet, and the time they are of."""
+    """The samples on the path between two frames, from each one up to their common ancestor, and their time."""
 
     time: int
     from_source: list[Sample]
@@ -50,12 +50,12 @@ class TransformBuffer(FrameTree):
     # --- lookups out
 
     def lookup(self, target: str, source: str, time: int) -> StampedTransform:
-        """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; 0: the latest that all have.
+        """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; 0 means the latest common time.
 
         Raise LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException.
         """
         if target == source:
-            # A frame is at its own place even if nobody knows it.
+            # As in tf2, the pose of a frame in itself is the identity, even for an unknown frame.
             return StampedTransform(time or self._newest_of(target), _ORIGIN, IDENTITY)
         target_frame = self._valid(target, "lookupTransform argument target_frame")
         source_frame = self._valid(source, "lookupTransform argument source_frame")
@@ -64,9 +64,9 @@ class TransformBuffer(FrameTree):
     def lookup_full(
         self, target: str, target_time: int, source: str, source_time: int, fixed: str
     ) -> StampedTransform:
-        """Return where ``source`` was at ``source_time``, seen from ``target`` at ``target_time``.
+        """Return the pose of ``source`` at ``source_time`` in ``target`` at ``target_time``.
 
-        The frame ``fixed`` is taken as one that did not move meanwhile. Raise as :meth:`lookup` does.
+        The frame ``fixed`` is assumed not to have moved meanwhile. Raise as :meth:`lookup` does.
         """
         self._valid(target, "lookupTransform argument target_frame")
         self._valid(source, "lookupTransform argument source_frame")
@@ -78,7 +78,7 @@ class TransformBuffer(FrameTree):
     def why_not(self, target: str, source: str, time: int) -> str | None:
         """Return None if :meth:`lookup` would succeed, else the text of tf2's can_transform.
 
-        Raise InvalidArgumentException on a name that no frame can have.
+        Raise InvalidArgumentException on a name that is invalid for a frame.
         """
         if target == source:
             return None
@@ -94,7 +94,7 @@ class TransformBuffer(FrameTree):
     ) -> str | None:
         """Return None if :meth:`lookup_full` would succeed, else the text of tf2's can_transform.
 
-        Raise InvalidArgumentException on a name that no frame can have.
+        Raise InvalidArgumentException on a name that is invalid for a frame.
         """
         self._check_name(target, "canTransform argument target_frame")
         self._check_name(source, "canTransform argument source_frame")
@@ -102,7 +102,7 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # The fixed frame is named wherever the source is missing: tf2 tests the wrong one of the two.
+            # Like tf2, which tests the wrong frame, report the fixed frame as missing if the source is missing.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:
@@ -111,9 +111,9 @@ class TransformBuffer(FrameTree):
         return self._why_no_walk(fixed_frame, source_frame, source_time) if why is None else why
 
     def latest_common_time(self, target: str, source: str) -> int:
-        """Return the newest time at which :meth:`lookup` succeeds; 0 if only static transforms are between them.
+        """Return the newest time at which :meth:`lookup` succeeds; 0 if all transforms between them are static.
 
-        Raise LookupException, InvalidArgumentException; a plain TransformException where they are not connected.
+        Raise LookupException, InvalidArgumentException; a plain TransformException if they are not connected.
         """
         target_frame = self._valid(target, "get_latest_common_time")
         source_frame = self._valid(source, "get_latest_common_time")
@@ -123,7 +123,7 @@ class TransformBuffer(FrameTree):
             raise TransformException(*error.args) from None
 
     def chain(self, target: str, target_time: int, source: str, source_time: int, fixed: str) -> list[str]:
-        """Return the frames on the way from ``source`` to ``fixed``, and from there to ``target``. Raise as :meth:`lookup`."""
+        """Return the frames on the path from ``source`` to ``fixed``, and from there to ``target``. Raise as :meth:`lookup`."""
         first = self._path(fixed, source, source_time)
         second = self._path(target, fixed, target_time)
         return [*first, *second[1:]] if first else second
@@ -174,10 +174,10 @@ class TransformBuffer(FrameTree):
         return None
 
     def _walk(self, time: int, target: Frame, source: Frame) -> _Walk:
-        """Return the samples from the source and from the target up to where they meet; of two different frames.
+        """Return the samples from the source and from the target up to their common ancestor; the frames must differ.
 
-        Both go up to the root, or to where the source has no data for the time: what is above their common ancestor
-        cancels out. Raise what :meth:`lookup` raises.
+        Both paths go up to the root, or to a frame for which the source's path has no data: the part above the common
+        ancestor cancels out. Raise the exceptions of :meth:`lookup`.
         """
         if time == 0:
             time = self._common_time(target, source)
@@ -191,7 +191,7 @@ class TransformBuffer(FrameTree):
                 self._settle(frame)
             sample = cache.at(time)
             if sample is None:
-                # There may still be a way: the target may hang below.
+                # There may still be a path: the target's ancestors may include this frame.
                 missed = frame
                 break
             if frame is target:
@@ -222,14 +222,14 @@ class TransformBuffer(FrameTree):
         return _Walk(time, from_source, from_target)
 
     def _common_time(self, target: Frame, source: Frame) -> int:
-        """Return the newest time that every frame between the two has; static ones have every time.
+        """Return the newest time for which every frame between the two has data; static frames have data for every time.
 
         Raise ConnectivityException, LookupException.
         """
         if target is source:
             return self._newest_of(target.name)
 
-        # As :meth:`_ancestors`, written out: of most lookups this is all.
+        # Inlined from :meth:`_ancestors` for speed: most lookups need only this part.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
         frame, arrived = source, self._arrived
@@ -262,7 +262,7 @@ class TransformBuffer(FrameTree):
         raise _unconnected(target, source)
 
     def _ancestors(self, frame: Frame) -> Iterator[tuple[int, Frame]]:
-        """Yield the newest stamp and the parent of a frame, of its parent, and so on. Raise LookupException on a loop."""
+        """Yield the newest stamp and the parent of a frame and of each ancestor. Raise LookupException on a loop."""
         depth = 0
         while (cache := frame.cache) is not None:
             if frame.settled != self._arrived:
@@ -279,7 +279,7 @@ class TransformBuffer(FrameTree):
     def _path(self, target: str, source: str, time: int) -> list[str]:
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         if target_frame is source_frame:
-            # Two names that do not exist are the same frame, too.
+            # Two equal names are the same frame, even if it does not exist.
             return []
         if target_frame is None or source_frame is None:
             if time == 0:
@@ -301,7 +301,7 @@ class TransformBuffer(FrameTree):
 
 
 def _accumulated(walk: _Walk) -> StampedTransform:
-    """Return the source's pose in the target: up from the source, and down to the target."""
+    """Return the source's pose in the target, by composing both paths."""
     if not walk.from_target:
         return StampedTransform(walk.time, *_composed(walk.from_source))
     back, turn_back = invert(*_composed(walk.from_target))
@@ -315,7 +315,7 @@ def _accumulated(walk: _Walk) -> StampedTransform:
 def _composed(samples: list[Sample]) -> tuple[Vector, Quaternion]:
     """Return the pose of the first sample's child in the last one's parent.
 
-    Written out, without the functions of `rotation`: this is what a lookup spends its time with.
+    The functions of `rotation` are inlined here, since a lookup spends most of its time in this function.
     """
     _, a, b, c, x, y, z, w = samples[0]
     for _, ta, tb, tc, qx, qy, qz, qw in samples[1:]:

@@ -1,4 +1,4 @@
-"""The history of a frame's transforms: samples (stamp, parent, transform) in -> the sample at a time out.
+"""The history of a frame's transforms: samples (stamp, parent, transform) in, the sample at a given time out.
 
 Times are nanoseconds since the epoch; time 0 means the newest. Source: http://wiki.ros.org/tf2/Design.
 """
@@ -12,25 +12,25 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
+# Expired samples to keep before the lists are shortened, so that not each insertion moves all samples
 _COMPACT_ABOVE = 32
-"""So many expired samples are kept before the lists are shortened, so that an insertion does not move them all."""
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded as C++ does it: in texts of today's times that shows in the last digits."""
+    """Return a time in seconds, rounded like C++; for present times the last printed digits depend on it."""
     whole, rest = divmod(nanoseconds, 1_000_000_000)
     return whole + 1e-9 * rest
 
 
 class Misfit(Enum):
-    """Why a cache does not take a sample."""
+    """The reason why a cache refuses a sample."""
 
     OLD = "TF_OLD_DATA ignoring data from the past (Possible reasons are listed at http://wiki.ros.org/tf/Errors%20explained)"
     REPEATED = "TF_REPEATED_DATA ignoring data with redundant timestamp"
 
 
 class Frame:
-    """A frame that some transform has named: its cache (None: it is only a parent) and who sent the last sample."""
+    """A frame that a transform has named: its cache (None: it is only a parent) and the sender of its last sample."""
 
     __slots__ = ("authority", "cache", "name", "settled")
 
@@ -38,16 +38,15 @@ class Frame:
         self.name = name
         self.cache: TimeCache | StaticCache | None = None
         self.authority = ""
-        self.settled = 0
-        """How many lazy messages had arrived when those of this frame were decoded last."""
+        self.settled = 0  # number of lazy messages that had arrived when this frame's were last decoded
 
 
+# Parent, translation x, y, z, and rotation x, y, z, w
 Sample = tuple[Frame, float, float, float, float, float, float, float]
-"""The parent, the translation x, y, z, and the rotation x, y, z, w."""
 
 
 class TimeCache:
-    """The samples of ``span`` nanoseconds, in the order of their stamps, in parallel lists."""
+    """The samples of the last ``span`` nanoseconds, in the order of their stamps, in parallel lists."""
 
     __slots__ = ("_first", "_samples", "_span", "_stamps")
 
@@ -55,24 +54,23 @@ class TimeCache:
         self._span = span
         self._stamps: list[int] = []
         self._samples: list[Sample] = []
-        self._first = 0
-        """Where the samples start that have not expired."""
+        self._first = 0  # index of the first sample that has not expired
 
     def __len__(self) -> int:
         return len(self._stamps) - self._first
 
     @property
     def newest(self) -> int:
-        """The newest stamp; 0 without samples."""
+        """The newest stamp, or 0 if there are no samples."""
         return self._stamps[-1] if self._stamps else 0
 
     @property
     def oldest(self) -> int:
-        """The oldest stamp; 0 without samples."""
+        """The oldest stamp, or 0 if there are no samples."""
         return self._stamps[self._first] if self._stamps else 0
 
     def insert(self, stamp: int, sample: Sample) -> Misfit | None:
-        """Keep a sample, and forget those that are older than the span; return why where it does not fit."""
+        """Insert a sample, and drop those older than the span; return the reason if the sample is refused."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
@@ -93,7 +91,7 @@ class TimeCache:
     def at(self, time: int) -> Sample | None:
         """Return the sample at ``time``, interpolated between its neighbours; None if there is none.
 
-        Between samples of different parents the older one counts.
+        If the neighbours have different parents, return the older one.
         """
         stamps = self._stamps
         if not stamps:
@@ -122,11 +120,11 @@ class TimeCache:
         )
 
     def latest(self) -> tuple[int, Frame] | None:
-        """Return the newest stamp and its parent; None without samples."""
+        """Return the newest stamp and its parent; None if there are no samples."""
         return (self._stamps[-1], self._samples[-1][0]) if self._stamps else None
 
     def why_not(self, time: int) -> str:
-        """Return the text for a time without a sample; "" without any samples."""
+        """Return the error text for a time without a sample; "" if there are no samples at all."""
         if not self._stamps:
             return ""
         if len(self) == 1:
@@ -145,7 +143,7 @@ class TimeCache:
         )
 
     def clear(self) -> None:
-        """Forget all samples."""
+        """Drop all samples."""
         self._stamps.clear()
         self._samples.clear()
         self._first = 0
@@ -159,7 +157,7 @@ class TimeCache:
 
 
 class StaticCache:
-    """One sample that holds at every time, until another replaces it."""
+    """A single sample that is valid at every time, until another replaces it."""
 
     __slots__ = ("_sample",)
 
@@ -172,7 +170,7 @@ class StaticCache:
         return 1
 
     def insert(self, stamp: int, sample: Sample) -> None:
-        """Replace the sample; the stamp does not matter."""
+        """Replace the sample; the stamp is ignored."""
         self._sample = sample
 
     def at(self, time: int) -> Sample:
@@ -184,8 +182,8 @@ class StaticCache:
         return 0, self._sample[0]
 
     def why_not(self, time: int) -> str:
-        """Return ""; there is a sample at every time."""
+        """Return "", since there is a sample at every time."""
         return ""
 
     def clear(self) -> None:
-        """Do nothing: what is static stays."""
+        """Do nothing, since static transforms are kept."""

@@ -1,4 +1,4 @@
-"""The faults of a transform, as texts of tf2's, and a log of them that does not flood.
+"""The faults of a transform with tf2's error texts, and a rate-limited log of them.
 
 The texts are tf2's (noetic's: with the parent), since people search for them.
 """
@@ -14,26 +14,24 @@ from minirospy.core.tf2.rotation import Quaternion, Vector
 
 __all__ = ["Refusal", "RefusalLog", "faults_of", "misfit_refusal"]
 
-_TOLERANCE = 0.01
-"""How far the squared length of a quaternion may be from 1."""
+_TOLERANCE = 0.01  # maximum difference of a quaternion's squared length from 1
 _PAUSE = 1.0
 _MAX_KEYS = 1000
 
 
 class Refusal(NamedTuple):
-    """A transform that was not taken: the child frame, tf2's name of the fault, and its text."""
+    """A refused transform: the child frame, tf2's name of the fault, and its text."""
 
     frame: str
     kind: str
     text: str
-    is_error: bool
-    """Whether the transform itself is wrong; else it only comes too late, or twice."""
+    is_error: bool  # the transform itself is invalid; otherwise it is only too late, or a duplicate
 
 
 def faults_of(
     parent: str, child: str, translation: Vector, rotation: Quaternion, authority: str
 ) -> list[Refusal]:
-    """Return every reason why tf2 takes no such transform, from no data at all; in tf2's order."""
+    """Return all reasons why tf2 refuses this transform, independent of other data; in tf2's order."""
     found = []
 
     def add(kind: str, text: str) -> None:
@@ -74,15 +72,15 @@ def faults_of(
 
 
 def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authority: str) -> Refusal:
-    """Return the refusal of a transform that a frame's cache did not take."""
+    """Return the refusal of a transform that a frame's cache did not accept."""
     text = f"{misfit.value} for frame {child} (parent {parent}) at time {seconds(stamp):.6f} according to authority {authority}"
     return Refusal(child, misfit.value.partition(" ")[0], text, False)
 
 
 class RefusalLog:
-    """Passes a refusal on to ``write`` at most once a second for each frame and fault; the next one has the count.
+    """Passes a refusal to ``write`` at most once a second for each frame and fault; the next one includes the count.
 
-    ``clock`` returns seconds. tf2 writes each, which floods terminals where two nodes publish one frame.
+    ``clock`` returns seconds. tf2 writes each refusal, which floods terminals if two nodes publish one frame.
     """
 
     def __init__(self, write: Callable[[str, bool], object], clock: Callable[[], float]) -> None:
@@ -91,7 +89,7 @@ class RefusalLog:
         self._written: dict[tuple[str, str], tuple[float, int]] = {}
 
     def __call__(self, refusal: Refusal) -> None:
-        """Write ``write(text, is_error)``, or count."""
+        """Call ``write(text, is_error)``, or count the refusal."""
         key = refusal.frame, refusal.kind
         now = self._clock()
         last, held_back = self._written.get(key, (-math.inf, 0))

@@ -1,7 +1,7 @@
-"""The frames of a buffer as texts: YAML as view_frames reads it, and a graph in graphviz's language.
+"""Listings of a buffer's frames: YAML as parsed by view_frames, and a graph in graphviz's language.
 
-Source: http://wiki.ros.org/tf2/view_frames; the texts are those of tf2's BufferCore, byte for byte.
-In the graph quotation marks and backslashes of names are escaped, as graphviz needs it; the real one does not.
+Source: http://wiki.ros.org/tf2/view_frames; the texts are those of tf2's BufferCore, byte for byte, except that
+quotation marks and backslashes in names are escaped in the graph, as graphviz requires.
 """
 
 from __future__ import annotations
@@ -11,12 +11,11 @@ from minirospy.core.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
 __all__ = ["escaped_name", "frames_as_dot", "frames_as_yaml"]
 
-_SHORTEST = 0.0001
-"""Seconds: the span that a single sample counts for in a rate."""
+_SHORTEST = 0.0001  # seconds; the time span assumed for a single sample when computing a rate
 
 
 def frames_as_yaml(buffer: TransformBuffer) -> str:
-    """Return parent, broadcaster, rate and times of each frame that has a parent; ``{}`` without any frame."""
+    """Return parent, broadcaster, rate and times of each frame that has a parent; ``{}`` if there are no frames."""
     if not buffer.frame_names():
         return "{}"
 
@@ -39,7 +38,7 @@ def frames_as_yaml(buffer: TransformBuffer) -> str:
 
 
 def frames_as_dot(buffer: TransformBuffer, now: int = 0) -> str:
-    """Return the tree as a graph for `dot`; with a time ``now`` (nanoseconds) also how old each transform is."""
+    """Return the tree as a graph for `dot`; if ``now`` (nanoseconds) is given, also the age of each transform."""
     if not buffer.frame_names():
         return 'digraph G {\n"no tf data recieved"}'
     frames = buffer.frames()
@@ -63,7 +62,7 @@ def _edge(frame: Frame, now: int) -> str:
 
 
 def _root(frame: Frame, now: int) -> str:
-    """Return the legend at a frame without a parent; one that never had any gets it only with the time."""
+    """Return the legend at a frame without a parent; a frame that never had one gets it only if ``now`` is given."""
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""
@@ -76,7 +75,7 @@ def _root(frame: Frame, now: int) -> str:
 
 
 def escaped_name(name: str) -> str:
-    """Return a name as it is written between quotation marks in graphviz's language."""
+    """Return a name escaped for a quoted string in graphviz's language."""
     return name.replace("\\", "\\\\").replace('"', '\\"')
 
 

@@ -1,9 +1,9 @@
-"""TFMessages as they came -> the samples of one frame, decoded when that frame is looked up.
+"""Keep TFMessages as received, and decode the samples of a frame when that frame is looked up.
 
 A publisher sends the same frames in the same order again and again: two messages of one layout differ only in
-sequence numbers, stamps and transforms, which are at the same offsets. So a message of a known layout is recognised
-without decoding it, and kept as bytes. What may be dropped without decoding it is what the caches would have
-forgotten by now.
+sequence numbers, stamps and transforms, which are at the same offsets. So a message of a known layout is recognized
+without decoding it, and kept as bytes. Messages may be dropped without decoding if the caches would have dropped their
+samples by now.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ _COUNT = struct.Struct("<I")
 _HEAD = struct.Struct("<4I")
 _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
-_BLOCK = 64
-"""After so many messages a layout drops what has expired, so many at a time."""
+_BLOCK = 64  # messages after which a layout drops expired ones, this many at a time
 _MAX_MESSAGES = 16_384
 _MAX_LAYOUTS = 16_384
 _MAX_SAME_LENGTH = 8
@@ -40,7 +39,7 @@ class TransformSample(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A message that is kept: which one it was in the order of all, who sent it, and its bytes."""
+    """A stored message: its number in the order of arrival, its sender, and its bytes."""
 
     number: int
     authority: str
@@ -48,7 +47,7 @@ class Arrival(NamedTuple):
 
 
 class _Offsets(NamedTuple):
-    """Where a transform is in a message: the offsets of its header, and of its seven numbers."""
+    """The location of a transform in a message: the offsets of its header, and of its seven numbers."""
 
     parent: str
     child: str
@@ -57,7 +56,7 @@ class _Offsets(NamedTuple):
 
 
 def read_transforms(data: bytes) -> list[TransformSample]:
-    """Return the transforms of a serialised tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
+    """Return the transforms of a serialized tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
     return [_sample(data, offsets) for offsets in _find_transforms(data)]
 
 
@@ -68,12 +67,11 @@ class Layout:
         self._offsets = found
         self._index = {offsets.child: index for index, offsets in enumerate(found)}
         self._arrivals: list[Arrival] = []
-        self._dropped = 0
-        """How many messages came before the first of the list."""
+        self._dropped = 0  # number of messages before the first one in the list
+        # Per transform: number of messages decoded, counted from the first one ever received
         self._decoded = [0] * len(found)
-        """Of each transform: how many messages, counted from the first that ever came, have been decoded."""
+        # Per transform: the newest stamp when expired messages were last dropped
         self._newest = [0] * len(found)
-        """Of each transform: the stamp when expired messages were dropped last."""
 
     @property
     def children(self) -> list[str]:
@@ -81,12 +79,12 @@ class Layout:
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
-        """Keep a message, and drop what has expired; return the frames that the caller has to decode now."""
+        """Store a message, and drop expired ones; return the frames that the caller must decode now."""
         self._arrivals.append(arrival)
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
     def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
-        """Decode what has come of a frame since the last time: (number of the arrival, authority, sample)."""
+        """Decode a frame's messages since the last time: yield (number of the arrival, authority, sample)."""
         index = self._index[child]
         start = max(0, self._decoded[index] - self._dropped)
         self._decoded[index] = self._dropped + len(self._arrivals)
@@ -100,11 +98,11 @@ class Layout:
         self._arrivals.clear()
 
     def _drop_expired(self, span: int) -> list[str]:
-        """Drop the oldest blocks that nobody needs any more; return the frames to decode.
+        """Drop the oldest blocks that no frame needs; return the frames to decode.
 
-        A frame needs no message that it has decoded, and none that its cache would have forgotten. The cache forgets what is
-        older than the newest message, if that is one that it takes: a valid one, later than those before. A frame of which it
-        is not has to be decoded; then its messages can go, too.
+        A frame does not need messages that it has decoded, or that its cache would have dropped. The cache drops samples older
+        than the newest message, if it accepts that one: a valid transform, later than those before. A frame whose newest one
+        would be refused must be decoded; then its messages can be dropped, too.
         """
         newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
         moves_on = [
@@ -137,13 +135,13 @@ class Layout:
 
 
 class Layouts:
-    """Every layout that has come, found by a message's bytes."""
+    """All known layouts, found by a message's bytes."""
 
     def __init__(self) -> None:
+        # For messages with one transform: the bytes of its names, which are contiguous
         self._single: dict[bytes, Layout] = {}
-        """Of messages with one transform: by the names' bytes, which are in one piece."""
+        # Message length -> (mask of the constant bytes, their value, layout)
         self._several: dict[int, list[tuple[int, int, Layout]]] = {}
-        """By a message's length: a mask of the bytes that do not change, their value, the layout."""
         self._count = 0
 
     def __iter__(self) -> Iterator[Layout]:
@@ -153,7 +151,7 @@ class Layouts:
                 yield layout
 
     def find(self, data: bytes) -> Layout | None:
-        """Return the layout of a message; None if it is a new one, or no message."""
+        """Return the layout of a message; None if it is unknown, or the message is invalid."""
         if data[:4] == b"\1\0\0\0":
             return self._single.get(data[16:-56])
         candidates = self._several.get(len(data))
@@ -166,7 +164,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Make the layout of a message; None if it has no frame, one twice, or there are too many layouts."""
+        """Add the layout of a message; return None if it has no frames, a duplicate, or there are too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:
@@ -206,7 +204,7 @@ def _find_transforms(data: bytes) -> list[_Offsets]:
             end += length
             found.append(_Offsets(without_slash(parent), without_slash(child), header, end))
             end += _BODY.size
-    except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
+    except (struct.error, OverflowError) as error:  # OverflowError: an offset exceeds 32 bits
         raise DeserializationError(error) from error
     if end > len(data):
         raise DeserializationError("the message ends too early")
@@ -215,7 +213,7 @@ def _find_transforms(data: bytes) -> list[_Offsets]:
 
 
 def without_slash(name: str) -> str:
-    """Return a frame's name as tf2 knows it: without one leading slash."""
+    """Return a frame's name as tf2 stores it: without one leading slash."""
     return name[1:] if name.startswith("/") else name
 
 

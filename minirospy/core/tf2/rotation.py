@@ -1,7 +1,7 @@
-"""Quaternions (x, y, z, w), vectors and rigid transforms as plain floats -> the same; no array library.
+"""Operations on quaternions (x, y, z, w), vectors and rigid transforms as plain floats, without an array library.
 
-Quaternions need not be of length one exactly: tf2 takes those whose squared length is within 0.01 of 1, and never
-normalises them, so neither do the functions here. Source: Shoemake, "Animating rotation with quaternion curves" (1985).
+Quaternions need not have a length of exactly one: tf2 accepts a squared length within 0.01 of 1 and never
+normalizes, so neither do the functions here. Source: Shoemake, "Animating rotation with quaternion curves" (1985).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _Matrix = tuple[Vector, Vector, Vector]
 
 
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the rotation that does ``q`` first, then ``p``."""
+    """Return the rotation that applies ``q`` first, then ``p``."""
     px, py, pz, pw = p
     qx, qy, qz, qw = q
     return (
@@ -51,13 +51,13 @@ def invert(translation: Vector, rotation: Quaternion) -> tuple[Vector, Quaternio
 
 
 def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
-    """Return the rotation at ``ratio`` of the shortest way from ``p`` (0) to ``q`` (1), at constant angular speed."""
+    """Return the rotation at ``ratio`` of the shortest path from ``p`` (0) to ``q`` (1), at constant angular speed."""
     px, py, pz, pw = p
     qx, qy, qz, qw = q
     dot = px * qx + py * qy + pz * qz + pw * qw
     length = math.sqrt((px * px + py * py + pz * pz + pw * pw) * (qx * qx + qy * qy + qz * qz + qw * qw))
     if dot < 0:
-        # -q is the same rotation, and nearer.
+        # -q is the same rotation, and closer.
         dot, qx, qy, qz, qw = -dot, -qx, -qy, -qz, -qw
     cosine = dot / length
     if cosine >= 1.0:
@@ -76,10 +76,10 @@ def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
 
 
 def compose(first: tuple[Vector, Quaternion], second: tuple[Vector, Quaternion]) -> tuple[Vector, Quaternion]:
-    """Return the transform that does ``second`` first, then ``first``.
+    """Return the transform that applies ``second`` first, then ``first``.
 
-    By rotation matrices, as tf2 composes the two halves of a lookup with a fixed frame: they normalise the quaternions
-    and choose the sign of the result.
+    It uses rotation matrices, as tf2 does to compose the two halves of a lookup with a fixed frame: they normalize the
+    quaternions and determine the sign of the result.
     """
     m, n = _matrix(first[1]), _matrix(second[1])
     product = _product(m, n)
@@ -116,7 +116,7 @@ def _product(m: _Matrix, n: _Matrix) -> _Matrix:
 
 
 def _quaternion(m: _Matrix) -> Quaternion:
-    """Return the quaternion of a rotation matrix: by the trace, or where that is small by the largest diagonal element."""
+    """Return the quaternion of a rotation matrix: from the trace, or if small, the largest diagonal element."""
     trace = m[0][0] + m[1][1] + m[2][2]
     if trace > 0.0:
         root = math.sqrt(trace + 1.0)

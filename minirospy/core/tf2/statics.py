@@ -1,7 +1,7 @@
-"""Static transforms of many publishers in one latched message. Pure.
+"""Combine static transforms from many publishers in one latched message. Pure.
 
-A publisher latches its last message only, and the bridge is one publisher for all those of the other side. So it publishes
-the newest transform of each frame, as a broadcaster of static transforms does.
+A publisher latches only its last message, and the bridge is a single publisher for all publishers of the other ROS. So
+it publishes the newest transform of each frame, like a broadcaster of static transforms.
 """
 
 from __future__ import annotations
@@ -16,23 +16,21 @@ TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
 _LENGTH = struct.Struct("<I")
 _STAMP = 12
-_NUMBERS = 56
-"""Bytes of a header's number and time, and of a translation and rotation."""
+_NUMBERS = 56  # of a header's number and time, and of a translation and rotation
 MAX_FRAMES = 10_000
 MAX_BYTES = 8 << 20
 
 
 class StaticTransforms:
-    """Keeps the newest transform to each frame, as bytes: at most :data:`MAX_FRAMES`, of :data:`MAX_BYTES` together."""
+    """Stores the newest transform to each frame, as bytes: at most :data:`MAX_FRAMES` with :data:`MAX_BYTES` in total."""
 
     def __init__(self) -> None:
-        self.left_out = 0
-        """How many transforms to new frames were over the limit."""
+        self.left_out = 0  # number of transforms to new frames beyond the limit
         self._by_child: dict[bytes, bytes] = {}
         self._bytes = 0
 
     def merged(self, data: bytes | memoryview) -> bytes:
-        """Return a message of ROS 1 with all transforms so far, those of this one included.
+        """Return a ROS 1 message with all transforms so far, including those of ``data``.
 
         Raise DeserializationError on bytes that are not a TFMessage.
         """
@@ -48,7 +46,7 @@ class StaticTransforms:
                 if end > len(data):
                     raise DeserializationError("the message ends too early")
                 self._keep(child, data[start:end])
-        except (struct.error, OverflowError) as error:  # the second: of an offset that 32 bits do not hold
+        except (struct.error, OverflowError) as error:  # OverflowError: an offset exceeds 32 bits
             raise DeserializationError("the message ends too early") from error
         return _LENGTH.pack(len(self._by_child)) + b"".join(self._by_child.values())
 

@@ -1,6 +1,6 @@
-"""The frames of a buffer: transforms and TFMessages in, each frame's cache kept.
+"""The frames of a buffer: transforms and TFMessages in, each frame's cache updated.
 
-Not locked: one thread at a time. Source: http://wiki.ros.org/tf2/Design.
+Not thread-safe. Source: http://wiki.ros.org/tf2/Design.
 """
 
 from __future__ import annotations
@@ -15,15 +15,14 @@ from minirospy.core.tf2.rotation import Quaternion, Vector
 
 __all__ = ["DEFAULT_CACHE_TIME", "FrameTree"]
 
-DEFAULT_CACHE_TIME = 10_000_000_000
-"""Nanoseconds."""
+DEFAULT_CACHE_TIME = 10_000_000_000  # nanoseconds
 
 
 class FrameTree:
     """The tree of frames over the last ``cache_time`` nanoseconds.
 
-    ``on_refused`` is called with each transform that is not taken, from within what inserts it; of what
-    :meth:`insert_message` has taken, when its frame is looked up.
+    ``on_refused`` is called with each refused transform, from inside the inserting call; for transforms of
+    :meth:`insert_message` this may happen when the frame is looked up.
     """
 
     def __init__(
@@ -33,11 +32,9 @@ class FrameTree:
     ) -> None:
         self.cache_time = cache_time
         self._on_refused = on_refused
-        self._frames: dict[str, Frame] = {}
-        """In the order of their first appearance, which is that of the listings."""
+        self._frames: dict[str, Frame] = {}  # in the order of first appearance, which is that of the listings
         self._layouts = Layouts()
-        self._lazy: dict[str, list[Layout]] = {}
-        """The layouts that a child frame comes in."""
+        self._lazy: dict[str, list[Layout]] = {}  # child frame -> layouts that contain it
         self._arrived = 0
 
     # --- transforms in
@@ -53,9 +50,9 @@ class FrameTree:
         *,
         is_static: bool = False,
     ) -> bool:
-        """Take the pose of ``child`` in ``parent`` at ``stamp``; return whether it is one that tf2 takes.
+        """Insert the pose of ``child`` in ``parent`` at ``stamp``; return whether tf2 would accept it.
 
-        One leading slash of a name is dropped. ``is_static``: it holds at every time, where the frame's first one was
+        One leading slash is removed from names. ``is_static``: the pose is valid at every time, if the frame's first one was
         static, too.
         """
         return self._insert(
@@ -63,9 +60,9 @@ class FrameTree:
         )
 
     def insert_message(self, data: bytes, authority: str = "", *, is_static: bool = False) -> None:
-        """Take a serialised TFMessage. Raise DeserializationError.
+        """Insert the transforms of a serialized TFMessage. Raise DeserializationError.
 
-        Messages of a kind that came before stay bytes until one of their frames is looked up.
+        Messages with a known layout stay bytes until one of their frames is looked up.
         """
         if not is_static:
             layout = self._layouts.find(data)
@@ -78,7 +75,7 @@ class FrameTree:
         is_regular = not is_static
         for parent, child, stamp, translation, rotation in read_transforms(data):
             self._insert(parent, child, stamp, translation, rotation, authority, is_static)
-            # A layout is for frames that exist, with samples, from its first message on.
+            # A layout is added only if all its frames exist and have samples.
             frame = self._frames.get(child)
             is_regular = (
                 is_regular and frame is not None and frame.cache is not None and parent in self._frames
@@ -87,7 +84,7 @@ class FrameTree:
             self._add_layout(data)
 
     def clear(self) -> None:
-        """Forget every transform that is not static; the frames' names stay."""
+        """Drop all transforms that are not static; the frames' names are kept."""
         for layout in self._layouts:
             layout.forget()
         for frame in self._frames.values():
@@ -97,7 +94,7 @@ class FrameTree:
     # --- what there is
 
     def frames(self) -> list[Frame]:
-        """Return every frame in the order of first appearance, all that has come decoded."""
+        """Return every frame in the order of first appearance, after decoding all messages."""
         for layout in self._layouts:
             self._settle_all(layout)
         return list(self._frames.values())
@@ -111,7 +108,7 @@ class FrameTree:
         return name in self._frames
 
     def frames_as_string(self) -> str:
-        """Return a line for each frame that is a child, in the order of their first appearance."""
+        """Return a line for each child frame, in the order of first appearance."""
         lines = []
         for frame in self.frames():
             if frame.cache is not None:
@@ -133,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Take a transform after those of its frame that came before it."""
+        """Insert a transform after earlier ones of the same frame."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)
@@ -150,7 +147,7 @@ class FrameTree:
     ) -> bool:
         x, y, z, w = rotation
         a, b, c = translation
-        # NaN is not less than anything, and not equal to itself.
+        # NaN compares false with everything, including itself.
         is_sound = abs(x * x + y * y + z * z + w * w - 1.0) < 0.01 and a == a and b == b and c == c  # noqa: PLR0124
         if not (is_sound and child and parent and child != parent):
             for refusal in faults_of(parent, child, translation, rotation, authority):
@@ -183,7 +180,7 @@ class FrameTree:
     # --- what waits to be decoded
 
     def _settle(self, frame: Frame) -> None:
-        """Insert what has come of a frame since it was looked up last, in the order of arrival."""
+        """Insert a frame's messages since its last lookup, in the order of arrival."""
         frame.settled = self._arrived
         layouts = self._lazy.get(frame.name)
         if layouts is None:

@@ -1,4 +1,4 @@
-"""A robot as text: its tree as `check_urdf` prints it, and as a graph for graphviz."""
+"""A robot as text: its tree in the format of `check_urdf`, and as a graph for graphviz."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["dot_graph", "error_lines", "problem_lines", "tree_lines"]
 
 
 def tree_lines(robot: Robot) -> Iterator[str]:
-    """Yield the lines of `check_urdf` about a robot."""
+    """Yield the output lines of `check_urdf` for a robot."""
     yield f"robot name is: {robot.name}"
     yield "---------- Successfully Parsed XML ---------------"
     yield f"root Link: {robot.root} has {len(robot.child_joints(robot.root))} child(ren)"
-    # A list instead of recursion, and each link's children once: neither a deep robot nor links with many parents take long.
+    # Iterates instead of recursing, and visits each link's children once, for deep trees and links with many parents.
     shown = {robot.root}
     waiting = [(1, *child) for child in _numbered(robot, robot.root)]
     while waiting:
@@ -28,12 +28,12 @@ def tree_lines(robot: Robot) -> Iterator[str]:
 
 
 def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
-    """Return the children of a link with their numbers, the last first."""
+    """Return the children of a link with their numbers, in reverse order."""
     return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
 
 
 def dot_graph(robot: Robot) -> str:
-    """Return the links and joints as text for graphviz, as `urdf_to_graphviz` writes it."""
+    """Return the links and joints as text for graphviz, in the format of `urdf_to_graphviz`."""
     links, edges = [], []
     waiting = [robot.root]
     seen = set()
@@ -63,14 +63,14 @@ def _quoted(name: str) -> str:
 
 
 def error_lines(error: UrdfError) -> Iterator[str]:
-    """Yield the lines of ROS's reader about a description that does not read, each with its place."""
+    """Yield the lines of ROS's parser about an invalid description, each with its location."""
     for text in error.trail:
         yield f"Error:   {text}"
         yield f"         at line {error.line} in {error.file}" if error.line else f"         in {error.file}"
 
 
 def problem_lines(problem: Problem, file: str) -> Iterator[str]:
-    """Yield the lines of ROS's reader about a part that it leaves out."""
+    """Yield the lines of ROS's parser about a part that it ignores."""
     level = "Warning:" if problem.is_warning else "Error:  "
     for text in problem.trail:
         yield f"{level} {text}"

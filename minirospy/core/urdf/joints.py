@@ -1,4 +1,4 @@
-"""``<joint>`` and what is in it, read from elements."""
+"""Read ``<joint>`` and its contents from elements."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_joint(element: Element) -> Joint:
     limit = _part(element, "limit", _read_limit, f"Could not parse limit element for joint [{name}]")
     if limit is None and type_ in _NO_LIMITS:
         raise ElementError(element.line, f"Joint [{name}] {_NO_LIMITS[type_]}")
-    # Two spaces where ROS's reader has them.
+    # Some texts contain two spaces, like those of ROS's parser.
     safety = _part(
         element, "safety_controller", _read_safety, f"Could not parse safety element for joint [{name}]"
     )
@@ -103,7 +103,7 @@ def _link_of(element: Element, tag: str) -> str:
 
 
 def _part(element: Element, tag: str, read: Callable[[Element], _T], context: str) -> _T | None:
-    """Return what ``read`` makes of the first child of this tag; None if there is none. Raise ElementError."""
+    """Return the result of ``read`` for the first child with this tag; None if there is none. Raise ElementError."""
     part = element.first(tag)
     if part is None:
         return None

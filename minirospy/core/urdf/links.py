@@ -1,4 +1,4 @@
-"""``<link>``, ``<material>`` and what is in them, read from elements."""
+"""Read ``<link>``, ``<material>`` and their contents from elements."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class ElementError(ValueError):
-    """An element that does not read: its line, and ROS's lines about it, the cause first."""
+    """An element is invalid: its line, and ROS's lines about it, the cause first."""
 
     def __init__(self, line: int, *trail: str) -> None:
         super().__init__(line, *trail)
@@ -38,7 +38,7 @@ class ElementError(ValueError):
 
 
 def read_link(element: Element, problems: list[Problem]) -> Link:
-    """Return a link without those of its parts that do not read, which become problems. Raise ElementError."""
+    """Return a link without its invalid parts, which are added to ``problems``. Raise ElementError."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "No name given for the link.")
@@ -60,7 +60,7 @@ def read_link(element: Element, problems: list[Problem]) -> Link:
 
 
 def read_material(element: Element, problems: list[Problem]) -> Material:
-    """Return a material; one that is only named has neither colour nor texture. Raise ElementError."""
+    """Return a material; a reference by name has neither colour nor texture. Raise ElementError."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "Material must contain a name attribute")

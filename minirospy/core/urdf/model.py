@@ -1,6 +1,6 @@
-"""The parts of a robot: frozen records, as http://wiki.ros.org/urdf/XML has them.
+"""The parts of a robot: frozen records as described in http://wiki.ros.org/urdf/XML.
 
-Lengths are metres, angles radians, masses kilograms; a joint's position is metres where it is prismatic.
+Lengths are metres, angles radians, masses kilograms; a prismatic joint's position is in metres.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class JointType(Enum):
 
 
 class Origin(NamedTuple):
-    """A pose: ``xyz``, and ``rpy``, turns about the fixed axes x, y, z in this order."""
+    """A pose: ``xyz``, and ``rpy``, rotations about the fixed axes x, y, z in this order."""
 
     xyz: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
@@ -72,13 +72,13 @@ class Cylinder(NamedTuple):
 
 
 class Sphere(NamedTuple):
-    """A ball."""
+    """A sphere."""
 
     radius: float
 
 
 class Mesh(NamedTuple):
-    """A file of a shape: a path or ``package://PACKAGE/PATH``."""
+    """The file of a mesh: a path or ``package://PACKAGE/PATH``."""
 
     filename: str
     scale: Vector = (1.0, 1.0, 1.0)
@@ -88,7 +88,7 @@ Geometry = Box | Cylinder | Sphere | Mesh
 
 
 class Material(NamedTuple):
-    """A colour (red, green, blue, opacity from 0 to 1) or the file of a texture, or both."""
+    """A colour (red, green, blue, opacity from 0 to 1) or a texture's file, or both."""
 
     name: str
     color: Color | None = None
@@ -96,7 +96,7 @@ class Material(NamedTuple):
 
 
 class Visual(NamedTuple):
-    """A shape to be seen. ``material``: its name where it is defined elsewhere."""
+    """A visible shape. ``material``: its name if it is defined elsewhere."""
 
     geometry: Geometry
     origin: Origin = Origin()
@@ -105,7 +105,7 @@ class Visual(NamedTuple):
 
 
 class Collision(NamedTuple):
-    """A shape to be collided with."""
+    """A shape for collision checks."""
 
     geometry: Geometry
     origin: Origin = Origin()
@@ -130,7 +130,7 @@ class Limit(NamedTuple):
 
 
 class Mimic(NamedTuple):
-    """The joint's position is ``multiplier * position of joint + offset``."""
+    """Sets the joint's position to ``multiplier * position of joint + offset``."""
 
     joint: str
     multiplier: float = 1.0
@@ -138,7 +138,7 @@ class Mimic(NamedTuple):
 
 
 class Safety(NamedTuple):
-    """Limits that a controller keeps, inside those of the joint."""
+    """Limits for a controller, inside those of the joint."""
 
     k_velocity: float
     k_position: float = 0.0
@@ -162,7 +162,7 @@ class Dynamics(NamedTuple):
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: the frame of ``child`` is ``origin`` in that of ``parent``, then moved along or about ``axis``."""
+    """A joint: the frame of ``child`` is at ``origin`` in that of ``parent``, moved along or about ``axis``."""
 
     name: str
     type: JointType
@@ -190,7 +190,7 @@ class Link:
 
 
 class Problem(NamedTuple):
-    """A fault that ROS's reader reports before it reads on; ``trail``: its lines, the cause first."""
+    """A fault that ROS's parser reports before it continues; ``trail``: its lines, the cause first."""
 
     line: int
     trail: tuple[str, ...]
@@ -202,9 +202,9 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot: its links and joints by name in the order of the file, and the link that is the root of the tree.
+    """A robot: its links and joints by name in file order, and the root link of the tree.
 
-    ``problems``: what was left out or looks wrong, and does not keep the robot from being used.
+    ``problems``: parts that were ignored or look wrong, although the robot can be used.
     """
 
     name: str
@@ -215,11 +215,11 @@ class Robot:
     problems: tuple[Problem, ...] = ()
 
     def child_joints(self, link: str) -> list[Joint]:
-        """Return the joints below a link, sorted by name as ROS's tree has them."""
+        """Return the joints below a link, sorted by name as in ROS's tree."""
         return self._below.get(link, [])
 
     def parent_joint(self, link: str) -> Joint | None:
-        """Return the joint above a link; None for the root. Of several the last by name, as in ROS."""
+        """Return the joint above a link; None for the root. If there are several, the last one by name, as in ROS."""
         return self._above.get(link)
 
     @cached_property

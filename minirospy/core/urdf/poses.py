@@ -1,4 +1,4 @@
-"""Poses of joints: plain floats in the steps that urdfdom and KDL take, so that signs and zeros are theirs.
+"""Poses of joints, computed with plain floats in the same steps as urdfdom and KDL, for equal signs and zeros.
 
 Quaternions are (x, y, z, w); a matrix is nine numbers, row by row.
 """
@@ -24,21 +24,20 @@ Quaternion = tuple[float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 _EPSILON = 1e-12
-_POLE = 0.99999
-"""Sine of the pitch beyond which roll and yaw are one angle."""
+_POLE = 0.99999  # sine of the pitch beyond which roll and yaw cannot be distinguished
 
 
 class Pose(NamedTuple):
-    """A frame in its parent: metres, and a unit quaternion."""
+    """A frame's pose in its parent: metres, and a unit quaternion."""
 
     translation: Vector
     rotation: Quaternion
 
 
 class Segment:
-    """A joint and the link below it: its pose in the parent link, by the joint's position.
+    """A joint and the link below it: computes the link's pose in the parent link from the joint's position.
 
-    A planar joint does not move, as KDL has it.
+    As in KDL, a planar joint does not move.
     """
 
     def __init__(self, joint: Joint) -> None:
@@ -48,7 +47,7 @@ class Segment:
         self._is_sliding = joint.type is JointType.PRISMATIC
         length = math.hypot(*joint.axis)
         x, y, z = joint.axis
-        # An axis without a direction is x, as KDL's normalisation has it.
+        # Like KDL's normalization, use x for an axis of length zero.
         self._axis = (x / length, y / length, z / length) if length >= _EPSILON else (1.0, 0.0, 0.0)
 
     @property
@@ -73,7 +72,7 @@ class Segment:
 
 
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return the rotation by turns about the fixed axes x, y and z, in this order."""
+    """Return the rotation about the fixed axes x, y and z, in this order."""
     sr, cr = math.sin(roll / 2), math.cos(roll / 2)
     sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
     sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
@@ -86,7 +85,7 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rpy_from_quaternion(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw of a rotation; at the poles the roll is 0."""
+    """Return roll, pitch and yaw of a rotation; at a pitch of +-90 degrees the roll is 0."""
     x, y, z, w = rotation
     xx, yy, zz, ww = x * x, y * y, z * z, w * w
     sine = -2 * (x * z - w * y) / (xx + yy + zz + ww)
@@ -113,7 +112,7 @@ def matrix_from_quaternion(rotation: Quaternion) -> Matrix:
 
 
 def quaternion_from_matrix(matrix: Matrix) -> Quaternion:
-    """Return the unit quaternion of a matrix; its largest part is positive."""
+    """Return the unit quaternion of a matrix; its largest component is positive."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix
     trace = xx + yy + zz
     if trace > _EPSILON:
@@ -130,7 +129,7 @@ def quaternion_from_matrix(matrix: Matrix) -> Quaternion:
 
 
 def _turn(axis: Vector, angle: float) -> Matrix:
-    """Return the matrix of a turn about a unit vector."""
+    """Return the matrix of a rotation about a unit vector."""
     x, y, z = axis
     c, s = math.cos(angle), math.sin(angle)
     v = 1 - c

@@ -1,9 +1,9 @@
-"""The text of a robot description -> a Robot. Strict where a robot would move wrongly, as ROS's reader is.
+"""Parse a robot description into a Robot. As strict as ROS's parser if a robot would move wrongly.
 
-What ROS's reader reports and reads on (a shape or a mass that does not read) is left out and kept in
-:attr:`Robot.problems`. Texts are those of ROS's reader; lines are those of the description.
+If ROS's parser reports a fault and continues (an invalid shape or mass), the part is ignored and recorded in
+:attr:`Robot.problems`. Texts are those of ROS's parser; line numbers are those of the description.
 
-Source: http://wiki.ros.org/urdf/XML/model, and what Debian's `check_urdf` prints.
+Source: http://wiki.ros.org/urdf/XML/model, and the output of Debian's `check_urdf`.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _ROOT = "Failed to find root link"
 
 
 def read_robot(path: str | Path) -> Robot:
-    """Return the robot of a file. Raise UrdfError, OSError."""
+    """Return the robot described in a file. Raise UrdfError, OSError."""
     return parse_robot(Path(path).read_bytes(), str(path))
 
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
-    """Return the robot of a description; ``file`` names it in errors. Raise UrdfError."""
+    """Return the robot of a description; ``file`` is its name in errors. Raise UrdfError."""
     root = parse_xml(text, file)
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")
@@ -92,7 +92,7 @@ def _read_links(
     if not links:
         raise UrdfError(file, root.line, "No link elements found in urdf file")
 
-    # A material may be defined where it is used first.
+    # A material may be defined at its first use.
     for link in links.values():
         for visual in link.visuals:
             if visual.material and (visual.material.color or visual.material.texture):
@@ -120,7 +120,7 @@ def _read_joints(root: Element, file: str) -> dict[str, Joint]:
 
 
 def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -> None:
-    """Raise UrdfError for a joint between links that are not there."""
+    """Raise UrdfError for a joint between links that do not exist."""
     for name in sorted(joints):
         joint = joints[name]
         if not joint.parent or not joint.child:
@@ -143,7 +143,7 @@ def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -
 
 
 def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, Joint]) -> str:
-    """Return the link without a parent. Raise UrdfError if there is not one."""
+    """Return the link without a parent. Raise UrdfError if there is not exactly one."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in sorted(links) if name not in children]
     if not roots:
@@ -155,7 +155,7 @@ def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, J
 
 
 def _suspicions(robot: Robot) -> list[Problem]:
-    """Return what ROS's reader accepts without a word, and what no tree of frames can be."""
+    """Return the faults that ROS's parser silently accepts, but that a tree of frames cannot have."""
     found = []
     for joint in robot.joints.values():
         above = robot.parent_joint(joint.child)

@@ -1,4 +1,4 @@
-"""Attributes -> numbers and vectors, refused in the words of ROS's reader."""
+"""Parse attributes to numbers and vectors, with the error texts of ROS's parser."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ _NUMBER = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class NotANumberError(ValueError):
-    """A text that is not the number or the vector that it has to be; the text says why."""
+    """The text is not the required number or vector; ``str()`` is the reason."""
 
 
 def as_float(text: str) -> float:
-    """Return a number. Raise NotANumberError, also for hexadecimal, infinite and not-a-number values, as ROS refuses them."""
+    """Return a number. Raise NotANumberError, like ROS also for hexadecimal, infinite and not-a-number values."""
     stripped = text.strip()
     value = float(stripped) if _NUMBER.fullmatch(stripped) else math.nan
     if not math.isfinite(value):

@@ -1,1 +1,1 @@
-"""Pure protocol: bytes in, events out. Imports no asyncio, no socket, no threading."""
+"""Pure protocols: bytes in, events out. Imports no asyncio, no socket, no threading."""

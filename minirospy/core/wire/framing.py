@@ -1,10 +1,10 @@
-"""Frames: a 4-byte little-endian length, then that many bytes, as TCPROS sends every message.
+"""Frames: a 4-byte little-endian length, then that many bytes, in which TCPROS sends every message.
 
-The reader owns the buffer that a socket receives into, so that bytes are moved once:
+The reader owns the buffer that a socket receives into, so bytes are copied only once:
 ``n = sock.recv_into(reader.space()); for frame in reader.received(n): ...``
 
-To a subscriber whose header says ``split_frames=1`` a large message that ends with a byte array is sent as a
-split frame: the length with its highest bit set, 4 bytes with the array's size, then the message as ever. So the
+If a subscriber's header has ``split_frames=1``, a large message that ends with a byte array is sent as a
+split frame: the length with its highest bit set, 4 bytes with the array's size, then the unchanged message. So the
 subscriber reads the array into a separate object, which becomes the field without another copy.
 Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
@@ -33,17 +33,13 @@ __all__ = [
     "split_sizes",
 ]
 
-CHUNK = 64 * 1024
-"""Size of one receive while messages are small, in bytes."""
+CHUNK = 64 * 1024  # bytes per receive while messages are small
 
-LENGTH_BYTES = 4
-"""Bytes of the length in front of a frame or a connection header."""
+LENGTH_BYTES = 4  # bytes of the length prefix of a frame or a connection header
 
-MAX_FRAME = 1024 * 1024 * 1024
-"""A longer frame is refused: it is garbage, or not for us."""
+MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is refused as invalid
 
-SPLIT = 1 << 31
-"""The bit of a length that says: the size of the array at the end follows."""
+SPLIT = 1 << 31  # bit of the length which means that the size of the array at the end follows
 
 _FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
@@ -51,23 +47,23 @@ _TWO_LENGTHS = struct.Struct("<II")
 
 
 def serialize_frame(body: bytes) -> bytes:
-    """``body`` with its length in front."""
+    """Return ``body`` with its length prefix."""
     return _LENGTH.pack(len(body)) + body
 
 
 def parse_length(data: bytes) -> int:
-    """Return the length that the first :data:`LENGTH_BYTES` of ``data`` announce."""
+    """Return the length in the first :data:`LENGTH_BYTES` of ``data``."""
     return int.from_bytes(data[:LENGTH_BYTES], "little")
 
 
 class LargeFrame(NamedTuple):
-    """A message to be sent that is not worth joining: the pieces, in order, and their size together."""
+    """A message to be sent that is too large to be joined: the pieces, in order, and their total size."""
 
     pieces: tuple[bytes, ...]
     size: int
 
     def buffers(self, *, split: bool) -> list[bytes]:
-        """Return what goes into the socket, as a split frame where that is requested and this message allows it."""
+        """Return the buffers to send, as a split frame if that is requested and possible for this message."""
         first, *others = self.pieces
         if split and len(others) == 1 and may_split(first, len(others[0])):
             return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
@@ -75,26 +71,26 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target of a message's ``serialize``: the bytes are joined once, and large ones never."""
+    """The target of a message's ``serialize``: joins the bytes once, but large ones never."""
 
     __slots__ = ()
     write = list.append
 
     def frame(self) -> bytes | LargeFrame:
-        """All that was written as one frame."""
+        """Return everything written as one frame."""
         size = len(self[0]) if len(self) == 1 else sum(map(len, self))
         if size < CHUNK:
             self.insert(0, _LENGTH.pack(size))
             frame = b"".join(self)
             if len(frame) == size + 4:
                 return frame
-            # The len() of an array is not in bytes.
+            # The len() of an array.array does not count bytes.
             return serialize_frame(frame[4:])
 
         joined: list[bytes] = []
         small: list[bytes] = []
         for piece in self:
-            # What is not bytes may be changed by its owner before it is sent.
+            # Copy other types than bytes, since the caller may change them before they are sent.
             whole = piece if isinstance(piece, bytes) else bytes(piece)
             if len(whole) < CHUNK:
                 small.append(whole)
@@ -108,10 +104,10 @@ class Pieces(list[Any]):
 
 
 class SplitFrame(bytes):
-    """A message in two parts, for ``deserialize``: bytes of the first that end where those of ``tail`` begin.
+    """A message in two parts, for ``deserialize``: the first part's bytes, followed by those of ``tail``.
 
-    Length and slices are those of the whole; the slice that is ``tail`` is that object, uncopied. ``bytes(frame)``
-    joins. A memoryview of it sees the first part alone.
+    Length and slices are those of the whole; the slice that equals ``tail`` is that object, without a copy.
+    ``bytes(frame)`` joins the parts. A memoryview contains only the first part.
     """
 
     tail: bytes
@@ -144,17 +140,16 @@ class SplitFrame(bytes):
         return bytes(self)[key]
 
 
-Frame = memoryview | bytes
-"""A message's bytes as they are delivered."""
+Frame = memoryview | bytes  # a message's bytes as delivered
 
 
 def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes: there a message may be split."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes: then it may be split there."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
 def split_sizes(size: int, tail: int) -> tuple[int, int]:
-    """(bytes before the array, bytes of the array) of a split frame. Raise WireError."""
+    """Return (bytes before the array, bytes of the array) of a split frame. Raise WireError."""
     if not CHUNK <= tail <= size - 4:
         raise WireError(f"a split message of {size} bytes says that it ends with an array of {tail}")
     return size - tail, tail
@@ -164,18 +159,17 @@ class FrameReader:
     """Bytes in, frames out.
 
     A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
-    than ``chunk`` comes in a separate buffer, which is not written again. With ``gathers`` false such a frame is
-    left to the caller instead: :attr:`unfinished` has what has come of it. A frame of more than ``limit`` bytes is a
-    WireError, or left out with ``skips``, and counted in :attr:`skipped`.
+    than ``chunk`` gets a separate buffer, which is not reused. With ``gathers`` false the caller must read such a frame
+    itself: :attr:`unfinished` contains its first bytes. A frame of more than ``limit`` bytes raises WireError, or with
+    ``skips`` is skipped and counted in :attr:`skipped`.
     """
 
     def __init__(
         self, limit: int = MAX_FRAME, *, gathers: bool = True, skips: bool = False, chunk: int = CHUNK
     ) -> None:
-        self.skipped = 0
-        """Frames that were left out."""
+        self.skipped = 0  # number of skipped frames
         self.unfinished: tuple[int, bytes] | None = None
-        """The length in front of a large frame, and the bytes that came with it; to be set to None by the caller."""
+        """The length of a large frame and its first bytes; the caller resets it to None."""
         self._gathers = gathers
         self._limit = limit
         self._skips = skips
@@ -184,27 +178,27 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # Of the large frame: the bytes that have come, and all that belong to it.
+        # Of the large frame: the number of bytes received, and its total size.
         self._filled: int
         self._wanted = 0
-        # Bytes of a frame that is left out, which are still to come.
+        # The number of bytes of a skipped frame that are still to come.
         self._left_out = 0
 
     @property
     def wanted(self) -> int:
-        """The bytes of the large frame that is coming, or of the last one."""
+        """The size of the present large frame, or of the last one."""
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
-        """Begin with these few bytes, where nothing is held."""
+        """Start with these few bytes; the buffer must be empty."""
         self._end = len(data)
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return where the next bytes go; never empty."""
+        """Return the memory for the next bytes; never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
-                # A length is only a claim until the bytes come: memory grows with what has come.
+                # A length prefix must not allocate all memory in advance: the buffer grows with the received bytes.
                 grown = bytearray(min(self._wanted, 2 * len(self._large)))
                 grown[: self._filled] = self._large
                 self._large = grown
@@ -218,7 +212,7 @@ class FrameReader:
         return self._small[self._end :]
 
     def received(self, count: int) -> Iterator[memoryview]:
-        """Return the frames that are complete after ``count`` more bytes in :meth:`space`. Raise WireError."""
+        """Return the frames completed by ``count`` more bytes in :meth:`space`. Raise WireError."""
         if self._large is not None:
             self._filled += count
             if self._filled == self._wanted:

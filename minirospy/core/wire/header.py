@@ -1,6 +1,6 @@
-"""The connection header: ``field=value`` pairs that open every TCPROS connection.
+"""The connection header: the ``field=value`` pairs at the start of every TCPROS connection.
 
-Fields in, bytes out, and back. Source: http://wiki.ros.org/ROS/Connection%20Header.
+Converts fields to bytes and back. Source: http://wiki.ros.org/ROS/Connection%20Header.
 """
 
 from __future__ import annotations
@@ -14,21 +14,20 @@ __all__ = ["MAX_HEADER", "Header", "parse_header", "serialize_header"]
 
 Header = dict[str, str]
 
-MAX_HEADER = 4 * 1024 * 1024
-"""Bytes that a header may have: the full texts of the largest definitions take some 20 kB."""
+MAX_HEADER = 4 * 1024 * 1024  # bytes; the full texts of the largest definitions take some 20 kB
 
 _LENGTH = struct.Struct("<I")
 
 
 def serialize_header(fields: Mapping[str, str]) -> bytes:
-    """Return the header with its own length in front, fields sorted as rospy and roscpp send them."""
+    """Return the header with its length prefix, and its fields sorted like those of rospy and roscpp."""
     pairs = [f"{name}={fields[name]}".encode() for name in sorted(fields)]
     body = b"".join(_LENGTH.pack(len(pair)) + pair for pair in pairs)
     return _LENGTH.pack(len(body)) + body
 
 
 def parse_header(body: bytes) -> Header:
-    """Return the fields of a header whose length has been taken off. Raise WireError."""
+    """Return the fields of a header without its length prefix. Raise WireError."""
     fields: Header = {}
     at = 0
     while at < len(body):
@@ -42,6 +41,7 @@ def parse_header(body: bytes) -> Header:
         at += length
         if not separator:
             raise WireError(f"connection header's field {name[:40]!r} has no '='")
-        # Others send names and definitions in any encoding; a definition's comment must not end a link.
+        # Third-party nodes send names and definitions in any encoding; a definition's comment must not cause a
+        # failure.
         fields[name.decode("utf-8", "replace")] = value.decode("utf-8", "replace")
     return fields

@@ -1,4 +1,4 @@
-"""HTTP/1.1 as XML-RPC needs it: POST requests and their answers, with keep-alive.
+"""HTTP/1.1 for XML-RPC: POST requests and their answers, with keep-alive.
 
 Pure: bytes in, messages out. Source: RFC 9112.
 """
@@ -25,8 +25,7 @@ __all__ = [
     "serialize_response_head",
 ]
 
-MAX_BODY = 64 * 1024 * 1024
-"""Bytes that a body may have: a parameter may hold a robot's whole description."""
+MAX_BODY = 64 * 1024 * 1024  # bytes; a parameter may contain a robot's whole description
 
 _MAX_HEAD = 64 * 1024
 _SHORT_HEAD = 512
@@ -40,21 +39,17 @@ _REASONS = {
 }
 
 
-Body = bytes | bytearray
-"""Of a message: a long one is not copied out of the buffer that it was collected in."""
+Body = bytes | bytearray  # of a message; a long one is not copied from the buffer in which it was collected
 
 
 class HttpHead(NamedTuple):
-    """The start line and the headers of a message. ``start`` is the first line, ``headers`` have lower-case names."""
+    """The first line and the headers of a message; ``headers`` have lower-case names."""
 
     start: str
     headers: dict[str, str]
-    method: str
-    """A request's method."""
-    keep_alive: bool
-    """Whether the connection serves another request after this one."""
-    plain_length: int
-    """The length of the body where only a Content-Length gives it; else -1."""
+    method: str  # of a request
+    keep_alive: bool  # the connection serves another request after this one
+    plain_length: int  # length of the body if only a Content-Length specifies it; else -1
 
 
 class HttpMessage(NamedTuple):
@@ -65,7 +60,7 @@ class HttpMessage(NamedTuple):
 
     @property
     def start(self) -> str:
-        """The first line."""
+        """The first line of the message."""
         return self.head.start
 
     @property
@@ -75,20 +70,20 @@ class HttpMessage(NamedTuple):
 
     @property
     def method(self) -> str:
-        """A request's method."""
+        """The method of a request."""
         return self.head.method
 
     @property
     def status(self) -> int:
-        """An answer's status code; 0 if there is none."""
+        """The status code of an answer; 0 if there is none."""
         parts = self.head.start.split(" ", 2)
         return int(parts[1]) if len(parts) > 1 and re.fullmatch(r"[0-9]{3}", parts[1]) else 0
 
 
 class HttpReader:
-    """Bytes in, whole messages out, several of them where they were pipelined.
+    """Bytes in, complete messages out, several of them if they were pipelined.
 
-    Nearly always a message comes in one piece, or as its head and then its body, and alone: that costs little.
+    Optimized for the usual case: a single message in one piece, or as its head and then its body.
     """
 
     __slots__ = (
@@ -105,18 +100,17 @@ class HttpReader:
 
     def __init__(self, max_body: int = MAX_BODY) -> None:
         self._max_body = max_body
-        # The head whose body comes next, in one piece perhaps.
+        # The head of the next message, if its body may come in one piece.
         self._head: HttpHead | None = None
         self._parser: Generator[HttpMessage | None, None, None] | None = None
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
-        # Whether the bytes that were fed may hold another message.
+        # The bytes fed so far may contain another message.
         self._has_more = False
-        # What was taken out of the buffer of a body in chunks.
+        # The body in chunks, as far as removed from the buffer.
         self._chunked: bytearray | None = None
-        self.wants_continue = False
-        """Whether the peer waits for :meth:`continue_line` before it sends its body."""
+        self.wants_continue = False  # the peer waits for :meth:`continue_line` before it sends its body
 
     @property
     def is_idle(self) -> bool:
@@ -125,16 +119,16 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the present message has a body in chunks, of which many may be in few bytes."""
+        """Return whether the present message has a chunked body, since a few bytes may contain many chunks."""
         return self._chunked is not None
 
     @property
     def held(self) -> int:
-        """Bytes of a message that is not whole yet."""
+        """The number of bytes of an incomplete message."""
         return len(self._buffer) + len(self._chunked or b"")
 
     def feed(self, data: bytes) -> list[HttpMessage]:
-        """Return the messages that are complete with ``data``; b"" means that the peer has closed.
+        """Return the messages that ``data`` completes; b"" means that the peer has closed.
 
         Raise RpcProtocolError.
         """
@@ -146,9 +140,9 @@ class HttpReader:
         return messages
 
     def feed_one(self, data: bytes) -> HttpMessage | None:
-        """Return the first message that is complete with ``data``, and leave the others to :meth:`next_message`.
+        """Return the first message that ``data`` completes, and leave the others to :meth:`next_message`.
 
-        None if the first one is not complete. Raise RpcProtocolError.
+        Return None if the first one is incomplete. Raise RpcProtocolError.
         """
         head = self._head
         if head is not None:
@@ -178,7 +172,7 @@ class HttpReader:
         return self.next_message()
 
     def next_message(self) -> HttpMessage | None:
-        """Return the next message that is complete, of the bytes that were fed. Raise RpcProtocolError."""
+        """Return the next complete message in the bytes fed so far. Raise RpcProtocolError."""
         if not self._has_more:
             return None
         assert self._parser
@@ -187,7 +181,7 @@ class HttpReader:
         return message
 
     def close(self) -> None:
-        """Release what was read of an incomplete message. Idempotent."""
+        """Release the data of an incomplete message. Idempotent."""
         self._head = self._parser = None
         self._has_more = False
         self._buffer = bytearray()
@@ -195,17 +189,17 @@ class HttpReader:
         self._in_body = False
 
     def continue_line(self) -> bytes:
-        """Return what a peer that sent ``Expect: 100-continue`` waits for."""
+        """Return the response that a peer waits for after sending ``Expect: 100-continue``."""
         self.wants_continue = False
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None if it has to be filled; ``head`` has been removed already."""
+        """Yield the messages in the buffer, and None when it must be filled; ``head`` has been removed already."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
             self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
-            # No variable keeps the body until the next one.
+            # Not in a variable, which would keep the body in memory until the next one.
             yield HttpMessage(head, (yield from self._whole_body(head)))
             head = None
 
@@ -221,7 +215,7 @@ class HttpReader:
         length = head.headers.get("content-length")
         if length is None:
             if head.start.startswith("HTTP/"):
-                # An answer without a length goes on until the peer ends.
+                # An answer without a length extends to the end of the connection.
                 while not self._ended:
                     self._check(len(self._buffer))
                     yield None
@@ -245,7 +239,7 @@ class HttpReader:
                 self._chunked = None
                 return body
 
-            # As it comes: to move a long chunk when it is whole would take long.
+            # In pieces, since moving a long chunk at once would take long.
             while left:
                 if not self._buffer:
                     yield from self._more()
@@ -274,7 +268,7 @@ class HttpReader:
             yield from self._more()
         if len(self._buffer) > 2 * count:
             return self._take(count)
-        # The longer part is not copied.
+        # Copy the shorter part, not the longer one.
         rest = self._buffer[count:]
         del self._buffer[count:]
         whole, self._buffer = self._buffer, rest
@@ -299,17 +293,17 @@ class HttpReader:
 
 
 def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
-    """Return where the first line that ends after ``start`` ends, and where the next one starts; -1 if none does.
+    """Return the end of the first line that ends after ``start``, and the start of the next one; -1 if there is none.
 
-    A line feed alone ends a line too, where somebody writes a request by hand.
+    A line feed alone also ends a line, for requests written by hand.
     """
     at = data.find(b"\n", start)
     return _before_return(data, at), at + 1
 
 
 def _end_of_head(data: bytearray, start: int) -> tuple[int, int]:
-    """Return the same of the first line that an empty one follows."""
-    # Not by a regular expression, which takes long for many short lines.
+    """Return the same for the first line that is followed by an empty one."""
+    # Without a regular expression, which is slow for many short lines.
     found = [(at, len(mark)) for mark in (b"\n\r\n", b"\n\n") if (at := data.find(mark, start)) >= 0]
     if not found:
         return -1, -1
@@ -322,12 +316,12 @@ def _before_return(data: bytearray, at: int) -> int:
 
 
 def serialize_request(host: str, path: str, body: bytes) -> bytes:
-    """Return a POST of ``body``."""
+    """Return a POST request with ``body``."""
     return serialize_request_head(host, path, len(body)) + body
 
 
 def serialize_request_head(host: str, path: str, length: int) -> bytes:
-    """Return what is sent in front of the body of a POST."""
+    """Return the part of a POST request before its body."""
     head = (
         f"POST {path or '/'} HTTP/1.1\r\nHost: {host}\r\nUser-Agent: minirospy\r\n"
         f"Content-Type: text/xml\r\nContent-Length: {length}\r\n\r\n"
@@ -336,12 +330,12 @@ def serialize_request_head(host: str, path: str, length: int) -> bytes:
 
 
 def serialize_response(body: bytes, *, keep_alive: bool = True) -> bytes:
-    """Return a successful answer."""
+    """Return a successful response with ``body``."""
     return serialize_response_head(len(body), keep_alive=keep_alive) + body
 
 
 def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
-    """Return what is sent in front of a successful answer of so many bytes."""
+    """Return the part of a successful response before its body of ``length`` bytes."""
     connection = "" if keep_alive else "Connection: close\r\n"
     return (
         f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {length}\r\n\r\n".encode()
@@ -349,7 +343,7 @@ def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
 
 
 def serialize_error(status: int, text: str) -> bytes:
-    """Return a refusal, after which the connection closes."""
+    """Return an error response, after which the connection is closed."""
     body = (text + "\n").encode()
     return (
         f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: text/plain; charset=utf-8\r\n"
@@ -358,7 +352,7 @@ def serialize_error(status: int, text: str) -> bytes:
 
 
 def _parse_head(data: bytes) -> HttpHead:
-    # A client's heads differ in nothing but the length.
+    # The heads of one client differ only in the length.
     return _short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
 
 
@@ -375,7 +369,7 @@ def _read_head(data: bytes) -> HttpHead:
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
-        # A proxy that reads a space before the colon differently would see another request (request smuggling).
+        # A proxy that interprets a space before the colon differently would see another request (request smuggling).
         if not separator or not name or name[-1] in " \t" or name[0] in " \t":
             raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
         name, value = name.lower(), value.strip()

@@ -1,8 +1,8 @@
-"""The master's journal as bytes: one record a change, each with its length and checksum in front.
+"""The master's journal as bytes: one record per change, each with a length prefix and a checksum.
 
-Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of what
-follows (4 bytes), a msgpack array ``[what, argument, ...]``. A record that is not whole ends the file: what
-follows it may not be consistent with the records before.
+Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of the
+rest (4 bytes), a msgpack array ``[what, argument, ...]``. An incomplete record ends the file: the bytes after
+it may be inconsistent with the records before.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ HEAD = b"minirospy journal 1\n"
 
 _STEP_ITEMS = 500
 _STEP_BYTES = 65536
+# Msgpack's type bytes of a long string and of long bytes, before a 4-byte length
 _TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
-"""What msgpack has in front of the length, in four bytes, of a long text or of bytes."""
 
 _FRAME = struct.Struct("<II")
 _DATE, _DATE_TEXT = 1, 2
 
 
 class Recovered(NamedTuple):
-    """The records that are whole, how many bytes they take with the head, and what is wrong behind them."""
+    """The complete records, their size in bytes including the head, and the fault after them."""
 
     records: list[list[Any]]
     size: int
@@ -40,13 +40,13 @@ class Recovered(NamedTuple):
 
 
 def serialize_record(record: list[object]) -> bytes:
-    """Return a record's bytes in the file. Raise ValueError or TypeError on a value that msgpack cannot hold."""
+    """Return a record's bytes in the file. Raise ValueError or TypeError on a value that msgpack cannot represent."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
 
 def pack_in_steps(value: object) -> Iterator[bytes]:
-    """Yield a large value in pieces, which :func:`unpack` takes all together. Raise as :func:`serialize_record`."""
+    """Yield a large value in pieces; :func:`unpack` takes them joined. Raise as :func:`serialize_record`."""
     packer = msgpack.Packer(default=_encode_other, strict_types=True, autoreset=False)
     yield from _pack_in_steps(value, packer)
     yield packer.bytes()
@@ -103,7 +103,7 @@ def _taken(packer: msgpack.Packer) -> bytes:
 
 
 def unpack(data: bytes) -> object:
-    """Return the value that :func:`pack_in_steps` has packed. Raise ValueError."""
+    """Return the value packed by :func:`pack_in_steps`. Raise ValueError."""
     try:
         return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
     except (msgpack.UnpackException, TypeError) as error:
@@ -111,7 +111,7 @@ def unpack(data: bytes) -> object:
 
 
 def parse_journal(data: bytes) -> Recovered:
-    """Return the records in ``data``, up to the first that is not whole."""
+    """Return the records in ``data``, up to the first incomplete one."""
     if not data.startswith(HEAD):
         return Recovered([], 0, "it does not start as a journal" if data else "it is empty")
     records: list[list[object]] = []

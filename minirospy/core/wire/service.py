@@ -1,7 +1,7 @@
-"""Requests and responses of a service, as TCPROS sends them after the connection headers.
+"""Requests and responses of a service, which TCPROS sends after the connection headers.
 
-A request is its length (4 bytes, little-endian) and its body; a response is one byte, 1 for success, the length, and its body
-or, after a 0, the text of an error. Source: http://wiki.ros.org/ROS/TCPROS ("Services").
+A request is its length (4 bytes, little-endian) and its body. A response is the byte 1 for success, the length, and the
+body; or the byte 0, the length, and the text of an error. Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
 from __future__ import annotations
@@ -24,32 +24,30 @@ __all__ = [
 _LENGTH = struct.Struct("<I")
 _OK_LENGTH = struct.Struct("<BI")
 
-REQUEST_HEAD = _LENGTH.size
-"""Bytes in front of a request's body."""
+REQUEST_HEAD = _LENGTH.size  # bytes before a request's body
 
-RESPONSE_HEAD = _OK_LENGTH.size
-"""Bytes in front of a response's body, or of the text of an error."""
+RESPONSE_HEAD = _OK_LENGTH.size  # bytes before a response's body, or before the text of an error
 
 
 def serialize_request(body: bytes) -> bytes:
-    """Return what a client sends."""
+    """Return the bytes of a client's request."""
     return _LENGTH.pack(len(body)) + body
 
 
 def serialize_response(body: bytes) -> bytes:
-    """Return what a server sends after a call that succeeded."""
+    """Return the bytes of a server's response after a successful call."""
     return _OK_LENGTH.pack(1, len(body)) + body
 
 
 def serialize_failure(error: Exception) -> bytes:
-    """Return what a server sends after a call that failed: the text of ``error``."""
-    # An error's text may hold what UTF-8 does not, as part of a file's name.
+    """Return the bytes of a server's response after a failed call, with the text of ``error``."""
+    # An error's text may contain characters that UTF-8 cannot encode, for example from a file's name.
     text = str(error).encode(errors="backslashreplace")
     return _OK_LENGTH.pack(0, len(text)) + text
 
 
 def parse_request_head(head: bytes) -> int:
-    """Return the length of the body behind these :data:`REQUEST_HEAD` bytes. Raise WireError if it is over the limit."""
+    """Return the length of the body after these :data:`REQUEST_HEAD` bytes. Raise WireError if it exceeds the limit."""
     length: int = _LENGTH.unpack(head)[0]
     if length > MAX_FRAME:
         raise _too_long(length)
@@ -57,7 +55,7 @@ def parse_request_head(head: bytes) -> int:
 
 
 def parse_response_head(head: bytes) -> tuple[bool, int]:
-    """Return whether the call succeeded, and the length of what follows. Raise WireError if it is over the limit."""
+    """Return whether the call succeeded, and the length of the rest. Raise WireError if it exceeds the limit."""
     ok, length = _OK_LENGTH.unpack(head)
     if length > MAX_FRAME:
         raise _too_long(length)

@@ -1,4 +1,4 @@
-"""TCPROS roles: which header each side sends, and when the other's header is accepted.
+"""TCPROS roles: the header that each node sends, and the check of the peer's header.
 
 Pure decisions on fields; the sockets are in ``minirospy.runtime``.
 Source: http://wiki.ros.org/ROS/TCPROS, http://wiki.ros.org/ROS/Connection%20Header.
@@ -28,8 +28,7 @@ __all__ = [
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
 
-ANY = "*"
-"""The type and md5sum of one who takes whatever comes."""
+ANY = "*"  # type and md5sum of a peer that accepts any type
 
 
 class InterfaceType(NamedTuple):
@@ -41,14 +40,14 @@ class InterfaceType(NamedTuple):
 
     @classmethod
     def of(cls, described: Any) -> InterfaceType:
-        """Return the type of a message's or service's class; a service's class has no full text."""
+        """Return the type of a message's or service's class; a service's type has no full text."""
         return cls(described._type, described._md5sum, getattr(described, "_full_text", ""))
 
 
 def subscriber_header(
     topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
 ) -> Header:
-    """Return what a subscriber opens with; ``split_frames``: it understands them (``core/wire/framing``)."""
+    """Return the header that a subscriber sends first; ``split_frames``: it supports them (``core/wire/framing``)."""
     return {
         **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
@@ -63,9 +62,9 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """Return what a publisher answers with; ``extra`` are the user's fields.
+    """Return the header that a publisher answers with; ``extra`` are the user's fields.
 
-    They win, as with rospy: a relay of AnyMsg sends the type of what it relays.
+    As in rospy, these override others: a relay of AnyMsg sends the type of the relayed messages.
     """
     return {
         "callerid": caller_id,
@@ -79,7 +78,7 @@ def publisher_header(
 
 
 def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
-    """Why a publisher of ``type_`` refuses the subscriber with these fields; None accepts it."""
+    """Return the reason why a publisher of ``type_`` refuses the subscriber with these fields; None accepts it."""
     for name in ("md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -97,7 +96,7 @@ def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | 
 
 
 def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
-    """Raise HandshakeRefused unless a publisher's answer fits ``type_``."""
+    """Raise HandshakeRefused unless a publisher's answer matches ``type_``."""
     _raise_error_field(fields)
     for name in ("md5sum", "type"):
         if name not in fields:
@@ -122,20 +121,20 @@ def service_client_header(
     probe: bool = False,
     extra: Mapping[str, str] | None = None,
 ) -> Header:
-    """Return what a service client opens with; ``probe`` only tests whether the service is alive."""
+    """Return the header that a service client sends first; ``probe`` only tests whether the service is alive."""
     fields = {"callerid": caller_id, "md5sum": md5sum, "service": service}
     if persistent:
         fields["persistent"] = "1"
     if probe:
         fields["probe"] = "1"
-    # What the user adds goes over our own, as in rospy.
+    # As in rospy, the user's fields override others.
     return {**fields, **{name: str(value) for name, value in (extra or {}).items()}}
 
 
 def service_header(
     service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
 ) -> Header:
-    """Return what a service answers with: rospy's fields, and roscpp's types of request and response."""
+    """Return the header that a service answers with: rospy's fields, and roscpp's types of request and response."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,
@@ -147,7 +146,7 @@ def service_header(
 
 
 def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
-    """Why a service of ``type_`` refuses the client with these fields; None accepts it."""
+    """Return the reason why a service of ``type_`` refuses the client with these fields; None accepts it."""
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -162,7 +161,7 @@ def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
 
 
 def check_service(fields: Header) -> None:
-    """Raise HandshakeRefused where a service answered with an error, WireError without an md5sum."""
+    """Raise HandshakeRefused if a service answered with an error, WireError if there is no md5sum."""
     _raise_error_field(fields)
     if "md5sum" not in fields:
         raise WireError("header missing required field [md5sum]")
@@ -174,5 +173,5 @@ def _raise_error_field(fields: Header) -> None:
 
 
 def _fits(md5sum: str, type_: InterfaceType) -> bool:
-    """Types are compared only once the md5sums differ: a renamed type with the same fields is compatible."""
+    """Return whether the md5sum matches the type: a renamed type with the same fields is compatible."""
     return md5sum == type_.md5sum or ANY in (md5sum, type_.md5sum)

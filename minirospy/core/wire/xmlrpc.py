@@ -1,7 +1,7 @@
-"""XML-RPC: calls and answers as bytes, and back.
+"""XML-RPC: convert calls and answers to bytes and back.
 
-Pure; parses with expat (``core/wire/xmlrpc_reader.py``), and what is plain without it (``core/wire/xmlrpc_plain.py``). A server,
-which serves others meanwhile, reads and writes in short steps where a document is long.
+Pure; parses with expat (``core/wire/xmlrpc_reader.py``), and plain documents without it (``core/wire/xmlrpc_plain.py``).
+For a server that must not block, long documents can be read and written in short steps.
 Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
 """
 
@@ -30,8 +30,7 @@ __all__ = [
     "serialize_response_in_steps",
 ]
 
-_PLAIN_BYTES = 32768
-"""A document up to this length is read in one step where it is plain."""
+_PLAIN_BYTES = 32768  # a plain document up to this length is read in one step
 
 _STEP_BYTES = 8192
 
@@ -46,7 +45,7 @@ class Call(NamedTuple):
 
 
 class Serialized:
-    """An answer that is XML already, in pieces: a long one takes long to join."""
+    """An answer that is already XML, in pieces, since joining a long one takes time."""
 
     __slots__ = ("pieces",)
 
@@ -84,7 +83,7 @@ def serialize_fault(code: int, text: str) -> bytes:
 
 
 def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> Steps[list[bytes]]:
-    """Return a call as pieces of XML, as :func:`serialize_response_in_steps` does an answer."""
+    """Return a call as pieces of XML, like :func:`serialize_response_in_steps` for an answer."""
     out = Output(most)
     out.parts += [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
@@ -96,7 +95,7 @@ def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> S
 
 
 def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
-    """Return a successful answer as pieces of XML. Raise RpcProtocolError if it has more than ``most`` bytes."""
+    """Return a successful answer as pieces of XML. Raise RpcProtocolError if it exceeds ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]
     yield from write_in_steps(value, out, 0)
@@ -129,7 +128,7 @@ def parse_call(body: bytes | bytearray) -> Call:
 
 
 def parse_response(body: bytes | bytearray) -> Any:
-    """Return the value in an answer. Raise RpcFault where the peer answered with one, else RpcProtocolError."""
+    """Return the value in an answer. Raise RpcFault if the peer answered with a fault, RpcProtocolError on invalid XML-RPC."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]

@@ -1,8 +1,8 @@
-"""XML-RPC of the plain kind, read without an XML parser: five times as fast, and the same.
+"""Read plain XML-RPC without an XML parser: five times as fast, with the same results.
 
-Pure. Plain is what nearly all documents of ROS are: ASCII without references; strings, numbers, booleans, arrays
-and structs, written without spaces inside the tags. Of anything else, right or wrong, nothing is said here: that
-is the parser's (``core/wire/xmlrpc_reader.py``).
+Pure. Nearly all documents of ROS are plain: ASCII without references; strings, numbers, booleans, arrays
+and structs, without spaces inside the tags. Any other document, valid or not, is left to the parser
+(``core/wire/xmlrpc_reader.py``).
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 __all__ = ["read_plain"]
 
 _MAX_TAGS = 2_000_000
-_MAX_OPEN = 60
-"""Within the limits of the parser, which answers for what is beyond."""
+_MAX_OPEN = 60  # below the parser's limit on nesting; deeper documents are left to the parser
 
 _SPACE = r"[ \t\r\n]*"
 # No references, nor "]]>", and no characters that XML changes or forbids.
@@ -39,7 +38,7 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
         head_of, tail_of, token_of = _patterns()
         head, end = head_of.match(text), text.rfind("</params>")
         tail = tail_of.fullmatch(text, max(0, end))
-        # Both are of a call, or both of an answer.
+        # Head and tail must both belong to a call, or both to an answer.
         if not head or not tail or (head[1] is None) is not (tail[1] is None):
             return None
         params = _read(token_of.findall(text, head.end(), end))
@@ -49,14 +48,14 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
 
 
 def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
-    """Return the values that the tokens make up; None if they do not fit each other. Raise ValueError."""
+    """Return the values that the tokens represent; None if the tokens are inconsistent. Raise ValueError."""
     if tokens and tokens[-1][4] not in {"", "</param>"}:
-        # The token of what was not expected is always the last one.
+        # An unexpected part always becomes the last token.
         return None
 
     params: list[object] = []
     add: Callable[[object], None] = params.append
-    # What is open: the first letters of its end, how the values around it are added, and what it holds.
+    # The open elements: the start of the end tag, the function that adds to the enclosing value, and the contents.
     opened: list[tuple[str, Callable[[object], None], Any]] = []
 
     for text, param_text, bare, param_bare, other in tokens:
@@ -113,7 +112,7 @@ _NUMBERS: dict[str, Callable[[str], object]] = {
 
 @cache
 def _patterns() -> _Patterns:
-    # Made when they are first needed: it takes a millisecond.
+    # Compiled at first use, since this takes a millisecond.
     utf8 = "(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))?"
     declaration = rf"<\?xml version=(?:'1\.0'|\"1\.0\"){utf8} ?\?>"
     call = rf"Call>{_SPACE}<methodName>({_TEXT})</methodName>"
@@ -129,7 +128,7 @@ def _patterns() -> _Patterns:
         "</member>",
         "<value><struct>",
         rf"</struct>{_SPACE}</value>",
-        # Text in an unexpected place, and all after it, is an unknown token.
+        # Text in an unexpected place, with everything after it, becomes an unknown token.
         "(?s:.+)",
     )
 

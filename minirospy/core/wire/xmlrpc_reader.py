@@ -1,7 +1,7 @@
-"""XML to values, as its bytes arrive, by expat.
+"""Parse XML-RPC documents to values with expat, as their bytes arrive.
 
-Pure. Refuses what a caller could hurt with: document types (and so entities), nesting beyond 64 levels, a million elements,
-tags of 64 KiB, texts of 64 MiB in memory. Source: http://xmlrpc.com/spec.md.
+Pure. Refuses input that could do harm: document types (and so entities), nesting beyond 64 levels, a million elements,
+tags of 64 KiB, strings of 64 MiB in memory. Source: http://xmlrpc.com/spec.md.
 """
 
 from __future__ import annotations
@@ -17,31 +17,26 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-_MAX_ELEMENTS = 1_000_000
-"""In one document: some seconds of work."""
+_MAX_ELEMENTS = 1_000_000  # per document; they take some seconds
 
 _MIB = 1024 * 1024
-_MAX_MEMORY = 64 * _MIB
-"""Of the long texts of one document."""
+_MAX_MEMORY = 64 * _MIB  # of all long strings in one document
 
 _MAX_WIDE = 16 * _MIB
-"""Of one text in which a character beyond U+00FF makes each one take two or four bytes: all of it is copied then."""
+"""Bytes of one string with a character beyond U+00FF, which makes each character take 2 or 4 bytes and copies the string."""
 
-_MAX_TOKEN = 65536
-"""Bytes of a tag, a comment or the like."""
+_MAX_TOKEN = 65536  # bytes of a tag, a comment or similar
 
-_MAX_SCALAR = 2048
-"""Characters of a number, a boolean or a date."""
+_MAX_SCALAR = 2048  # characters of a number, a boolean or a date
 
-_LONG_TEXT = 16
-"""Pieces of a text, 8 KiB each, after which it is a long one."""
+_LONG_TEXT = 16  # pieces, of 8 KiB each, after which a string is long
 
 _GROWTH_SHIFT = 17
-"""A long text grows by a sixteenth of what it has already: as many pieces of 8 KiB as its length shifted by this."""
+"""A long string is joined each time it has grown by a sixteenth: its length shifted by this is a number of 8-KiB pieces."""
 
 
 class DateTime(NamedTuple):
-    """A date in another form than XML-RPC's, as it came: others take any text for one."""
+    """A date in another format than XML-RPC's, as received; other implementations accept any text."""
 
     value: str
 
@@ -84,8 +79,8 @@ _SCALARS: dict[str, Callable[[str], object]] = {
 class Reader:
     """Reads a document, as its bytes arrive, into ``root``, ``method``, ``params`` and ``is_fault``.
 
-    ``_containers`` holds the lists and dictionaries that are not complete yet; ``_values`` one entry for each
-    ``<value>`` that is: a one-element list once it has something in it.
+    ``_containers`` contains the incomplete lists and dictionaries; ``_values`` has an entry for each incomplete
+    ``<value>``: an empty list, or a list of one element once the value is known.
     """
 
     def __init__(self) -> None:
@@ -103,13 +98,13 @@ class Reader:
         self._depth = 0
         self._left = _MAX_ELEMENTS
         self._tag: str
-        # The bytes that were fed, and those that the long texts take in memory.
+        # The number of bytes fed, and the memory that the long strings take.
         self._fed = 0
         self._memory = 0
-        # What is joined of a long text, and the bytes that each of its characters takes.
+        # The joined part of a long string, and its bytes per character.
         self._joined = ""
         self._width = 1
-        # A long base64 as far as it is decoded.
+        # The decoded part of a long base64 value.
         self._binary: BytesIO | None = None
 
         parser = self._parser = expat.ParserCreate()
@@ -120,20 +115,20 @@ class Reader:
         parser.StartDoctypeDeclHandler = self._refuse_doctype
 
     def feed(self, data: bytes | bytearray | memoryview, *, is_last: bool = False) -> None:
-        """Read some more. Raise RpcProtocolError."""
+        """Parse more data. Raise RpcProtocolError."""
         try:
             self._parser.Parse(data, is_last)
         except self._errors as error:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
         self._fed += len(data)
-        # The parser looks at an incomplete tag or comment again whenever more of it comes.
+        # The parser scans an incomplete tag or comment again each time more data arrives.
         if not is_last and self._fed - self._parser.CurrentByteIndex > _MAX_TOKEN:
             raise RpcProtocolError(f"a tag or comment of more than {_MAX_TOKEN} bytes")
         if len(self._text) - _LONG_TEXT > len(self._joined) >> _GROWTH_SHIFT:
             self._join_text()
 
     def close(self) -> None:
-        """Release the parser, whose handlers refer to this object and to all that was read. Idempotent."""
+        """Release the parser, whose handlers refer to this object and all parsed values. Idempotent."""
         parser = self._parser
         parser.StartElementHandler = parser.EndElementHandler = None
         parser.CharacterDataHandler = parser.StartDoctypeDeclHandler = None
@@ -143,7 +138,7 @@ class Reader:
 
     def _start(self, tag: str, _: object) -> None:
         self._depth += 1
-        # Each level of a value takes four elements at most (struct, member, value; array, data, value).
+        # Each level of a value needs at most four elements (struct, member, value; array, data, value).
         if self._depth > 4 * MAX_DEPTH:
             raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
         self._left -= 1
@@ -221,7 +216,7 @@ class Reader:
         return self._joined or "".join(self._text)
 
     def _join_text(self) -> None:
-        """Join what has come of a long text, which would take too long at its end. Raise RpcProtocolError."""
+        """Join the received pieces of a long string, which would take too long at its end. Raise RpcProtocolError."""
         if self._tag == "base64":
             self._decode_base64()
             return
@@ -229,7 +224,7 @@ class Reader:
         self._text.clear()
         joined, self._joined = self._joined, ""
 
-        # All characters take as much as the widest one.
+        # All characters of a string take as many bytes as the widest one.
         width = max(self._width, _width(more))
         memory = width * (len(joined) + len(more))
         self._memory += memory - self._width * len(joined)
@@ -240,7 +235,7 @@ class Reader:
             most = _MAX_WIDE // _MIB
             raise RpcProtocolError(f"a text of wide characters of more than {most} MiB in memory", status=413)
 
-        # Python copies nothing if a local variable is the only one that refers to a text.
+        # Python appends in place if a local variable is the only reference to a string.
         joined += more
         self._joined = joined
 
@@ -253,7 +248,7 @@ class Reader:
 
 
 def _width(text: str) -> int:
-    """Return the bytes that each character of a long text takes in memory."""
+    """Return the bytes that each character of a long string takes in memory."""
     return 1 if text.isascii() else min(4, sys.getsizeof(text) // len(text))
 
 

@@ -1,4 +1,4 @@
-"""Values to XML: in one go, or in steps where there are many.
+"""Convert values to XML, at once, or in steps if they are large.
 
 Pure. Source: http://xmlrpc.com/spec.md.
 """
@@ -17,12 +17,11 @@ __all__ = ["Output", "escape", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-_ALONE_BYTES = 1024 * 1024
-"""Of an answer, before it demands to be the only one that is being written."""
+_ALONE_BYTES = 1024 * 1024  # of an answer, after which it demands to be written alone
 
 
 def escape(text: str) -> str:
-    """Return a text as XML holds it."""
+    """Return a text escaped for XML."""
     if "&" in text:
         text = text.replace("&", "&amp;")
     if "<" in text:
@@ -30,7 +29,7 @@ def escape(text: str) -> str:
     if ">" in text:
         text = text.replace(">", "&gt;")
     if "\r" in text:
-        # A bare carriage return would be read as a line feed.
+        # XML parsers would convert a bare carriage return to a line feed.
         text = text.replace("\r", "&#13;")
     return text
 
@@ -46,7 +45,7 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    # A subclass, such as numpy's, may write itself in another way.
+    # A subclass, such as numpy's, may have another repr.
     parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
@@ -57,7 +56,7 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
 def _write_list(value: Sequence[object], parts: list[str], depth: int) -> None:
     parts.append("<value><array><data>")
     for item in value:
-        # Most lists are of strings.
+        # Most lists contain strings.
         if type(item) is str:
             parts.append(f"<value><string>{escape(item)}</string></value>")
         else:
@@ -100,7 +99,7 @@ _WRITERS: dict[type, _Writer] = {
 
 
 def write(value: object, parts: list[str], depth: int) -> None:
-    """Append a value's XML to ``parts``. Raise RpcProtocolError on what XML-RPC has no type for."""
+    """Append a value's XML to ``parts``. Raise RpcProtocolError on a value for which XML-RPC has no type."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
     writer = _WRITERS.get(type(value))
@@ -110,7 +109,7 @@ def write(value: object, parts: list[str], depth: int) -> None:
 
 
 class Output:
-    """XML that is written in steps: what is being written, and the pieces that are done."""
+    """XML written in steps: the current parts, and the completed pieces."""
 
     def __init__(self, most: int) -> None:
         self.parts: list[str] = []
@@ -120,7 +119,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Put away what was written; return what to yield. Raise RpcProtocolError if it is too much."""
+        """Complete a piece from the current parts; return the value to yield. Raise RpcProtocolError above the limit."""
         piece = "".join(self.parts).encode()
         self.parts.clear()
         self._pieces.append(piece)
@@ -139,7 +138,7 @@ class Output:
 
 
 def write_in_steps(value: Any, out: Output, depth: int) -> Steps[None]:
-    """Do the same with a value that may be large."""
+    """Do the same as :func:`write`, in steps, for a value that may be large."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
     writer = _WRITERS.get(type(value)) or _writer_of_kin(value)
@@ -196,7 +195,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
     import base64
 
     out.parts.append("<value><base64>")
-    # Three bytes make four characters.
+    # Three bytes are encoded as four characters.
     size = 3 * _STEP_BYTES
     for at in range(0, len(value), size):
         out.parts.append(base64.b64encode(value[at : at + size]).decode())

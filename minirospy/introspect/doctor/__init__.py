@@ -1,4 +1,4 @@
-"""Checks of this machine's ROS, its network and its graph: an environment in, findings out.
+"""Checks of this machine's ROS installation, its network and its graph: takes an environment, yields findings.
 
 Source: http://wiki.ros.org/roswtf, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/Troubleshooting.
 """
@@ -19,9 +19,9 @@ __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
 
 
 class Examination:
-    """All checks, in order; ``findings`` yields each when it is there. A context manager.
+    """All checks in order; ``findings`` yields each result when it is available. A context manager.
 
-    ``machines``: names or addresses of others that are tried too; ``offline`` leaves the network out.
+    ``machines``: names or addresses of other machines to check; ``offline`` skips the network checks.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Examination:
         self._stack.close()
 
     def findings(self) -> Iterator[Finding]:
-        """Yield one finding after the other."""
+        """Run the checks and yield their findings."""
         yield from check_python()
         try:
             environment = Environment.read(self._environ)
@@ -52,7 +52,7 @@ class Examination:
             yield problem("variables", str(error), "correct it, or unset it")
             return
         host, port = environment.master_address
-        # Of a name server that is out of reach one waits once.
+        # Look up all names in parallel: if the name server is unreachable, wait for one timeout only.
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
         place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Answer the doctors of other machines until the context ends; False if no master was found."""
+        """Answer the doctors of other machines until the context exits; return False if no master was found."""
         if self._listen is None:
             return False
         self._listen(report)

@@ -1,4 +1,4 @@
-"""The result of a check: one finding, one line."""
+"""The result of a check: one finding, printed as one line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Status(str, Enum):
 
 
 class Finding(NamedTuple):
-    """``check`` is what was looked at, ``text`` what was seen, ``advice`` what to do about it ("": nothing)."""
+    """The result of one check. ``check``: its subject; ``text``: the observation; ``advice``: what to do, "" for nothing."""
 
     check: str
     status: Status
@@ -26,15 +26,15 @@ class Finding(NamedTuple):
 
 
 def ok(check: str, text: str) -> Finding:
-    """Return nothing to do."""
+    """Return a finding that needs no action."""
     return Finding(check, Status.OK, text)
 
 
 def warning(check: str, text: str, advice: str) -> Finding:
-    """Something that is sometimes at fault."""
+    """Return a finding that may be the cause of a fault."""
     return Finding(check, Status.WARNING, text, advice)
 
 
 def problem(check: str, text: str, advice: str) -> Finding:
-    """Something that does not work."""
+    """Return a finding that is a fault."""
     return Finding(check, Status.PROBLEM, text, advice)

@@ -1,4 +1,4 @@
-"""Frames: two nodes that publish one, loops, several trees, transforms that are wrong, old, or from a clock ahead.
+"""Checks of tf frames: duplicate publishers, loops, several trees, and invalid, old or future transforms.
 
 Source: http://wiki.ros.org/roswtf ("tf"), http://wiki.ros.org/tf/Errors%20explained.
 """
@@ -22,18 +22,17 @@ from minirospy.runtime.rpc.master_proxy import SystemState
 __all__ = ["Observation", "check_frames", "frame_findings"]
 
 _TOPICS = {"/tf": False, "/tf_static": True}
-_SECONDS = 1.5
-"""How long is listened: something that is published once a second comes."""
+_SECONDS = 1.5  # listening time, long enough to receive transforms published at 1 Hz
 _OLD_SECONDS = 1.0
 _AHEAD_SECONDS = 1.1
-"""static_transform_publisher stamps ahead, by its period, which is a second at most in practice."""
+"""Tolerance for future stamps: static_transform_publisher stamps ahead by its period, in practice at most a second."""
 _SIMILAR = 0.8
 _SHOWN = 5
 
 
 @dataclass
 class Observation:
-    """The stamps seen of one child frame: times in nanoseconds, ``offset`` the newest stamp's distance from its arrival."""
+    """The stamps seen of one child frame, in nanoseconds; ``offset`` is the newest stamp minus its arrival time."""
 
     child: str
     senders: set[str] = field(default_factory=set)
@@ -43,7 +42,7 @@ class Observation:
 
 
 def check_frames(environment: Environment, state: SystemState) -> Iterator[Finding]:
-    """Listen to /tf for a moment, where there is one, and yield what is wrong with the frames. Raise as ToolNode does."""
+    """Listen to /tf for _SECONDS if it is published, and yield the faults of the frames. Raise as ToolNode does."""
     published = [topic for topic in _TOPICS if state.publishers.get(topic)]
     if not published:
         return
@@ -69,7 +68,7 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # Workers have ended with the node; simulated time has nothing to do with when something comes.
+    # The workers have stopped with the node. With simulated time, stamps and arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -85,7 +84,7 @@ def _add(seen: dict[str, Observation], body: bytes, sender: str, now: int, *, is
 
 
 def frame_findings(seen: Sequence[Observation], *, is_simulated: bool = False) -> Iterator[Finding]:
-    """Yield what is wrong with frames; one line of good news where nothing is."""
+    """Yield the faults of the frames, or one ok finding if there are none."""
     if not seen:
         yield warning(
             "frames",
@@ -128,7 +127,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     walked: set[str] = set()
     for child in sorted(parent):
-        # Each frame is walked through once: 10,000 of them take no longer than reading them.
+        # Visit each frame once, so that the time is linear in the number of frames.
         way: dict[str, None] = {}
         at = child
         while at in parent and at not in walked:
@@ -145,7 +144,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Several trees: of those whose root is called nearly as a frame of another, what was meant."""
+    """Yield a warning if there are several trees; suggest a similar frame name for a root that may be misspelt."""
     children = {each.child for each in seen}
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     roots = sorted({above for above in parent.values() if above not in children})
@@ -158,7 +157,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
         while at not in tree and at in parent and at not in way:
             way[at] = None
             at = parent[at]
-        # Of a loop any of its frames.
+        # Frames in a loop get any frame of the loop as their tree.
         tree.update(dict.fromkeys(way, tree.get(at, at)))
 
     hints: list[str] = []
@@ -179,7 +178,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the name that was perhaps meant; names that differ in their numbers alone are not."""
+    """Return the most similar name, "" if there is none; ignore names that differ only in their numbers."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")
@@ -189,7 +188,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
     by_plain: dict[str, str] = {}
     for other in sorted(others):
-        # Of two robots with prefixes the frames are called alike on purpose.
+        # Robots with numbered prefixes have similar frame names on purpose.
         if letters(other) != letters(name) or plain(other) == plain(name):
             by_plain.setdefault(plain(other), other)
     found = difflib.get_close_matches(plain(name), by_plain, n=1, cutoff=_SIMILAR)
@@ -199,7 +198,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
 
 def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Stamps that are far from the time at which they come: of each node the worst ahead, and the worst behind."""
+    """Yield stamps far from their arrival time: for each node the largest offset ahead and the largest behind."""
     worst: dict[tuple[str, bool], tuple[float, str]] = {}
     for each in sorted(seen, key=_child):
         if each.offset is None:

@@ -1,4 +1,4 @@
-"""The graph: nodes that do not answer, topics whose ends do not meet, services that are dead.
+"""Checks of the graph: nodes that do not answer, publishers and subscribers that do not connect, dead services.
 
 Source: http://wiki.ros.org/roswtf ("Online checks").
 """
@@ -50,9 +50,9 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class NodeAnswer:
-    """The answers of a node to queries; ``trouble`` if it did not answer.
+    """The answers of a node to queries; ``trouble`` is set if it did not answer.
 
-    ``seconds`` is how long the first call took; ``stats`` (getBusStats) only if the caller wants them.
+    ``seconds``: duration of the first call; ``stats`` (getBusStats): only if the caller requests them.
     """
 
     node: NodeAddress
@@ -77,7 +77,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
-    """Return what all registered nodes report of themselves, queried side by side, without the node ``besides``."""
+    """Query all registered nodes in parallel, except for ``besides``, and return their answers."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -98,7 +98,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Nodes that do not answer: one line for those of a machine that fail in the same way."""
+    """Yield a problem for nodes that do not answer: one line for all nodes of a machine that fail in the same way."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:
@@ -117,7 +117,7 @@ def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
 
 
 def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[str, str]:
-    """Return (what, advice) for a node that has registered as being at ``host`` and does not answer there."""
+    """Return (problem, advice) for a node that is registered at ``host`` and does not answer there."""
     if trouble.fault is Fault.NAME:
         return (
             f"are registered as being at '{host}', a name that this machine does not know",
@@ -151,7 +151,7 @@ def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[st
 
 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Topics whose nodes name different types, and those that nobody publishes."""
+    """Yield topics whose nodes report different types, and topics without publishers."""
     differing = differing_types(state, answers)
     for topic, types in differing.items():
         found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
@@ -179,7 +179,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
-    """Return the topics of which nodes name different types, and who names which."""
+    """Return the topics for which nodes report different types: topic -> type -> nodes."""
     found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
     return {topic: types for topic, types in found.items() if len(types) > 1}
 
@@ -206,7 +206,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
     ]
     missing = [pair for pair in pairs if not _is_connected(pair, answers)]
     if missing:
-        # Those that have just been started connect within a moment.
+        # Nodes that have just started may connect within this time: check again.
         time.sleep(_AGAIN_SECONDS)
         names = {name for pair in missing for name in pair[1:]}
         again = in_parallel(
@@ -234,7 +234,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Services that do not answer; those of nodes that do not answer either are reported with their nodes."""
+    """Yield services that do not answer, except for those of nodes that were reported themselves."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -245,7 +245,7 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
 
     for name, result in zip(names, found, strict=True):
         if isinstance(result, RpcRefused):
-            continue  # it has gone meanwhile
+            continue  # the service was unregistered meanwhile
         if isinstance(result, Exception):
             bad += 1
             trouble = trouble_of(result)
@@ -271,7 +271,7 @@ def _ask(tool: str, node: NodeAddress, *, with_stats: bool = False) -> NodeAnswe
         start = time.perf_counter()
         pid = slave.get_pid()
         seconds = time.perf_counter() - start
-        # Not all clients send their name.
+        # Some client libraries do not implement getName.
         with contextlib.suppress(RpcFault, RpcRefused, RpcProtocolError):
             name = slave.call("getName")
             if name not in (node.name, "", 0):
@@ -289,7 +289,7 @@ def _ask(tool: str, node: NodeAddress, *, with_stats: bool = False) -> NodeAnswe
 
 
 def _stats(slave: SlaveProxy) -> tuple[object, ...]:
-    """Return what a node counts of its connections; nothing of one that does not count."""
+    """Return a node's connection statistics; () if it provides none."""
     try:
         return tuple(slave.get_bus_stats())
     except (RpcFault, RpcRefused, RpcProtocolError):
@@ -297,7 +297,7 @@ def _stats(slave: SlaveProxy) -> tuple[object, ...]:
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
-    """Return the types that nodes name for a topic, and who does."""
+    """Return the types that nodes report for a topic, with the nodes that report each."""
     types: dict[str, set[str]] = {}
     for name, answer in answers.items():
         for table in (answer.publications, answer.subscriptions):
@@ -308,7 +308,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Return whether it is where an action server waits for goals: most of the time nobody sends any."""
+    """Return whether this is an action server's goal or cancel topic, which often has no publisher."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 
@@ -329,7 +329,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return what to do, where the publisher's definition of the type is another than this machine's; else ""."""
+    """Return the advice if the publisher's definition of the type differs from this machine's; else ""."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -344,7 +344,7 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 
 def _probe_service(graph: Graph, name: str) -> str:
-    """Return what is wrong with a service's type; "": nothing. Raise as ServiceClient, and RpcRefused where it has gone."""
+    """Return a problem with a service's type, "" for none. Raise as ServiceClient, and RpcRefused if it is unregistered."""
     from minirospy.core.idl.load import service_class
     from minirospy.runtime.node.service_client import ServiceClient
 
@@ -363,7 +363,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Return the first few of them, and how many there are more."""
+    """Return the first few names, and the number of the others."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

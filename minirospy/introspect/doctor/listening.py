@@ -1,8 +1,8 @@
-"""Both ways between two machines: one listens, the other requests that it connects back.
+"""Check the connection between two machines in both directions: one listens, the other requests that it connects back.
 
-The listener is a service of type std_srvs/Trigger: who calls it has reached that machine, and its answer says whether
-that machine reached the caller's node, by a topic, with a message of 16 KiB. The answer's text is JSON: ``host`` and
-``time`` of the listener, ``fault`` and ``text`` of what went wrong ("": nothing).
+The listener is a service of type std_srvs/Trigger. A client that can call it has reached that machine. The response reports
+whether that machine has reached the client's node, by subscribing to its topic and receiving a message of 16 KiB. The
+response's message is JSON: the listener's ``host`` and ``time``, and ``fault`` and ``text`` of a failure ("" for none).
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Connect back to each doctor that requests it, from now on; ``report`` is called with each, in a separate thread.
+    """Start to connect back to each doctor that requests it; call ``report`` with each result, in a separate thread.
 
-    Raise MasterUnreachableError, RpcError.
+    Raise MasterUnreachableError or RpcError.
     """
 
     def connect_back(_: memoryview, fields: Header) -> bytes:
@@ -87,14 +87,14 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
 
 
 def listeners(state: SystemState, answers: Answers) -> Answers:
-    """Return the doctors among the nodes that listen."""
+    """Return the answers of the doctors that listen."""
     return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
 
 
 def check_listeners(
     own: DoctorNode, graph: Graph, answers: Answers, place: MasterLocation
 ) -> Iterator[Finding]:
-    """Yield what the listeners among the nodes that answer say: one or two findings for each."""
+    """Call the listeners and yield one or two findings for each."""
     services = [
         node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble
     ]
@@ -136,7 +136,7 @@ def check_listeners(
 
 
 def _call(uri: str, service: str, caller_id: str) -> str:
-    """Return the text of a listener's answer. Raise OSError, WireError."""
+    """Return the message of a listener's response. Raise OSError or WireError."""
     type_ = service_class("std_srvs/Trigger")
     client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, same_host=False)
     try:

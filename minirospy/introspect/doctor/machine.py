@@ -1,4 +1,4 @@
-"""Checks of this machine without the network: Python, the variables, the packages.
+"""Checks of this machine without the network: Python, environment variables and packages.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/roswtf.
 """
@@ -33,7 +33,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Yield which Python this is, and whose rospy a program gets that it runs."""
+    """Yield the Python version, and which rospy programs import."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -57,9 +57,9 @@ def check_variables(
     master: MasterLocation,
     known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
-    """Yield the variables that say where the master and this machine are, one by one and beside each other.
+    """Yield findings about the variables for the master's and this machine's address, each by itself and in combination.
 
-    ``known``: the addresses of the names in them.
+    ``known``: the addresses of the host names in them.
     """
     found = [*_host_findings(environ, environment, master, known), *_other_findings(environ, environment)]
     if not found:
@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # `192.168.1` has an address, too: 192.168.0.1.
+        # `192.168.1` resolves as well, to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -163,7 +163,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     if config and not Path(config).is_file():
         yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
 
-    # Of a folder that is not there yet, the nearest one above it counts.
+    # If a folder does not exist yet, check its nearest existing parent.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
@@ -172,14 +172,14 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
                 "variables",
                 f"logs cannot be written to {folder}: {there} {why}",
                 f"export {variable}=<a folder of your own>"
-                # What `sudo roscore` has left behind.
+                # A folder owned by root is usually left by `sudo roscore`.
                 + (f", or `sudo chown -R $USER {there}`" if there == folder and there.is_dir() else ""),
             )
             break
 
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
-    """Yield the packages of ROS_PACKAGE_PATH: of one name, unreadable, with missing dependencies; ``here``: a workspace."""
+    """Yield findings about ROS_PACKAGE_PATH: duplicates, unreadable packages, missing dependencies; ``here``: a workspace."""
     from minirospy.workspace.packages import Packages, built_in_roots
 
     found: list[Finding] = []
@@ -192,7 +192,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    # A workspace that is sourced names minirospy's own, too: they are in order, and a student's package goes before them.
+    # A sourced workspace adds minirospy's packages to the path: skip them. The user's packages may replace them.
     mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()
     for name, folders in sorted(copies.items()):
@@ -231,7 +231,7 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
             for each in manifest.dependencies
             if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
         ]
-        # What the system installs is called as the system calls it.
+        # Ignore rosdep keys of system packages.
         missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
         if missing:
             yield warning(

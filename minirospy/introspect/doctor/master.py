@@ -1,4 +1,4 @@
-"""The master: whether it answers, which side is at fault if it does not, and how its clock differs from ours."""
+"""Checks of the master: whether it answers, which machine is at fault if it does not, and its clock's offset."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
 
-_FEEL_SECONDS = 0.1
-"""What tf begins to feel of clocks that differ."""
+_FEEL_SECONDS = 0.1  # clock difference from which tf is affected
 
 _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield whether a master answers; a single problem if it does not."""
+    """Yield whether a master answers, or one problem if none does."""
     if not place.addresses:
         yield problem(
             "master",
@@ -42,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # a master of others, which lacks this call
+        pid = ""  # another implementation's master, which lacks this call
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
@@ -55,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
 
 
 def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield how far the master's clock is from ours; nothing if both are this machine's."""
+    """Yield the difference between the master's clock and the local one; nothing if the master is local."""
     if place.is_local:
         return
     before = time.time()
@@ -68,12 +67,12 @@ def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]
     if seconds is None:
         yield ok("clock", f"{place.host} does not report its time: compare `date` on both machines")
         return
-    # Whole seconds, cut off.
+    # The header has whole seconds, rounded down.
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
 
 
 def clock_finding(who: str, theirs: float, before: float, after: float) -> Finding:
-    """Return what ``theirs``, a time that came between ``before`` and ``after``, says of another clock."""
+    """Compare ``theirs``, a remote time that was read between ``before`` and ``after``, with the local clock."""
     difference = theirs - after if theirs > after else min(0.0, theirs - before)
     if abs(difference) < _FEEL_SECONDS:
         return ok("clock", f"that of {who} is the same")
@@ -128,7 +127,7 @@ def _unreachable(uri: str, place: MasterLocation, trouble: Trouble) -> Finding:
 
 
 def _status(master: MasterProxy) -> dict[str, object]:
-    """Return what only minirospy's master reports of itself."""
+    """Return the status that only minirospy's master provides."""
     try:
         found = master.call("minirospy.status")
     except (RpcFault, RpcError):
@@ -137,7 +136,7 @@ def _status(master: MasterProxy) -> dict[str, object]:
 
 
 def _http_date(place: MasterLocation) -> float | None:
-    """Return the time that the server writes into its answers, as Python's own does."""
+    """Return the time in the server's HTTP Date header, which Python's server sends."""
     from email.utils import parsedate_to_datetime
 
     request = serialize_request(place.host, "/RPC2", serialize_call("getPid", ("/doctor",)))

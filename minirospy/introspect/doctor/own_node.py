@@ -1,6 +1,6 @@
-"""The doctor's own node: whether others reach what runs on this machine, the master first.
+"""The doctor's own node: checks whether other machines, the master's first, reach nodes on this one.
 
-It is a node like any other for as long as the doctor works: what reaches it reaches the user's nodes too.
+It is a normal node of the graph while the doctor runs: peers that reach it also reach the user's nodes.
 """
 
 from __future__ import annotations
@@ -35,17 +35,16 @@ from minirospy.runtime.transport.loop import LoopThread
 
 __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unreached_finding"]
 
-PREFIX = "/minirospy_doctor"
-"""How the names of such nodes begin."""
+PREFIX = "/minirospy_doctor"  # prefix of the names of such nodes
 
 _LETTER_BYTES = 16 * 1024
-"""More than a packet: some tunnels lose whatever does not fit into one."""
+"""More than one packet: some tunnels drop everything that exceeds their packet size."""
 
 _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """A node with a latched message for any peer, registered while the context lasts.
+    """A node that publishes a latched message to any peer; registered while the context is active.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """
@@ -81,14 +80,14 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Be a node of the graph: it publishes its letter, and like any node /rosout.
+        """Register the node's topics: its letter, and /rosout as every node does.
 
-        Raise MasterUnreachableError, RpcError.
+        Raise MasterUnreachableError or RpcError.
         """
         self._loop.run(self._register())
 
     def serve(self, name: str, handler: Handler) -> None:
-        """Offer a std_srvs/Trigger service. Raise MasterUnreachableError, RpcError."""
+        """Provide a std_srvs/Trigger service. Raise MasterUnreachableError or RpcError."""
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
             name,
@@ -100,18 +99,18 @@ class DoctorNode:
         self._loop.run(self.node.serve(server))
 
     def wait_for_log_listeners(self, wanted: Collection[str], timeout: float) -> set[str]:
-        """Return those of the nodes ``wanted`` that have not connected to this one's /rosout in time."""
+        """Return the nodes in ``wanted`` that have not connected to this node's /rosout within ``timeout`` seconds."""
         with self._log_links:
             self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
             return set(wanted) - self._listeners
 
     async def _register(self) -> None:
-        # In this order the master has to notify us of ourselves.
+        # Subscribe before advertising, so that the master must send this node a publisherUpdate about itself.
         await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
-        # A std_msgs/String is a length and a text, as is a frame.
+        # A std_msgs/String has the layout of a frame: a length and the bytes.
         letter.publish(serialize_frame(serialize_frame(body)))
         log = message_class("rosgraph_msgs/Log")
         type_ = InterfaceType.of(log)
@@ -135,7 +134,7 @@ class DoctorNode:
 
 
 class _NotifiedNode(Node):
-    """A node that notes the master's calls."""
+    """A node that records calls from the master."""
 
     def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:
         super().__init__(name, environment)
@@ -167,7 +166,7 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Yield whether the master calls our node, and those who hear /rosout (``log_listeners``) connect to it."""
+    """Yield whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect to it."""
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return
@@ -183,7 +182,7 @@ def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[
 
 
 def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
-    """Return the finding for another machine (``who``, at ``their_host``) that does not reach our node."""
+    """Return the finding for another machine (``who``, at ``their_host``) that does not reach this node."""
     host, port = host_port(own.node.uri)
     known = addresses(their_host)
     ours = own_address_towards(known[0]) if known else ""

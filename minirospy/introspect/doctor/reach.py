@@ -48,13 +48,12 @@ __all__ = [
 ]
 
 CONNECT_SECONDS = 1.5
-"""Whoever means to answer does within this, also by a poor radio."""
+"""Connect timeout: a reachable peer answers within this, even over a poor radio link."""
 
 RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
-"""What to do about :attr:`Fault.LATE`."""
+"""Advice for :attr:`Fault.LATE`."""
 
-LOOK_UP_SECONDS = 2.0
-"""The same of a name server."""
+LOOK_UP_SECONDS = 2.0  # for a name server's answer
 
 _MAX_THREADS = 32
 _MAX_BYTES = 1024 * 1024
@@ -63,32 +62,27 @@ _R = TypeVar("_R")
 
 
 class Fault(str, Enum):
-    """Why an address does not answer, as far as it can be seen from here."""
+    """The reason why an address does not answer, as far as this machine can determine it."""
 
-    NAME = "name"
-    """the name is not known here"""
-    REFUSED = "refused"
-    """the machine is there, and nobody listens at that port"""
+    NAME = "name"  # the host name does not resolve
+    REFUSED = "refused"  # the machine is up, but no process listens on the port
     SILENT = "silent"
-    """nothing comes back: the machine is off, the address is another one's, or a firewall drops what is sent"""
-    LATE = "late"
-    """a connection is taken, and nothing is answered: the process is busy, or suspended"""
-    NO_ROUTE = "no route"
-    """the way there is closed: no network, or a firewall that says no"""
-    STRANGER = "stranger"
-    """somebody answers who speaks no ROS"""
+    """No answer: the machine is off, the address belongs to another machine, or a firewall drops the packets."""
+    LATE = "late"  # connected, but no response: the process is busy or suspended
+    NO_ROUTE = "no route"  # no network, or a firewall rejects the packets
+    STRANGER = "stranger"  # the peer does not speak a ROS protocol
     OTHER = "other"
 
 
 class Trouble(NamedTuple):
-    """A fault, and what was said about it."""
+    """A fault with its description."""
 
     fault: Fault
     text: str
 
 
 class MasterLocation(NamedTuple):
-    """The master's place in ROS_MASTER_URI, and the addresses of that host ([]: the name is not known)."""
+    """The master's host and port from ROS_MASTER_URI, and the addresses of that host ([] if it does not resolve)."""
 
     host: str
     port: int
@@ -96,17 +90,17 @@ class MasterLocation(NamedTuple):
 
     @property
     def is_local(self) -> bool:
-        """Return whether it is this machine."""
+        """Return whether the master is on this machine."""
         return is_loopback(self.host) or any(map(is_own_address, self.addresses))
 
     @property
     def own_address(self) -> str:
-        """The address of this machine as the other one sees it; "" without a route."""
+        """Return this machine's address as seen from the master's; "" without a route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
 def trouble_of(error: Exception) -> Trouble:
-    """Return the trouble that an error of a call, a connection or a look-up means."""
+    """Classify an error of a call, a connection or a name lookup."""
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
@@ -140,7 +134,7 @@ def trouble_of(error: Exception) -> Trouble:
 
 
 def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Return the addresses of a name, IPv4 first, as this machine knows them; [] where it knows none, or takes too long."""
+    """Return the addresses of a host name, IPv4 first; [] if it does not resolve in time."""
     try:
         return look_up(host, timeout)
     except OSError:
@@ -148,7 +142,7 @@ def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
 
 
 def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict[str, list[str]]:
-    """Return the same of several names, looked up side by side."""
+    """Look up several names in parallel; return the addresses of each, as :func:`addresses` does."""
     names = list(dict.fromkeys(hosts))
     found = in_parallel(_ask_resolver, names, timeout)
     return {
@@ -157,7 +151,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 
 
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Return the same; raises OSError. A name server that is out of reach would keep its client for half a minute."""
+    """Look up a name as :func:`addresses` does, but raise OSError. The system's own timeout is half a minute."""
     (found,) = in_parallel(_ask_resolver, [host], timeout)
     if isinstance(found, Exception):
         raise socket.gaierror(socket.EAI_NONAME, f"the name '{host}' is not known") from found
@@ -171,12 +165,12 @@ def _ask_resolver(name: str) -> list[str]:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a name or address is one by which a machine reaches itself alone."""
+    """Return whether a name or address is a loopback address."""
     return host in {"localhost", "ip6-localhost", "::1"} or host.startswith("127.")
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether this machine has an address: no other can be bound."""
+    """Return whether an address is one of this machine's: others cannot be bound."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -187,7 +181,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return the address of this machine as another one sees it; "" without a route. Nothing is sent."""
+    """Return this machine's address on the route to another one; "" without a route. Sends nothing."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -198,7 +192,7 @@ def own_address_towards(address: str) -> str:
 
 
 def host_port(uri: str) -> tuple[str, int]:
-    """(host, port) of ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) where it is not such a URI."""
+    """Return (host, port) from ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) for any other string."""
     try:
         parts = urlsplit(uri)
         return parts.hostname or "", parts.port or 0
@@ -209,9 +203,9 @@ def host_port(uri: str) -> tuple[str, int]:
 def read_topic(
     uri: str, topic: str, caller_id: str, timeout: float = CONNECT_SECONDS, *, wait: bool = False
 ) -> tuple[Header, bytes]:
-    """Return what the publisher at ``uri`` (its Slave API) says of a topic, and with ``wait`` its first message.
+    """Return the connection header of the publisher at ``uri`` (its Slave API) and, with ``wait``, its first message.
 
-    ``timeout`` seconds are for each step. Raise RpcError, WireError, OSError.
+    Each step has ``timeout`` seconds. Raise RpcError, WireError or OSError.
     """
     look_up(host_port(uri)[0])
     with contextlib.closing(SlaveProxy(uri, caller_id, timeout, same_host=False)) as slave:
@@ -232,7 +226,7 @@ def read_topic(
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
-    """Return a block with its length in front. Raise WireError, OSError."""
+    """Return a block that is preceded by its length. Raise WireError or OSError."""
 
     def exactly(count: int) -> bytes:
         data = b""
@@ -252,9 +246,9 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 def in_parallel(
     function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
 ) -> list[_R | Exception]:
-    """Return what ``function`` returns, or the error it raises, for each argument; TimeoutError for what takes longer.
+    """Return the result of ``function``, or its exception, for each argument; TimeoutError for one that takes longer.
 
-    Daemon threads: a look-up of a name cannot be ended, and must not keep the program.
+    Runs in daemon threads: a name lookup cannot be cancelled, and must not keep the program from exiting.
     """
     waiting = list(enumerate(arguments))
     results: list[_R | Exception] = [TimeoutError("timed out")] * len(waiting)

@@ -1,4 +1,4 @@
-"""The nodes of a crowded master whose port nobody listens at."""
+"""Find the dead nodes of a nearly full master: those whose port refuses connections."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _SECONDS = 3.0
 
 
 async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncIterator[tuple[str, str]]:
-    """Yield the nodes (name -> URI), and their URIs, that refuse connections. Each host and port is called once.
+    """Yield (name, URI) of each node in ``nodes`` (name -> URI) that refuses connections. Connect to each host and port once.
 
-    A node that does not answer is not one of them: it may be slow, or behind a network that is down.
+    A node that does not answer is not reported: it may be slow, or its network may be down.
     """
     names: dict[str, list[str]] = {}
     for name, uri in nodes.items():

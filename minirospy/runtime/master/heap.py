@@ -1,4 +1,4 @@
-"""The C library's heap: large blocks are given back to the system when they are freed."""
+"""Settings of the C library's heap, so that freed blocks are returned to the system."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _LARGE = 256 * 1024
 
 
 def return_large_blocks(least: int = _LARGE) -> None:
-    """Have glibc map each block of ``least`` bytes and more by itself. No effect on other systems and C libraries.
+    """Have glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
 
-    glibc does so for blocks of 128 KiB at first, but once a larger one is freed, up to 32 MiB, it takes those of that size
-    from its heap, which shrinks from its end only: after some large bodies a master kept 270 MiB that nobody used. To
-    grow such a block on the heap is to copy it, too, while a mapping grows in place. Source: mallopt(3).
+    By default glibc maps blocks from 128 KiB on. But once a larger block (up to 32 MiB) is freed, glibc allocates that size
+    from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused memory.
+    Growing such a block on the heap also copies it, while a mapping grows in place. Source: mallopt(3).
     """
     if sys.platform != "linux":
         return
@@ -28,14 +28,14 @@ def return_large_blocks(least: int = _LARGE) -> None:
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # As glibc has it: else the heap's end goes back and forth with each block of 128 KiB and more.
+            # The same ratio as glibc's default; otherwise each block above 128 KiB grows and shrinks the heap's end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 
 def return_free_memory() -> None:
-    """Have glibc give what is free back to the system. No effect on other systems and C libraries; takes up to 0.1 s.
+    """Have glibc return free memory to the system; takes up to 0.1 s. No effect on other systems and C libraries.
 
-    glibc's heaps shrink from their ends only, and each of Zenoh's threads has one. Source: malloc_trim(3).
+    A glibc heap shrinks only from its end, and each thread of Zenoh has its own heap. Source: malloc_trim(3).
     """
     if sys.platform != "linux":
         return

@@ -1,9 +1,9 @@
 """The master's journal on disk: the state that the successor of a killed master recovers.
 
-One file for each user and port, ``ROS_HOME/master/journal-PORT``. A record is written, without fsync, before
-the caller gets its answer: so a kill -9 loses nothing that was answered. A power cut may lose the last seconds,
-together with the nodes of this machine. The file is rewritten, and then synced, once it has grown
-to several times what it holds. A master that shuts down cleanly removes it: the next session starts empty.
+There is one file per user and port, ``ROS_HOME/master/journal-PORT``. Each record is written, without fsync, before
+the caller gets its answer, so kill -9 loses nothing that was answered. A power cut may lose the last seconds, but it
+also ends the nodes of this machine. The file is rewritten, and then synced, once it has grown to several times the size
+of the state. A master that shuts down cleanly removes the file: the next session starts empty.
 """
 
 from __future__ import annotations
@@ -31,15 +31,14 @@ _COMPACT_BYTES = 1024 * 1024
 _COMPACT_FACTOR = 4
 _STEP_RECORDS = 200
 
-RETRY_SECONDS = 30.0
-"""After this the journal is tried again that could not be written."""
+RETRY_SECONDS = 30.0  # seconds before writing the journal again after a failure
 
 _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
-"""The errors of locking a file that another process has locked; the last two are those of Windows."""
+"""The errors of locking a file that another process has locked; Windows raises the last two."""
 
 
 class JournalBusyError(Exception):
-    """Another master holds the journal; ``pid`` is its process, 0 if that is not known."""
+    """Another master has locked the journal; ``pid`` is its process id, or 0 if unknown."""
 
     def __init__(self, path: Path, pid: int) -> None:
         super().__init__(path, pid)
@@ -51,9 +50,9 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The journal that a killed master left; ``age``: seconds since it last wrote.
+    """The state in the journal of a killed master; ``age``: seconds since its last write.
 
-    ``copy`` is the file to which a damaged journal was copied, None if that was not possible.
+    ``copy`` is the path of the copy of a damaged journal, or None if the copy failed.
     """
 
     recovered: Recovered
@@ -65,8 +64,8 @@ class Left(NamedTuple):
 class Journal:
     """An open journal. ``snapshot`` returns the records that make up the present state, for a rewrite.
 
-    In this order: :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`. Where the disk fails, from the
-    first step on, the master runs without; ``trouble`` is the reason, and a whole rewrite is tried every half minute.
+    Call :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`, in this order. If the disk fails at any step,
+    the master runs without a journal: ``trouble`` is the reason, and a complete rewrite is retried every half minute.
     """
 
     def __init__(
@@ -76,7 +75,7 @@ class Journal:
         clock: Callable[[], float] = time.monotonic,
         start_steps: Callable[[Steps[None]], object] = finish,
     ) -> None:
-        """``start_steps`` runs what takes long, as a rewrite of a journal that has grown: here and now, or in steps."""
+        """Take ``start_steps``, which runs long work, such as rewriting a large journal: immediately, or in steps."""
         self.path = path
         self._start_steps = start_steps
         self._snapshot = snapshot
@@ -87,16 +86,16 @@ class Journal:
         self._size = 0
         self._compact_at: int
         self._failed_at: float
-        self.trouble = ""
-        """Why nothing is written at present."""
+        self.trouble = ""  # the reason why nothing is written at present, or ""
 
-        # The numbers of large values that are being stored, and the last number.
+        # The numbers of the large values that are being stored, and the last number used.
         self._stored: set[int] = set()
         self._number = 0
-        # While the journal is rewritten in steps: what was appended since, and the new file.
+        # During a rewrite in steps: the records appended since it started, and the new file.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Each rewrite in steps that ended or was given up counts: the one that finds another number is that one.
+        # Counts the rewrites in steps that finished or were abandoned, so that a rewrite can see that it was
+        # abandoned.
         self._rewrites = 0
 
     @property
@@ -105,13 +104,13 @@ class Journal:
         return self._size
 
     def lock(self) -> None:
-        """Make this process the only one that writes the journal. Raise OSError or JournalBusyError."""
+        """Lock the journal, so that only this process writes it. Raise OSError or JournalBusyError."""
         if self._lock is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
 
     def read(self) -> Left | None:
-        """Return what another master has left, None if that is nothing."""
+        """Return the state that another master left, or None if there is none."""
         try:
             data, written = private_files.read_file(self.path)
         except (FileNotFoundError, NotADirectoryError):
@@ -126,12 +125,12 @@ class Journal:
         return Left(recovered, max(0.0, time.time() - written), same_boot, copy)
 
     def discard(self) -> None:
-        """Drop what another master has left."""
+        """Discard the state that another master left."""
         with contextlib.suppress(OSError):
             self.path.unlink()
 
     def start(self) -> None:
-        """Write the present state, and each change from here on. Never raises: see ``trouble``."""
+        """Write the present state; from now on :meth:`append` writes each change. Never raises: see ``trouble``."""
         try:
             self.lock()
             self.rewrite()
@@ -139,7 +138,7 @@ class Journal:
             self._fail(error)
 
     def rewrite(self) -> None:
-        """Write the present state and nothing else. Raise OSError; the old file then remains."""
+        """Replace the file's contents by the present state. Raise OSError; the old file then remains."""
         head = HEAD + serialize_record(["boot", boot_id()])
         data = head + b"".join(serialize_record(record) for record in self._snapshot())
         self._abandon()
@@ -150,10 +149,10 @@ class Journal:
             os.fsync(file)
             file = self._put_in_place(file)
         except BaseException:
-            # Windows has closed it already.
+            # Windows has already closed it.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # On a full disk it takes the room that the old one may need.
+            # On a full disk, free the space: the old file may need it.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -168,7 +167,7 @@ class Journal:
         try:
             if record[0] == "put":
                 if record[2] not in self._stored:
-                    # The disk failed meanwhile, and the parts of the value went with the old file.
+                    # The disk failed meanwhile, and the parts of the value were lost with the old file.
                     self.rewrite()
                     return
                 self._stored.discard(record[2])
@@ -181,7 +180,7 @@ class Journal:
             self._log_trouble()
 
     def store(self, value: object) -> Steps[int]:
-        """Write a large value in parts; return the number by which a record "put" refers to it. Never raises."""
+        """Write a large value in parts; return the number by which a "put" record refers to it. Never raises."""
         while self._is_rewriting:
             yield PAUSE
 
@@ -215,7 +214,7 @@ class Journal:
             self._since.append(data)
 
     def _rewrite_in_steps(self, number: int) -> Steps[None]:
-        """Do the same as :meth:`rewrite`, while others append."""
+        """Do the same as :meth:`rewrite`, in steps, while :meth:`append` goes on."""
         size = 0
         try:
             if number != self._rewrites:
@@ -230,7 +229,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # The disk may take long, and other writers to the file wait for it.
+            # Syncing may take long, and other writes to the file wait for it.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():
@@ -246,23 +245,23 @@ class Journal:
             _log.warning("the journal %s could not be rewritten, it keeps growing: %s", self.path, error)
             self._compact_at = 2 * self._size
             if self._file is None:
-                # On Windows the old file is closed by then.
+                # On Windows the old file is already closed here.
                 self._fail(error)
         finally:
             if number == self._rewrites:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write what was appended since to the new file; return how many bytes. Raise OSError."""
+        """Write the records appended since the rewrite started to the new file; return the number of bytes. Raise OSError."""
         data = b"".join(self._since or ())
         _write_all(file, data)
         self._since = []
         return len(data)
 
     def _put_in_place(self, file: int) -> int:
-        """Give the new file, which is synced, the journal's name; return it, open. Raise OSError."""
+        """Rename the new, synced file to the journal's name; return its open descriptor. Raise OSError."""
         if sys.platform == "win32":
-            # Windows replaces no file that is open, and with none that is.
+            # Windows can neither replace an open file nor rename one.
             self._close_file()
             os.close(file)
             private_files.replace_file(self._new_path, self.path)
@@ -279,7 +278,7 @@ class Journal:
         self.trouble = ""
 
     def _abandon(self) -> None:
-        """Give up a rewrite in steps. Idempotent."""
+        """Abandon a rewrite in steps. Idempotent."""
         self._rewrites += 1
         self._since = None
         if self._second is not None:
@@ -290,7 +289,7 @@ class Journal:
                 self._new_path.unlink()
 
     def retry(self) -> None:
-        """Write the present state where nothing could be written half a minute ago. Never raises."""
+        """Write the present state if writing failed at least half a minute ago. Never raises."""
         if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:
@@ -304,14 +303,14 @@ class Journal:
             os.utime(self.path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
 
     def remove(self) -> None:
-        """Shut down cleanly: nothing is left to recover. Idempotent."""
+        """Remove the journal after a clean shutdown, so that nothing is recovered. Idempotent."""
         self._close_file()
         if self._lock is not None:
             self.discard()
         self.close()
 
     def close(self) -> None:
-        """Release the file and leave it as it is. Idempotent."""
+        """Close the file and keep its contents. Idempotent."""
         self._abandon()
         self._close_file()
         self.trouble = ""
@@ -366,12 +365,12 @@ class Journal:
 
 
 def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
-    """Yield the bytes of a whole journal, large values in parts."""
+    """Yield the bytes of a complete journal, large values in parts."""
     yield HEAD + serialize_record(["boot", boot_id()])
     written: list[bytes] = []
     for number, record in enumerate(records):
         if record[0] == "set" and not is_small(record[2]):
-            # Numbers below zero: those of values that are stored later are above.
+            # Negative numbers, since values stored later get positive ones.
             for piece in pack_in_steps(record[2]):
                 yield serialize_record(["part", -number - 1, piece])
             written.append(serialize_record(["put", record[1], -number - 1]))
@@ -384,7 +383,7 @@ def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
 
 
 class _Sync(threading.Thread):
-    """Syncs a file, which may take long; ``error`` is what the disk reported."""
+    """A thread that syncs a file, which may take long; ``error`` is the error from the disk."""
 
     def __init__(self, file: int) -> None:
         super().__init__(name="minirospy-journal-sync", daemon=True)
@@ -409,13 +408,16 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """Return a lock that the system releases with this process; the file holds its pid. Raise as Journal.lock."""
+    """Return the descriptor of a lock that the system releases when this process exits; the file contains the process id.
+
+    Raise as Journal.lock.
+    """
     file = private_files.open_file(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            # Beyond the pid, which others have to read.
+            # Lock a byte after the process id, which other processes must be able to read.
             os.lseek(file, 64, os.SEEK_SET)
             try:
                 msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
@@ -430,9 +432,9 @@ def _locked(path: Path, journal: Path) -> int:
             text = os.read(file, 20).strip()
             os.close(file)
             raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
-        # A file system without locks: no other master has this port, at least.
+        # The file system has no locks; but no other master can have the same port.
 
-    # On a full disk the lock holds all the same.
+    # The lock works even if a full disk prevents writing the process id.
     with contextlib.suppress(OSError):
         os.ftruncate(file, 0)
         os.write(file, b"%d\n" % os.getpid())
@@ -440,11 +442,11 @@ def _locked(path: Path, journal: Path) -> int:
 
 
 def boot_id() -> str:
-    """Return an identifier that stays the same until this machine is restarted."""
+    """Return an identifier that changes only when this machine reboots."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:
         import psutil
 
-        # Elsewhere than on Linux the time of the start is counted back from now, to a second or so.
+        # Except on Linux, the boot time is computed back from now and varies by about a second.
         return str(round(psutil.boot_time() / 60))

@@ -1,4 +1,4 @@
-"""The log files of a master: lines are collected and written twice a second, so that thousands a second cost little."""
+"""The log files of a master. Lines are collected and written twice a second, so that thousands per second cost little."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
-_MAX_PENDING = 64 * 1024
-"""Characters that are collected at most: to write megabytes in one go would stop the master for as long."""
+_MAX_PENDING = 64 * 1024  # characters to collect at most: writing megabytes in one go would block the master
 
 
 class LogFileHandler(RotatingFileHandler):
-    """A logging handler that follows no link: the name of a log file can be predicted."""
+    """A logging handler that does not follow symbolic links, since the name of a log file can be predicted."""
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """``most_bytes`` 0: no limit. Raise OSError."""
+        """Open ``path``; ``most_bytes`` 0 means no limit. Raise OSError."""
         super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
@@ -36,10 +35,10 @@ class LogFileHandler(RotatingFileHandler):
 
 
 class LogFile(LogFileHandler):
-    """``path``, of ``most_bytes`` at most, with three older files next to it.
+    """The log file ``path``, of ``most_bytes`` at most, with up to three rotated files.
 
-    As a logging handler it writes warnings and errors immediately. :meth:`line` and :meth:`text` take a text alone, on
-    the loop.
+    Used as a logging handler, it writes warnings and errors immediately. :meth:`line` and :meth:`text` add plain strings,
+    on the loop.
     """
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
@@ -57,7 +56,7 @@ class LogFile(LogFileHandler):
         self.text(f"{self._line_head}{self._stamp(time.time())}: {escaped(text)}")
 
     def text(self, text: str) -> None:
-        """Add a line that has its time and level already (on the loop)."""
+        """Add a line that already contains its time and level (on the loop)."""
         self._add(text + "\n")
         if self._pending > _MAX_PENDING:
             self._write_out()
@@ -65,7 +64,7 @@ class LogFile(LogFileHandler):
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Add a record; from any thread."""
+        """Add a record, from any thread."""
         try:
             self._add(self.format(record) + "\n")
         except Exception:  # noqa: BLE001 - as every handler of logging
@@ -74,11 +73,11 @@ class LogFile(LogFileHandler):
             self._write_out()
 
     def flush(self) -> None:
-        """Write the lines that are pending."""
+        """Write the pending lines."""
         self._write_out()
 
     def close(self) -> None:
-        """Write the lines that are pending, and close. Idempotent."""
+        """Write the pending lines, and close. Idempotent."""
         self._write_out()
         if self._timer:
             self._timer.cancel()
@@ -114,7 +113,7 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. What the stream could not write would fail again when it is closed.
+                # A full disk must not stop the master. Unwritten data in the stream would make its close fail again.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()
@@ -122,7 +121,7 @@ class LogFile(LogFileHandler):
 
 
 class _Formatter(logging.Formatter):
-    """Formats records like the lines; the text of a second is made once."""
+    """Formats records like the other lines; caches the formatted time for each second."""
 
     def __init__(self, stamp: Callable[[float], str]) -> None:
         super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")
@@ -132,6 +131,6 @@ class _Formatter(logging.Formatter):
         return self._stamp(record.created)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
-        # Names and URIs in it are a peer's choice: none may start another line.
+        # Peers choose the names and URIs in the message: these must not start another line.
         record.message = escaped(record.message)
         return super().formatMessage(record)

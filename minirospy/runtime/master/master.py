@@ -1,6 +1,6 @@
-"""The master: its server, its calls to nodes, its journal, and the look at the nodes of a master that was killed.
+"""The master: its server, its calls to nodes, its journal, and the check of a killed master's nodes.
 
-What it answers is in ``core/graph/master_api.py``.
+The answers are computed in ``core/graph/master_api.py``.
 """
 
 from __future__ import annotations
@@ -49,26 +49,25 @@ _CHECKS_AT_ONCE = 100
 _QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 _LOCK_SECONDS = 3.0
+# Seconds between attempts: the system may release a killed master's port before its journal's lock
 _LOCK_PAUSE = 0.02
-"""A master that was killed may release its port a moment before its journal."""
 
-_RESTART_SECONDS = 600.0
-"""A master that starts so soon after the last sign of the one that was killed takes its session up."""
+_RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its session to be continued
 
 _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
-"""The garbage collector's thresholds: 10,000 objects at most are looked at, for some 4 ms; the oldest generation is not
-collected by itself."""
+"""The garbage collector's thresholds: it examines at most 10,000 objects, for some 4 ms; the oldest generation is not
+collected automatically.
+"""
 
-_SWEEP_SECONDS = 10.0
-_FORGOTTEN_AT_ONCE = 20
-"""How often a crowded master looks for dead nodes, and how many it forgets in a turn of the loop."""
+_SWEEP_SECONDS = 10.0  # between a nearly full master's checks for dead nodes
+_FORGOTTEN_AT_ONCE = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
 
 
 class Master(MasterApi):
-    """A ROS master at ``http://host:port/``, listening on ``bind_host``; port 0 takes a free one."""
+    """A ROS master at ``http://host:port/``, listening on ``bind_host``; port 0 means any free port."""
 
     def __init__(
         self,
@@ -84,18 +83,18 @@ class Master(MasterApi):
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
-        """``journal``: the file that keeps what it knows (None: no file); ``fresh``: its contents are dropped.
+        """Take ``journal``, the file that stores the master's state (None: no file); ``fresh`` discards its contents.
 
-        ``timeout``: seconds that a node has to take a call. ``same_host``: processes of this machine may come, and are
-        called, by Unix sockets. ``owns_process``: nothing else runs in it, so the garbage collector is the master's.
+        ``timeout``: seconds that a node has to answer a call. ``same_host``: processes on this machine may connect, and are
+        called, through Unix sockets. ``owns_process``: the process runs only the master, which may tune the garbage collector.
         """
         super().__init__()
         self.host = host
         self.calls = 0
-        # The answer to getSystemState, and after which change of the registry it was written.
+        # The serialized answer to getSystemState, and the registry's change count at which it was serialized.
         self._state = (-1, Serialized(()))
+        # Messages for the user about the start: what was recovered, and what was not
         self.news: list[str] = []
-        """What a person should know of the start: what was recovered, and what was not."""
         self._started = time.monotonic()
         self._journal_path = journal
         self._fresh = fresh
@@ -116,12 +115,11 @@ class Master(MasterApi):
         self._touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
         self._sweeping: asyncio.Task[None] | None = None
-        self.stopped = asyncio.Event()
-        """Set when somebody asked the master to stop."""
+        self.stopped = asyncio.Event()  # set when a stop of the master was requested
 
     @property
     def port(self) -> int:
-        """The port that it listens on."""
+        """The port that the master listens on."""
         return self._server.port
 
     @property
@@ -131,9 +129,9 @@ class Master(MasterApi):
 
     @property
     def session(self) -> str:
-        """The /run_id of the session that was taken up; "" for a new one."""
+        """The /run_id of the continued session; "" if the session is new."""
         found = self.parameters.get("/run_id") if self.parameters.has("/run_id") else ""
-        # It becomes the name of a folder, and anybody may have set it.
+        # It becomes the name of a folder, and any node may have set it.
         return found if isinstance(found, str) and re.fullmatch(r"[\w-]{1,64}", found) else ""
 
     @property
@@ -143,8 +141,8 @@ class Master(MasterApi):
         return self.parameters.has(key) and self.parameters.get(key) is True
 
     async def start(self) -> None:
-        """Take the port, recover what a killed master left, and serve. Raise OSError."""
-        # The port first: of two masters that are started together, the one that gets it has the journal too.
+        """Bind the port, recover the state of a killed master, and serve. Raise OSError."""
+        # Bind the port first: of two masters that start together, the one that gets the port also gets the journal.
         self._server.listen()
         try:
             nodes = await self._open_journal() if self._journal_path else {}
@@ -162,9 +160,9 @@ class Master(MasterApi):
         self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
-        """Stop, as a master should: the next one starts empty. Idempotent.
+        """Stop and remove the journal, so that the next master starts empty. Idempotent.
 
-        With ``keep_journal`` the next one goes on where this one ended.
+        With ``keep_journal`` the next master continues this session.
         """
         for task in (self._checking, self._sweeping):
             if task:
@@ -182,11 +180,11 @@ class Master(MasterApi):
                 self._journal.remove()
 
     def attach(self, node: Node) -> None:
-        """``node``, which has started, is on this loop: it is notified of publishers without a call."""
+        """Notify ``node``, which has started on this loop, of publishers directly, without an XML-RPC call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call of a client, perhaps as XML already. Raise RpcFault as :meth:`dispatch`."""
+        """Return the answer to one call from a client, possibly already serialized. Raise RpcFault as :meth:`dispatch`."""
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
             if self._state[0] == self.registry.changes:
@@ -196,11 +194,11 @@ class Master(MasterApi):
         return self.dispatch(method, args)
 
     def _write_state(self) -> Steps[Serialized]:
-        """Return the system state as it is sent: it takes long to write, and tools request it all the time."""
+        """Return the serialized system state. It is cached, since it is slow to serialize and tools request it all the time."""
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # It was written while this client waited.
+            # It was serialized while this client waited.
             return self._state[1]
 
         changes = self.registry.changes
@@ -212,7 +210,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Call the node that is to be notified."""
+        """Call the node that the notice is for."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
@@ -227,7 +225,7 @@ class Master(MasterApi):
         return self.parameters.get(key) if self.parameters.has(key) else {}
 
     def subscribed_parameters(self, uri: str) -> list[str]:
-        """Return the keys of parameters that the node at ``uri`` has subscribed to."""
+        """Return a parameter's value, or {} if it is not set."""
         return self.parameters.subscribed_keys(uri)
 
     def defer(self, uri: str, topic: str) -> None:
@@ -235,11 +233,11 @@ class Master(MasterApi):
         self._notifier.defer(uri, topic)
 
     def stop(self) -> None:
-        """Somebody asked the master to stop."""
+        """Request the master to stop."""
         self.stopped.set()
 
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
-        """Return the state of this master: minirospy's own, for `minirospy master --status`."""
+        """Return this master's status, for `minirospy master --status`; not part of ROS's API."""
 
         def collect() -> Steps[Answer]:
             if self.parameters.is_large:
@@ -281,7 +279,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover what is in the journal, and begin to write it; return the nodes to be checked, and their URIs."""
+        """Recover the state from the journal, and start to write it; return the nodes to check, with their URIs."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -294,10 +292,10 @@ class Master(MasterApi):
         try:
             await _lock(journal)
         except JournalBusyError as error:
-            # What is there is not ours.
+            # The journal belongs to another master.
             busy = error
         except OSError:
-            # What is there can be read all the same. :meth:`Journal.start` finds out whether it can be written.
+            # The journal may still be readable. :meth:`Journal.start` finds out whether it is writable.
             pass
 
         if busy:
@@ -328,7 +326,7 @@ class Master(MasterApi):
 
         uri = self.registry.node_uri(_OWN_NODE)
         if uri:
-            # The /rosout node went with its master; this one brings its own.
+            # The /rosout node exited with its master; this master starts its own.
             self.registry.forget(_OWN_NODE, uri)
 
         if recovered.damage:
@@ -353,9 +351,9 @@ class Master(MasterApi):
         self.news.append(f"journal: recovered {what}")
 
     def _collect(self) -> None:
-        """Have the garbage collector look at the youngest objects only, and at all of them now and then if they are few.
+        """Have the garbage collector examine only the youngest objects, and all objects now and then if they are few.
 
-        A master of many registrations would stand still while it looks at them, and hardly ever has garbage in cycles.
+        Examining all objects would block a master with many registrations, which hardly ever has cyclic garbage.
         """
         gc.set_threshold(*_COLLECT)
         if not self.registry.is_large and not self.parameters.is_large:
@@ -365,7 +363,7 @@ class Master(MasterApi):
     def _touch(self) -> None:
         assert self._journal
         self._journal.touch()
-        # A graph where nothing changes writes nothing, and would not retry.
+        # An unchanged graph triggers no writes, so a failed write would never be retried.
         self._journal.retry()
         self._touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self._touch)
 
@@ -380,7 +378,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Forget the nodes that are gone; tell the others what they may have missed."""
+        """Forget dead nodes; send the others the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_CHECKS_AT_ONCE)
 
         async def check(name: str, uri: str) -> bool:
@@ -404,7 +402,7 @@ class Master(MasterApi):
     async def _sweep(self) -> None:
         """Forget the nodes whose port refuses connections, whenever the registrations are nearly full.
 
-        Else they would stay full: rosmaster keeps what a node that was killed has registered, and so does this master.
+        Otherwise they would stay full: like rosmaster, this master keeps the registrations of a killed node.
         """
         while True:
             await asyncio.sleep(_SWEEP_SECONDS)
@@ -431,7 +429,7 @@ class Master(MasterApi):
 
 
 async def _lock(journal: Journal) -> None:
-    """Lock the journal, as Journal.lock; wait a moment where it is held. The caller has the port."""
+    """Lock the journal, as Journal.lock; if it is locked, retry for a moment. The caller has bound the port."""
     from minirospy.runtime.master.journal import JournalBusyError
 
     end = time.monotonic() + _LOCK_SECONDS
@@ -447,7 +445,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Return whether the node still is where it was; any answer will do, unless it is another node's name."""
+    """Return whether the node still is at its URI. Any answer counts, except the name of another node."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)
@@ -455,7 +453,7 @@ async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries
             if isinstance(error.__cause__, (ConnectionRefusedError, EOFError)):
                 return False
         except RpcError:
-            # roscpp has no getName, and says so.
+            # roscpp has no getName and returns an error.
             return True
         else:
             return not (
@@ -476,7 +474,7 @@ def _ago(seconds: float) -> str:
 
 
 def _names_of(host: str, bind_host: str) -> list[str]:
-    """Return what ROS_MASTER_URI may call a master that listens on ``bind_host``."""
+    """Return the host names that ROS_MASTER_URI may contain for a master that listens on ``bind_host``."""
     names = [host]
     if bind_host in {"127.0.0.1", "0.0.0.0", "::"}:
         names.append("localhost")

@@ -1,4 +1,4 @@
-"""The master's calls to nodes: in order for each node, side by side for all, so that none waits for another."""
+"""The master's calls to nodes: in order for each node, and concurrent for different nodes, so that none delays another."""
 
 from __future__ import annotations
 
@@ -35,27 +35,24 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
-_SECONDS_PER_TURN = 0.003
-"""Of the loop, for starting calls."""
+_SECONDS_PER_TURN = 0.003  # of each loop iteration, to start calls
 
+# Pending parameter notices per node; beyond that, one notice for each subscribed key replaces them
 _MAX_PARAMETERS = 32
-"""Parameters of which a node is still to be notified; beyond that, those that it has subscribed to are one each."""
 
-_LARGE_BYTES = 32 * 1024 * 1024
-"""Bytes of large calls that are under way, before the next one waits."""
+_LARGE_BYTES = 32 * 1024 * 1024  # of large calls in progress, before the next one waits
 
-_MAX_ANSWER = 65536
-"""Nobody reads what a node answers to a notice."""
+_MAX_ANSWER = 65536  # bytes of a node's answer to a notice, which is ignored
 
 
 class State(Protocol):
-    """The graph and the parameters, as they are when a node is called."""
+    """The graph and the parameters at the time when a node is called."""
 
     def publisher_uris(self, topic: str) -> list[str]:
         """Return the URIs of a topic's publishers."""
 
     def parameter(self, key: str) -> object:
-        """Return a parameter's value, {} where it is not set; it is not changed afterwards."""
+        """Return a parameter's value, or {} if it is not set; the value does not change afterwards."""
 
     def subscribed_parameters(self, uri: str) -> list[str]:
         """Return the keys that the node at ``uri`` has subscribed to."""
@@ -67,16 +64,15 @@ class _Backlog:
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
-    parameters: int = 0
-    """How many of them are of parameters."""
+    parameters: int = 0  # number of pending parameter notices
+    # Topic -> time before which no notice of it is sent
     pauses: dict[object, float] = field(default_factory=dict)
-    """Until when no more is said of a topic."""
     timer: asyncio.TimerHandle | None = None
 
 
 @dataclass(eq=False, slots=True)
 class _Line:
-    """Nodes that wait for their call; ``most`` are called concurrently."""
+    """Nodes that wait for their call; at most ``most`` are called concurrently."""
 
     most: int
     under_way: int = 0
@@ -84,24 +80,23 @@ class _Line:
 
 
 class Notifier:
-    """Sends notices. A node that did not answer the last one shares a few slots with its like.
+    """Sends notices. Nodes that did not answer the last notice share a few call slots.
 
-    Of a topic's publishers, or a parameter's values, only the newest waits: an older one is of no use to
-    anybody. A very long list costs its reader time, so of a topic with thousands of publishers the next list
-    follows after a pause.
+    Only the newest list of a topic's publishers, or value of a parameter, is queued: older ones are obsolete. Processing a
+    very long list costs the receiver time, so for a topic with thousands of publishers the next list follows after a pause.
     """
 
     def __init__(self, state: State, turns: Turns, timeout: float, *, same_host: bool = True) -> None:
-        """Take ``turns``, which run what takes long, and ``timeout``, the seconds that a call may take."""
+        """Take ``turns``, which run long work, and ``timeout``, the time limit of a call in seconds."""
         self._state = state
         self._turns = turns
         self._timeout = timeout
         self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
-        """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
+        """URI of a node on this loop -> function called with a topic and its publishers in place of an XML-RPC call."""
         self._nodes: dict[str, _Backlog] = {}
-        # URI and topic -> until when nothing is said of it, the first to end in front.
+        # (URI, topic) -> time before which no notice of it is sent, the earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
         self._line = _Line(_CALLS_AT_ONCE)
@@ -110,26 +105,26 @@ class Notifier:
         self._starts_soon = False
         self._closed = False
 
-        # The last update that was written: the subscribers of one topic all get the same bytes.
+        # The last serialized update: all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
-        # The same for a large one, of a topic or a parameter.
+        # The same for a large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
-        # Large calls that wait; bytes of those that are under way; whether one is being written.
+        # Large calls that wait; the bytes of those in progress; whether one is being serialized.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
         self._is_writing = False
 
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notices to a node whose answer reports a topic, or PARAMETERS, as it is now.
+        """Delay notices to a node whose pending answer contains the current state of a topic, or of PARAMETERS.
 
-        A node of rospy that takes the update first and then the answer goes by the answer, the older of the two.
+        A rospy node that receives the update first and then the answer applies the answer, which is the older of the two.
         """
         now = asyncio.get_running_loop().time()
         while self._held and next(iter(self._held.values())) <= now:
             del self._held[next(iter(self._held))]
         self._held.pop((uri, topic), None)
-        # All that end within one tick wake the master once.
+        # Round up to a tick, so that all delays that end within one tick wake the master once.
         self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
 
     def send(self, notice: Notice) -> None:
@@ -151,7 +146,7 @@ class Notifier:
 
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
-        # A parameter comes after what was sent of its parents and children meanwhile.
+        # Move a parameter's notice behind the pending ones of its parents and children.
         if isinstance(notice, ParameterUpdate) and node.notices.pop(key, None) is None:
             node.parameters += 1
         node.notices[key] = notice
@@ -162,7 +157,7 @@ class Notifier:
             self._go_on(node)
 
     async def close(self) -> None:
-        """Give up what waits."""
+        """Discard the pending notices."""
         self._closed = True
         for node in self._nodes.values():
             if node.timer:
@@ -170,7 +165,7 @@ class Notifier:
         await self._rpc.close()
 
     def _summarize(self, node: _Backlog) -> None:
-        """Replace the notices of many parameters by one for each subscription of the node."""
+        """Replace the notices of many parameters by one for each key that the node subscribed to."""
         for key in [key for key, notice in node.notices.items() if isinstance(notice, ParameterUpdate)]:
             del node.notices[key]
         for name in self._state.subscribed_parameters(node.uri):
@@ -198,7 +193,7 @@ class Notifier:
                 self._call(line.waiting.popleft(), line)
 
     def _call(self, node: _Backlog, line: _Line) -> None:
-        """Send a node the first notice that need not wait."""
+        """Send a node its first notice that is not paused."""
         key = next((key for key in node.notices if key not in node.pauses), None)
         if key is None:
             self._go_on(node)
@@ -231,12 +226,12 @@ class Notifier:
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
-        """Send a large notice as soon as there is memory for it."""
+        """Send a large notice as soon as the memory limit allows."""
 
         def start() -> None:
             self._turns.start(self._call_in_steps(node, line, notice, count))
 
-        # Nodes that answered last time come first.
+        # Nodes that answered the last notice come first.
         (self._large.append if line is self._suspect_line else self._large.appendleft)(start)
         self._start_large()
 
@@ -280,7 +275,7 @@ class Notifier:
     def _called(
         self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
-        """Go on after a call that listed ``count`` publishers, ``size`` bytes if it was large."""
+        """Continue after a call that listed ``count`` publishers; ``size`` is its bytes if it was large."""
 
         line.under_way -= 1
         self._large_bytes -= size
@@ -307,7 +302,7 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Backlog) -> None:
-        """Line the node up where there is something to say; else wait for the end of a pause, if there is one."""
+        """Queue the node if it has a notice to send; otherwise wait for the end of its first pause, if any."""
         if node.timer:
             node.timer.cancel()
             node.timer = None
@@ -318,7 +313,7 @@ class Notifier:
         if any(key not in node.pauses for key in node.notices):
             self._line_up(node)
         elif node.pauses:
-            # A timer may be early by as much as the clock's resolution.
+            # A timer may fire early by up to the clock's resolution.
             node.timer = loop.call_at(min(node.pauses.values()) + _TICK, self._go_on, node)
         else:
             del self._nodes[node.uri]

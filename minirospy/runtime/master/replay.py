@@ -1,6 +1,6 @@
-"""The records of the master's journal: applied to a registry and parameters, and written from them.
+"""Convert between journal records and the master's state: apply records to a registry and parameters, and write them.
 
-A record is a change: its name and its arguments. ``runtime/master/journal.py`` keeps them in a file.
+A record is a change: its name and its arguments. ``runtime/master/journal.py`` stores records in a file.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ class Replay:
     def __init__(self, registry: Registry, parameters: ParameterTree) -> None:
         self._registry = registry
         self._parameters = parameters
-        # Large values whose parts have been found.
+        # The parts found so far of each large value, by number.
         self._parts: dict[int, list[bytes]] = {}
 
     def apply(self, what: str, *args: Any) -> None:
-        """Make one change again; the nodes that it notified then are not notified again.
+        """Apply one change; the nodes that were notified of it then are not notified again.
 
-        Raise TypeError, ValueError, KeyError or MinirospyError if the record makes no sense.
+        Raise TypeError, ValueError, KeyError or MinirospyError if the record is invalid.
         """
         registry, parameters = self._registry, self._parameters
         actions: Iterable[Notice] = ()
@@ -76,12 +76,12 @@ class Replay:
 
 
 def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[object]]:
-    """Return the changes that lead from nothing to the present state, with the order of every table.
+    """Return the changes that lead from an empty state to the present one, preserving the order of every table.
 
-    The state is copied here and now: the changes may be read while it goes on changing.
+    The state is copied immediately: the returned changes may be read while the state changes further.
     """
     uris, types = registry.nodes(), registry.topic_types()
-    # Each of them is a copy.
+    # Each of these is a copy.
     publications, subscriptions = registry.publications(), registry.all_subscriptions()
     offers, subscribed = list(registry.offers()), list(parameters.subscriptions())
     tree = parameters.get("/")
@@ -96,6 +96,6 @@ def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[o
 
 
 def forget_node(registry: Registry, parameters: ParameterTree, name: str, uri: str) -> list[Notice]:
-    """Forget all that the node ``name`` at ``uri`` has registered; return who is to be notified."""
+    """Forget everything that the node ``name`` at ``uri`` has registered; return the notices to send."""
     parameters.unsubscribe_node(name, uri)
     return list(registry.forget(name, uri))

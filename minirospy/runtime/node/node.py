@@ -1,6 +1,6 @@
-"""A node: its servers, its registrations with the master, and the connections of its peers.
+"""A node: its servers, its registrations with the master, and its connections to peers.
 
-Everything here runs on one event loop; a process may hold several nodes. ``minirospy.client`` is the blocking
+Everything here runs on one event loop; a process may have several nodes. ``minirospy.client`` is the blocking
 API in front of it.
 """
 
@@ -31,21 +31,19 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_MAX_IDLE = 200
-"""Idle connections to the Slave API; a graph has about as many as this node has peers."""
+_MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
 
-_STALE_SECONDS = 5.0
-"""How long a master may still send a list of publishers to a node that has unsubscribed."""
+_STALE_SECONDS = 5.0  # during which the master may still send lists of publishers after an unsubscription
 
 _REQUEST_AGAIN_SECONDS = 0.5
 
 
 class Node:
-    """A node of the computation graph, named globally (``/talker``).
+    """A node of the computation graph, with a global name (``/talker``).
 
-    ``await start()`` opens its servers; ``advertise``, ``subscribe`` and ``serve`` register with the master
-    and raise MasterUnreachableError or RpcRefused where that fails, with the topic or service in place all
-    the same: it is registered later. Methods are called on the loop, unless they say otherwise.
+    ``await start()`` opens its servers. ``advertise``, ``subscribe`` and ``serve`` register with the master. If that
+    fails, they raise MasterUnreachableError or RpcRefused, but the topic or service remains and is registered later.
+    Call the methods on the loop, unless stated otherwise.
     """
 
     def __init__(
@@ -57,7 +55,7 @@ class Node:
         on_parameter: Callable[[str, object], None] | None = None,
         watch_seconds: float = 2.0,
     ) -> None:
-        """``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
+        """Take the functions ``on_shutdown(reason)`` and ``on_parameter(key, value)``, which are called in a worker.
 
         Every ``watch_seconds`` the node checks whether the master still knows it.
         """
@@ -67,10 +65,9 @@ class Node:
         self.publications: dict[str, Publication] = {}
         self.subscriptions: dict[str, Subscription] = {}
         self.services: dict[str, ServiceServer] = {}
-        self._left: dict[str, asyncio.TimerHandle] = {}
-        """Topics with a subscription that has ended recently."""
+        self._left: dict[str, asyncio.TimerHandle] = {}  # topics unsubscribed from recently
+        # Topics whose publishers will be requested from the master again
         self._requesting: dict[str, asyncio.TimerHandle] = {}
-        """Topics whose publishers are to be requested from the master again."""
 
         self.uri = ""
         self._on_shutdown = on_shutdown
@@ -88,34 +85,33 @@ class Node:
         }
         self._registrations = Registrations(name, environment, tables, self._rpc, self.workers, watch_seconds)
         self.parameters = self._registrations.parameters
-        """The parameters that this node has subscribed to at the master; the caller that subscribes adds them."""
+        """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
         self.when_registered_again = self._registrations.when_registered_again
-        """Called in workers when the master had forgotten this node: to register what else it needs."""
+        """Functions that register further state, called in workers after the master had lost this node."""
 
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
         self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
         self._unix_listener = tcp.Listener(self._accept)
+        # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
-        """The value of :func:`local.this_host`, where this node uses Unix sockets too."""
-        self.unix_name = ""
-        """Where topics are served to processes of this machine; "" where they are not."""
+        self.unix_name = ""  # name of the Unix socket that serves topics to processes on this machine, or ""
 
         self._closed = False
         self._unregistering: asyncio.Task[None] | None = None
 
     @property
     def tcpros_port(self) -> int:
-        """The port where topics and services of this node are served."""
+        """The port that serves this node's topics and services."""
         return self._listener.port
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and holds a lock. From any thread."""
+        """Return whether a thread is publishing, and so holds a lock. From any thread."""
         return any(publication.is_sending for publication in list(self.publications.values()))
 
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
-        """Open the node's servers; port 0 takes a free one. Raise OSError."""
+        """Open the node's servers; port 0 means any free port. Raise OSError."""
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
@@ -147,14 +143,14 @@ class Node:
     async def close(self, *, announces: bool = True) -> None:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
-        Waits for the master as :meth:`Registrations.close` does, or until :meth:`stop_unregistering` is called; a master
-        that does not answer keeps the registrations that it has. ``announces``: whether a line is logged when it takes long.
+        Waits for the master as :meth:`Registrations.close` does, or until :meth:`stop_unregistering` is called. If the master
+        does not answer, it keeps the remaining registrations. ``announces``: whether to log a line when this takes long.
         """
         if self._closed:
             return
         self._closed = True
         self._unregistering = asyncio.ensure_future(self._registrations.close(announces=announces))
-        # Its first call is sent before anything else is done.
+        # Send the first call before doing anything else.
         await asyncio.sleep(0)
 
         for timer in [*self._left.values(), *self._requesting.values()]:
@@ -166,7 +162,7 @@ class Node:
             return_exceptions=True,
         )
 
-        # Its name goes before the port, which the next server takes with its own name.
+        # Close the Unix socket before the port: the next server on that port uses the same socket name.
         await close_all([self._unix_listener.close, self._listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])
@@ -175,7 +171,7 @@ class Node:
         await close_all([*waits, *servers, self._rpc.close, self._registrations.cancel])
 
     def stop_unregistering(self) -> None:
-        """Let :meth:`close` return although the master has not answered (on the loop)."""
+        """Let :meth:`close` return even if the master has not answered (on the loop)."""
         if self._unregistering:
             self._unregistering.cancel()
 
@@ -187,7 +183,7 @@ class Node:
         return await self._registrations.call(method, *args)
 
     async def advertise(self, publication: Publication) -> None:
-        """Publish a topic. One publication a topic: a second is a ValueError."""
+        """Publish a topic. Raise ValueError if this node already publishes it."""
         if self.publications.setdefault(publication.topic, publication) is not publication:
             raise ValueError(f"{self.name} publishes {publication.topic} already")
         await self._registrations.update(("Publisher", publication.topic))
@@ -230,7 +226,7 @@ class Node:
         )
 
     async def subscribe(self, subscription: Subscription) -> None:
-        """Subscribe to a topic. One subscription a topic: a second is a ValueError."""
+        """Subscribe to a topic. Raise ValueError if this node already subscribes to it."""
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
@@ -263,13 +259,13 @@ class Node:
         )
 
     async def serve(self, server: ServiceServer) -> None:
-        """Offer a service. One of a name: a second is a ValueError."""
+        """Offer a service. Raise ValueError if this node already offers it."""
         if self.services.setdefault(server.name, server) is not server:
             raise ValueError(f"service [{server.name}] already registered")
         await self._registrations.update(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
-        """Stop offering a service; calls under way are ended."""
+        """Stop offering a service; cancel the calls in progress."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()
@@ -277,26 +273,26 @@ class Node:
 
     @property
     def service_uri(self) -> str:
-        """Where this node's services are called: ``rosrpc://host:port``."""
+        """The address of this node's services: ``rosrpc://host:port``."""
         return f"rosrpc://{self.environment.uri_host}:{self.tcpros_port}"
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Take over the master's list of a topic's publishers."""
+        """Apply the master's list of a topic's publishers."""
         subscription = self.subscriptions.get(topic)
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # It may have been meant for the subscription before: rosmaster's lists wait in a queue.
+                # The list may have been meant for the previous subscription: rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
     def parameter_changed(self, key: str, value: object) -> None:
-        """Pass on a parameter's new value, of which the master has notified this node."""
+        """Pass on a parameter's new value that the master has sent."""
         if self._on_parameter:
             self._parameter_updates.start(self._on_parameter, key, value)
 
     def request_shutdown(self, reason: str) -> None:
-        """Stop on the request of another process."""
+        """Shut down at the request of another process."""
         if self._on_shutdown:
             self.workers.start(self._on_shutdown, reason)
 
@@ -305,13 +301,13 @@ class Node:
         self._registrations.request_again(topic)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
-        """Serve a peer that has connected: its header names a topic or service."""
+        """Serve a connected peer, whose header names a topic or service."""
         try:
             fields = await tcp.receive_header(sock, memory=self._header_memory)
         except (OSError, WireError):
             if not self._closed:
                 raise
-            sock.close()  # the master has notified the peer that this node leaves
+            sock.close()  # the master has already notified the peer that this node is leaving
             return
 
         if "service" in fields:
@@ -336,7 +332,7 @@ class Node:
             sock.close()
 
     def _open_unix_listener(self) -> None:
-        """Serve topics and services by a Unix socket too, where there are such sockets."""
+        """Serve topics and services through a Unix socket too, if the system supports it."""
         sock = local.bind(self.environment.uri_host, self.tcpros_port)
         if sock:
             self.this_host = local.this_host()

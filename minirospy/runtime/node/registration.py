@@ -1,7 +1,7 @@
-"""The registrations of a node: what the master knows of it, and what it should know.
+"""The registrations of a node: those that the master has, and those that it should have.
 
-Registrations are ordered, retried until the master has them, made again after it has restarted, and undone when the node closes.
-Source: http://wiki.ros.org/ROS/Master_API.
+Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and undone when the
+node closes. Source: http://wiki.ros.org/ROS/Master_API.
 """
 
 from __future__ import annotations
@@ -32,35 +32,32 @@ from minirospy.runtime.transport.workers import InOrder, Workers
 __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
+# Time limit of a call; on a small computer, many nodes that start together wait for each other
 _CALL_SECONDS = 30.0
-"""How long a call of the master may take: one of many nodes that start together on a small computer waits for its turn."""
 
-_LOOK_SECONDS = 5.0
-"""How long the master may take to answer whether it knows this node: it is asked again soon."""
+_LOOK_SECONDS = 5.0  # time limit of the check whether the master knows this node, which is repeated soon
 
 _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
-"""A closing node gives up on a master that answers nothing for this long; the shorter limit is for one that was already
-silent before. The total is not limited: a busy master that answers call after call is waited for."""
+"""A closing node gives up if the master answers nothing for this many seconds; the shorter limit applies if the master
+was already silent before. The total is not limited: the node waits for a busy master that keeps answering.
+"""
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0
-"""How often a closing node checks that the master answers anything."""
+_PROBE_SECONDS = 3.0  # between checks of a closing node that the master still answers
 
-_NOTICE_SECONDS = 3.0
-"""A node that is still waiting for the master after this says so."""
+_NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
-_CALLS_AT_ONCE = 100
-"""Unregistrations in one system.multicall."""
+_CALLS_AT_ONCE = 100  # unregistrations per system.multicall
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
-"""The kind of a part, as in the names of the master's calls ("Publisher"), and its topic or name."""
+"""The kind of a registration, as in the names of the master's methods ("Publisher"), and its topic or name."""
 _Call: TypeAlias = tuple[str, tuple[object, ...]]
-"""A method of the Master API, and its arguments after the caller's name."""
+"""A method of the Master API, and its arguments after the caller id."""
 
 
 class Registrations:
-    """The registrations of one node with its master, and the calls for them. On the loop."""
+    """The registrations of one node with its master, and the calls that make them. On the loop."""
 
     def __init__(
         self,
@@ -71,34 +68,32 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """``tables``: what the node has, by name, for each kind of registration, as in the names of the master's calls.
+        """Take ``tables``, the node's publications, subscriptions and services by name, for each kind ("Publisher").
 
         Every ``watch_seconds`` :meth:`watch` checks whether the master still knows the node.
         """
         self.uri = ""
         self.service_uri = ""
-        """The addresses of the node's Slave API and of its services; set before the first registration."""
-        self.parameters: set[str] = set()
-        """The parameters that the node has subscribed to."""
+        """The address of the node's services; like the Slave API's, set before the first registration."""
+        self.parameters: set[str] = set()  # the parameters that the node has subscribed to
         self.when_registered_again: list[Callable[[], object]] = []
-        """Called in workers when the master had forgotten the node: to register what else it needs."""
+        """Functions that register further state, called in workers after the master had lost the node."""
 
         self._name = name
         self._environment = environment
         self._tables = tables
         self._rpc = rpc
-        # At the limit of threads they wait, and the watch goes on.
+        # At the limit of threads the functions wait, while the watch goes on.
         self._again = InOrder(workers)
         self._watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """What is registered with the master; None if a call failed, or has no answer yet."""
+        """The object registered with the master; None if the call failed or is not answered yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self._watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
-        self._answered = 0.0
-        """When the master answered last, in seconds of the loop's clock."""
+        self._answered = 0.0  # time of the master's last answer, by the loop's clock
         self._closed = False
 
     def watch(self) -> None:
@@ -108,8 +103,8 @@ class Registrations:
     async def close(self, *, announces: bool) -> None:
         """Unregister everything, and register nothing more; the first call is sent before anything else is done.
 
-        Takes as long as the master answers. One that refuses connections is not waited for; one that answers nothing is
-        given up after ``_SILENT_SECONDS``. ``announces``: whether a line is logged when it takes long.
+        Waits as long as the master keeps answering; does not wait if it refuses connections, and gives up if it answers
+        nothing for ``_SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
         """
         self._closed = True
         if self._watching:
@@ -133,7 +128,7 @@ class Registrations:
     async def _call_master(self, method: str, *args: object) -> object:
         """Call any method of the master. Raise MasterUnreachableError, RpcError."""
         uri = self._environment.master_uri
-        # Of a node that closes _wait_for_answers() decides.
+        # While the node closes, _wait_for_answers() decides when to give up.
         seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
         try:
             answer = await self._rpc.call(uri, method, *args, timeout=seconds)
@@ -152,21 +147,21 @@ class Registrations:
             self._is_master_silent = True
             raise MasterUnreachableError(self._environment.master_uri) from error
         if self._closed:
-            # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the answer.
+            # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the answer.
             raise asyncio.CancelledError
 
     def request_again(self, topic: str) -> None:
-        """Register a subscription again: the list of publishers that the master sent last may be an older one."""
+        """Register a subscription again, since the master's last list of publishers may be outdated."""
         key = ("Subscriber", topic)
         if self._known.get(key):
             self._known[key] = None
             self._start_registering(key)
 
     async def update(self, key: _Key, *, again: bool = False) -> None:
-        """Register what this node has of one name, a part or nothing, if the master does not know it.
+        """Bring the master's registration of one name into line with this node: register, unregister, or do nothing.
 
-        One call after the other for each name, and none is cancelled half way: a registration could overtake the
-        unregistration before it, which would undo it, or the shutdown of the node could overtake a registration.
+        Calls for the same name are sequential, and none is cancelled half way. Otherwise a registration could overtake the
+        preceding unregistration, which would undo it, or the node's shutdown could overtake a registration.
         """
         task = self._start_registering(key, again=again)
         try:
@@ -174,7 +169,7 @@ class Registrations:
         except asyncio.CancelledError as error:
             if not task.cancelled():
                 raise
-            # close() has given up.
+            # close() has given up on the master.
             raise MasterUnreachableError(self._environment.master_uri) from error
 
     def _start_registering(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
@@ -186,7 +181,7 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # A caller that waits gets its error; nobody has to, since it is tried again.
+            # Retrieve the error: a waiting caller gets it, otherwise it is ignored, since the call is retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -200,11 +195,11 @@ class Registrations:
                 self._known[key] = None
                 method, args = self._unregistration(key)
                 await self.call(method, *args)
-                # A check of a master that has restarted may have come first.
+                # A check of a restarted master may have removed it already.
                 self._known.pop(key, None)
 
     def _wanted(self, key: _Key) -> _Part | None:
-        """Return what is to be registered for one name."""
+        """Return the object to register for one name, or None."""
         kind, name = key
         return None if self._closed else self._tables[kind].get(name)
 
@@ -225,8 +220,8 @@ class Registrations:
     async def _register_subscription(self, subscription: Subscription) -> list[str]:
         """Register a subscription; return its publishers.
 
-        A publisherUpdate comes by another connection, and may overtake the answer, which is then the older list.
-        Where one came, the call is made again.
+        A publisherUpdate arrives by another connection and may overtake the answer, which then is the older list.
+        If one arrived meanwhile, the call is repeated.
         """
         while True:
             lists = subscription.lists
@@ -238,11 +233,10 @@ class Registrations:
                 return uris
 
     async def _watch_master(self) -> None:
-        """Notice a master that has restarted and forgotten this node, and register again.
+        """Detect that the master has restarted and lost this node, and register again.
 
-        It looks up a service of this node, or else its name, which the master may know again by a topic that is newer
-        than the restart. The master's process id says nothing in a container, where each has the same, nor about a
-        master that kept its tables.
+        Looks up a service of this node, or else its name, which a restarted master may already know from a newer topic.
+        The master's process id is no evidence: in containers it is always the same, and a master may recover its tables.
         """
         failures = 0
         while not self._closed:
@@ -264,7 +258,7 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # What was unregistered meanwhile is unknown for good reason, and an illegal name is always refused.
+                # An entry unregistered meanwhile is expected to be unknown, and an illegal name is always refused.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
             except RpcError as error:
@@ -281,22 +275,22 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Once: this master does not count as one that knows this node any more.
+                # Logged once: from here on this master does not count as one that knows this node.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def _register_all(self, *, again: bool = False) -> None:
-        """Register all that the master does not know. Raise MasterUnreachableError."""
+        """Register everything that the master does not know. Raise MasterUnreachableError."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
-            # One that the master never accepts must not block the others.
+            # A registration that the master never accepts must not block the others.
             try:
                 await self.update(key, again=again)
             except RpcError as error:
                 _log.debug("registering %s: %s", key, error)
 
     async def _unregister_all(self, *, announces: bool) -> None:
-        """Unregister everything that the master has of this node, in as few calls as it allows."""
-        # A name with a call under way comes after that call, which would undo its unregistration.
+        """Unregister everything that the master has of this node, in as few calls as possible."""
+        # A name with a call in progress is unregistered after that call, which would undo it otherwise.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
         calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]
@@ -313,10 +307,10 @@ class Registrations:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
-        """Wait for the last calls of the master, for as long as it answers anything.
+        """Wait for the last calls to the master, for as long as it answers anything.
 
-        Of many nodes that shut down together each waits for its turn: a short call, which a busy master answers in between,
-        shows that it is alive.
+        If many nodes shut down together, each waits for its turn: a short call, which a busy master answers in between,
+        shows that the master is alive.
         """
         loop = asyncio.get_running_loop()
         uri = self._environment.master_uri
@@ -346,7 +340,7 @@ class Registrations:
             await self._call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
-        """Make all calls, whatever is answered; many in one where the master has system.multicall (not all masters do).
+        """Make all calls, ignoring their results; batch them if the master has system.multicall (not all masters do).
 
         Raise MasterUnreachableError.
         """
@@ -360,7 +354,7 @@ class Registrations:
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):
-                # What the master has not answered as one of many, such as a fault for a batch that is too long.
+                # Call individually if the batch was not answered, such as after a fault because it is too long.
                 if not isinstance(answer, list):
                     with contextlib.suppress(RpcFault, RpcProtocolError, RpcRefused):
                         await self.call(method, *args)

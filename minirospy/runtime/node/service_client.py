@@ -1,6 +1,6 @@
-"""A service's client that blocks its caller, and exact reads from a socket.
+"""A blocking service client, and exact reads from a socket.
 
-Without asyncio, which a command that calls one service would wait for. Source: http://wiki.ros.org/ROS/TCPROS
+It does not import asyncio, which would delay a command that calls one service. Source: http://wiki.ros.org/ROS/TCPROS
 ("Services").
 """
 
@@ -28,10 +28,10 @@ _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 
 
 class ServiceClient:
-    """A connection to one service, used by one thread at a time; it blocks the thread that calls.
+    """A connection to one service, used by one thread at a time; calls block that thread.
 
-    ``timeout`` bounds connecting and the handshake; a call itself may take as long as its handler does,
-    until :meth:`hang_up` ends it from another thread.
+    ``timeout`` bounds connecting and the handshake. A call may take as long as the service's handler; another thread
+    can abort it with :meth:`hang_up`.
     """
 
     def __init__(
@@ -48,11 +48,10 @@ class ServiceClient:
         waits: bool = True,
         same_host: bool = True,
     ) -> None:
-        """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` by a Unix socket where possible, and exchange headers.
+        """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` through a Unix socket if possible, and exchange headers.
 
-        With ``waits`` false the server's header is left for :meth:`finish`, so that the caller can do something
-        else meanwhile. Raise HandshakeRefused where the server says no, OSError or WireError where it cannot be
-        talked to.
+        With ``waits`` false, :meth:`finish` receives the server's header, so that the caller can do something else meanwhile.
+        Raise HandshakeRefused if the server refuses, OSError or WireError if communication fails.
         """
         self.header: Header = {}
         self._is_asked = False
@@ -60,7 +59,7 @@ class ServiceClient:
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
-        # Made before connecting, so that the server finds it when it looks at the connection for the first time.
+        # Serialize before connecting, so that the header has arrived when the server first reads the connection.
         header = serialize_header(fields)
         self._sock = _connected(parse_service_uri(uri), timeout, same_host=same_host)
 
@@ -78,13 +77,13 @@ class ServiceClient:
             self.finish()
 
     def finish(self, request: bytes | None = None) -> None:
-        """Receive the server's header. Raise as the constructor does; the connection is closed then.
+        """Receive the server's header. Raise as the constructor does; the connection is then closed.
 
-        The ``request`` of the :meth:`call` that follows is sent first where the server is known to accept that:
-        so both answers need one wait. A server that sends no header has not started on it.
+        If the server is known to accept it, the ``request`` of the following :meth:`call` is sent first, so that one wait
+        serves both answers. A server that sends no header has not started to process the request.
         """
         try:
-            # By a Unix socket, which only minirospy serves: rospy may lose what comes with a header.
+            # Only through a Unix socket, which only minirospy serves: rospy may lose data that arrives with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -96,7 +95,7 @@ class ServiceClient:
             raise
 
     def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raise CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raise CallFailed if the handler failed, OSError, WireError."""
         if self._is_asked:
             self._is_asked = False
         else:
@@ -111,12 +110,13 @@ class ServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Return whether the server has disconnected: a request that is sent now would not be read."""
-        # A server sends nothing by itself: what can be read is the end. A separate poll object, since each call uses it.
+        """Return whether the server has disconnected, so that it would not read another request."""
+        # A server sends nothing unasked: a readable socket means end of file. The poll object is reused, since each
+        # call checks.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:
-        """End a call that is under way in another thread."""
+        """Abort a call in progress in another thread."""
         sockets.hang_up(self._sock)
 
     def close(self) -> None:
@@ -142,17 +142,17 @@ class ServiceClient:
 
 
 def parse_service_uri(uri: str) -> tuple[str, int]:
-    """(host, port) of ``rosrpc://host:port``. Raise WireError."""
+    """Return (host, port) of ``rosrpc://host:port``. Raise WireError."""
     try:
         host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
         raise WireError(f"protocol uri is invalid: {uri}") from None
-    # "localhost" may name IPv6 first, where no server of ROS 1 listens.
+    # "localhost" may resolve to IPv6 first, where no ROS 1 server listens.
     return ("127.0.0.1" if host == "localhost" else host), port
 
 
 class PeerEndedError(WireError):
-    """The peer has ended in the middle, after ``received`` bytes of what was to be read."""
+    """The peer closed the connection after ``received`` bytes of an incomplete read."""
 
     def __init__(self, received: int) -> None:
         super().__init__(received)
@@ -163,18 +163,17 @@ class PeerEndedError(WireError):
 
 
 class Reader:
-    """Exact reads from a blocking socket; what came beyond them is kept for the next.
+    """Exact reads from a blocking socket; surplus bytes are kept for the next read.
 
-    A small request or answer arrives whole: so one receive takes length and body together.
+    A small request or answer arrives whole, so one receive gets its length and body together.
     """
 
     def __init__(self, sock: socket.socket) -> None:
         self._receive = sock.recv
-        self.rest = b""
-        """The bytes behind the last read."""
+        self.rest = b""  # bytes received beyond the last read
 
     def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
-        """``count`` bytes; b"" where the peer ended before the first and that is in order. Raise WireError."""
+        """Return ``count`` bytes, or b"" if ``at_end_ok`` and the peer closed before the first byte. Raise WireError."""
         data = self.rest
         while len(data) < count:
             more = self._some(max(count - len(data), _RECEIVE))
@@ -189,11 +188,11 @@ class Reader:
         return data[:count]
 
     def _some(self, count: int, flags: int = 0) -> bytes:
-        """Return up to so many bytes; none where the peer has ended."""
+        """Return up to ``count`` bytes, or b"" if the peer has closed."""
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # It closed with something unread: an end all the same.
+            # The peer closed with unread data, which also is end of file.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:
@@ -211,7 +210,7 @@ class Reader:
 
 
 def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> socket.socket:
-    """Return a tuned blocking socket. Raise OSError."""
+    """Return a connected and tuned blocking socket. Raise OSError."""
     unix = local.reach(*address) if same_host else None
     if unix:
         unix.settimeout(timeout)
@@ -225,7 +224,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sockets.tune(sock)
         return sock
 
-    # Most services have an address for a host: no resolver is needed.
+    # Most service URIs contain an IP address: no resolver is needed.
     sock = socket.socket()
     try:
         sockets.tune(sock)

@@ -1,6 +1,6 @@
-"""Services at run time: a server's handler runs in a worker, or on the loop; a client on the loop.
+"""Service servers, whose handlers run in a worker or on the loop, and a service client on the loop.
 
-All work on bytes; the client that blocks is in ``runtime/node/service_client.py``.
+All of them work on bytes; the blocking client is in ``runtime/node/service_client.py``.
 Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
@@ -48,17 +48,16 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Handler = Callable[[memoryview, Header], bytes]
-"""Request bytes and the client's header in, response bytes out; raises ServiceException with the text to send.
+"""Takes the request's bytes and the client's header; returns the response's bytes, or raises ServiceException.
 
-Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays.
+Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays open.
 """
 
-AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
-"""The same as a coroutine function, on the loop."""
+AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]  # the same as a coroutine function, on the loop
 
 
 class ServiceServer:
-    """A service that this node offers; each connection is served by a separate worker."""
+    """A service that this node offers; a separate worker serves each connection."""
 
     def __init__(
         self,
@@ -82,7 +81,7 @@ class ServiceServer:
         self._closed = False
 
     async def accept(self, sock: socket.socket, fields: Header) -> str | None:
-        """Answer a client's header and serve it, or return why it is refused."""
+        """Answer a client's header and serve the client, or return the reason for refusing it."""
         why = check_service_client(fields, self.type)
         if why:
             return why
@@ -107,7 +106,7 @@ class ServiceServer:
         return None
 
     async def _refuse_call(self, sock: socket.socket, error: Exception) -> None:
-        """Answer a client's call with the reason why it is not served: its header has been answered already."""
+        """Answer a client's call with the reason for refusing it, after its header was already accepted."""
         try:
             head = await asyncio.wait_for(_receive(sock, REQUEST_HEAD), sockets.HANDSHAKE_SECONDS)
             length = parse_request_head(head)
@@ -119,7 +118,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Serve no more: clients that wait for an answer get it, the others are disconnected."""
+        """Stop serving: clients that wait for an answer still get it, the others are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -160,7 +159,7 @@ class ServiceServer:
             raise WireError(f"no memory for a request of {size} bytes") from None
 
     def _client_failed(self, error: OSError | WireError, fields: Header) -> None:
-        """Log why a client is disconnected; that it has left says nothing."""
+        """Log the reason for disconnecting a client; a client that simply left is logged at level debug."""
         is_refused = isinstance(error, WireError) and not isinstance(error, PeerEndedError)
         log = self._refusals.warning if is_refused else _log.debug
         log("service %s: client %s is disconnected: %s", self.name, fields.get("callerid"), error)
@@ -172,7 +171,7 @@ class ServiceServer:
             return self._failure(error)
 
     def _failure(self, error: BaseException) -> bytes:
-        """Return the answer to a call whose handler raised; log what the handler did not mean to send."""
+        """Return the answer to a call whose handler raised; log the exception unless it is a ServiceException."""
         if isinstance(error, ServiceException):
             return serialize_failure(error)
 
@@ -182,13 +181,13 @@ class ServiceServer:
         except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
             text = type(error).__name__
         if not isinstance(error, Exception):
-            # Its text may be a number alone, or nothing.
+            # str(error) may be only a number, or empty.
             text = f"{type(error).__name__}: {text}".removesuffix(": ")
         return serialize_failure(ServiceException(f"error processing request: {text}"))
 
 
 class LoopServiceServer(ServiceServer):
-    """A service whose handler is a coroutine function: each connection is served by a task on the loop."""
+    """A service whose handler is a coroutine function: a task on the loop serves each connection."""
 
     def __init__(
         self,
@@ -215,7 +214,7 @@ class LoopServiceServer(ServiceServer):
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def cancel(self) -> None:
-        """End the calls that are under way."""
+        """Cancel the calls in progress."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -250,7 +249,8 @@ class LoopServiceServer(ServiceServer):
         except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
             return self._failure(error)
         except asyncio.CancelledError:
-            # Of this task, or of something that the handler awaited: only Python 3.11 could tell which.
+            # Either this task was cancelled or something that the handler awaited; only Python 3.11 could distinguish
+            # them.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)
                 with contextlib.suppress(OSError):
@@ -262,14 +262,14 @@ class LoopServiceServer(ServiceServer):
 
 @dataclass(eq=False)
 class _Connection:
-    """One client of a service; ``busy`` from its request's first bytes until it has the answer."""
+    """One client of a service; ``busy`` is true from the first bytes of its request until it has received the answer."""
 
     sock: socket.socket
     busy: bool = False
 
 
 class AsyncServiceClient:
-    """A client on the loop, as that of ``service_client.py``; made by :meth:`connect`, used by one task at a time."""
+    """A client on the loop, like the one in ``service_client.py``; made by :meth:`connect`, used by one task at a time."""
 
     def __init__(self, sock: socket.socket, header: Header) -> None:
         self.header = header
@@ -308,7 +308,7 @@ class AsyncServiceClient:
         return cls(sock, header)
 
     async def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raise CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raise CallFailed if the handler failed, OSError, WireError."""
         await asyncio.get_running_loop().sock_sendall(self._sock, serialize_request(request))
         ok, length = parse_response_head(await _receive(self._sock, RESPONSE_HEAD))
         body = await _receive(self._sock, length)
@@ -317,11 +317,11 @@ class AsyncServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Return whether the server has hung up: a request that is sent now would not be read."""
+        """Return whether the server has disconnected, so that it would not read another request."""
         return sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:
-        """End a call that is under way in another task."""
+        """Abort a call in progress in another task."""
         sockets.hang_up(self._sock)
 
     def close(self) -> None:
@@ -338,7 +338,7 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer ends before."""
+    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer closes before."""
     loop = asyncio.get_running_loop()
     try:
         buffer = bytearray(count)

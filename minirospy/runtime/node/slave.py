@@ -1,4 +1,4 @@
-"""The Slave API of a node: what the master and other nodes may ask it over XML-RPC.
+"""The Slave API of a node: the XML-RPC methods that the master and other nodes call.
 
 Source: http://wiki.ros.org/ROS/Slave_API. The answers are ``[status code, text, value]``.
 """
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["SlaveApi", "connection_text"]
 
+# The shutdown reason that rosmaster and minirospy's master send
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
-"""What masters write, rosmaster and ours."""
 
 
 class ServedNode(Protocol):
@@ -50,30 +50,30 @@ class ServedNode(Protocol):
 
     @property
     def uri(self) -> str:
-        """The URI of its Slave API."""
+        """The URI of the node's Slave API."""
 
     @property
     def tcpros_port(self) -> int:
-        """The port of its topics and services."""
+        """The port of the node's topics and services."""
 
     @property
     def unix_name(self) -> str:
-        """The name of its Unix socket."""
+        """The name of the node's Unix socket."""
 
     def parameter_changed(self, key: str, value: object) -> None:
-        """Take the new value of a parameter."""
+        """Apply a parameter's new value."""
 
     def publishers_changed(self, topic: str, publishers: list[str]) -> object:
-        """Take the full list of a topic's publishers."""
+        """Apply the complete list of a topic's publishers."""
 
     def request_shutdown(self, reason: str) -> None:
-        """Begin to shut the node down."""
+        """Start to shut the node down."""
 
 
 class SlaveApi:
-    """One method per call of the API; ``dispatch`` is what the XML-RPC server calls (on the loop).
+    """One method per call of the API; the XML-RPC server calls ``dispatch`` (on the loop).
 
-    Those that only tell may be called from any thread.
+    Methods that only return data may be called from any thread.
     """
 
     def __init__(self, node: ServedNode) -> None:
@@ -101,11 +101,11 @@ class SlaveApi:
         )
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that lead to it. Raise RpcFault on an unknown method."""
+        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:
-        """Transferred bytes and messages, by topic and connection."""
+        """Return the transferred bytes and messages, by topic and connection."""
         publications = [
             [
                 publication.topic,
@@ -117,7 +117,7 @@ class SlaveApi:
         subscriptions = [
             [
                 subscription.topic,
-                # How many were lost on the way, nobody knows: -1.
+                # The number of lost messages is unknown: -1.
                 [[link.number, link.received_bytes, link.received, -1, True] for link in subscription.links],
             ]
             for subscription in list(self._node.subscriptions.values())
@@ -125,7 +125,7 @@ class SlaveApi:
         return [SUCCESS, "", [publications, subscriptions, []]]
 
     def get_bus_info(self, caller_id: str) -> Answer:
-        """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
+        """Return one row per connection: [id, other end, direction, transport, topic, connected, text]."""
         rows: list[list[object]] = []
         for publication in list(self._node.publications.values()):
             for out in publication.links:
@@ -146,7 +146,7 @@ class SlaveApi:
         return [SUCCESS, "", self._node.name]
 
     def get_uri(self, caller_id: str) -> Answer:
-        """Where this API is served."""
+        """Return the URI of this API."""
         return [SUCCESS, "", self._node.uri]
 
     def get_pid(self, caller_id: str) -> Answer:
@@ -154,17 +154,17 @@ class SlaveApi:
         return [SUCCESS, "", os.getpid()]
 
     def get_publications(self, caller_id: str) -> Answer:
-        """[topic, type] of each topic that this node publishes."""
+        """Return [topic, type] of each topic that this node publishes."""
         rows = [[p.topic, p.type.name] for p in list(self._node.publications.values())]
         return [SUCCESS, "publications", rows]
 
     def get_subscriptions(self, caller_id: str) -> Answer:
-        """[topic, type] of each topic that this node subscribes to."""
+        """Return [topic, type] of each topic that this node subscribes to."""
         rows = [[s.topic, s.type.name] for s in list(self._node.subscriptions.values())]
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: object) -> Answer:
-        """Accept a new value of a parameter that this node subscribed to, of its namespace, or of what is below it."""
+        """Accept a new value of a parameter that this node subscribed to, of its namespace, or of a parameter below it."""
         self._node.parameter_changed(key, value)
         changed = names.canonicalize(key).rstrip("/") + "/"
         known = (f"{each.rstrip('/')}/" for each in list(self._node.parameters))
@@ -173,12 +173,12 @@ class SlaveApi:
         return [SUCCESS, "", 0]
 
     def publisher_update(self, caller_id: str, topic: str, publishers: list[str]) -> Answer:
-        """Accept the master's full list of a topic's publishers."""
+        """Accept the master's complete list of a topic's publishers."""
         self._node.publishers_changed(topic, publishers)
         return [SUCCESS, "", 0]
 
     def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
-        """Where a subscriber finds the topic, by the first protocol that both sides speak."""
+        """Return the address of the topic for the first protocol that both nodes support."""
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         host, port = self._node.environment.host, self._node.tcpros_port
@@ -192,10 +192,10 @@ class SlaveApi:
         ]
 
     def shutdown(self, caller_id: str, reason: str = "") -> Answer:
-        """Stop the node.
+        """Shut the node down.
 
-        A master that bumps a node, since a new one of its name has registered, calls the address of the old one, which may
-        have gone long ago and its port to this node: the reason names the node that is meant.
+        When a new node of the same name registers, the master calls the old node's address. The old node may have exited long
+        ago and this node may have its port: so the reason is checked for the name of the node that is meant.
         """
         meant = _BUMPED.fullmatch(reason) if caller_id == "/master" and isinstance(reason, str) else None
         if meant and meant[1] != self._node.name:
@@ -205,7 +205,7 @@ class SlaveApi:
 
 
 def _refusal_before_tcpros(protocols: object) -> Answer | None:
-    """Return rospy's answer to a list without TCPROS, or with an entry before it that is not a protocol; None for others."""
+    """Return rospy's answer if the list has no TCPROS or an invalid entry before it; otherwise None."""
     if not isinstance(protocols, (list, dict, str)):
         kind = type(protocols).__name__
         return [ERROR, f"Error: invalid arguments: {kind!r} object is not iterable", []]
@@ -215,7 +215,7 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
             kind = type(entry).__name__
             return [ERROR, f"Error: invalid arguments: {kind!r} object is not subscriptable", []]
         if isinstance(entry, dict):
-            # Keys of XML-RPC are texts: none is rospy's number 0.
+            # XML-RPC keys are strings, so rospy fails to find the key 0.
             return [FAILURE, "Internal failure: 0", []]
         if not entry:
             kind = "list" if isinstance(entry, list) else "string"
@@ -226,6 +226,6 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
 
 
 def connection_text(link: InLink | OutLink) -> str:
-    """Return a connection's text, of which `rosnode info` shows the numbers; none of a Unix socket, without a port."""
+    """Return a connection's description, whose numbers `rosnode info` shows; a Unix socket has no port."""
     on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

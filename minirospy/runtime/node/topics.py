@@ -50,20 +50,17 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-_SETTLE_SECONDS = 10.0
-"""A master that has forgotten everything has all nodes registered again within this."""
+_SETTLE_SECONDS = 10.0  # within which all nodes register again at a master that has lost its state
 
+# Failures before reporting a publisher that refuses; one that is shutting down has gone by then
 _WARN_AFTER = 3
-"""A publisher that refuses is reported at this failure: one that is shutting down has left by then."""
 
-_REFUSALS_LOGGED = 10
-"""Log lines about publishers that answer nonsense, before the rest are counted."""
+_REFUSALS_LOGGED = 10  # log lines about publishers with invalid answers, before further ones are only counted
 
-TOGETHER_SECONDS = 0.25  # in which the topics of one publisher that cannot be reached make one line
-MAX_TOPICS_SHOWN = 5  # topics that such a line names
+TOGETHER_SECONDS = 0.25  # within which the unreachable topics of one publisher are combined in one log line
+MAX_TOPICS_SHOWN = 5  # topics named in such a log line
 _LEAVE_SECONDS = 10.0
-_WORKED_SECONDS = 5.0
-"""A link that was open for this long, or brought a message, was a good one."""
+_WORKED_SECONDS = 5.0  # a link that was open for this long, or received a message, counts as working
 
 Deliver = Callable[[Frame, Header], None]
 """Called with each message's bytes and its publisher's connection header."""
@@ -71,9 +68,9 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """How a subscription delivers in steps on the loop, which ``start`` runs, messages of up to ``most`` bytes.
+    """Options of a subscription that delivers messages of up to ``most`` bytes in steps on the loop, run by ``start``.
 
-    ``on_left_out`` is called with the publisher's connection header when a longer one comes.
+    ``on_left_out`` is called with the publisher's connection header when a longer message arrives.
     """
 
     deliver: Callable[[Frame, Header], Steps[None]]
@@ -96,7 +93,7 @@ class Publication:
         tcp_nodelay: bool = False,
         on_link: Callable[[OutLink, bool], None] | None = None,
     ) -> None:
-        """``queue_size`` frames may wait for a slow subscriber (0: any number; None: publish waits itself).
+        """Let ``queue_size`` frames wait for a slow subscriber (0: no limit; None: publish blocks).
 
         ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
         """
@@ -107,23 +104,22 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
+        # Bytes of messages with at least one subscriber, each counted once, with length prefix
         self.sent_bytes = 0
-        """Of the messages that had a subscriber, each once, with their lengths."""
-        self.expected = 0
-        """How many subscribers the master knew when this was registered."""
+        self.expected = 0  # number of subscribers that the master knew when this was registered
         self._on_link = on_link
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and holds a lock."""
+        """Return whether a thread is publishing, and so holds a lock."""
         return self._latch_lock.locked() or any(link.is_sending for link in self.links)
 
     def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
         if self.latch:
-            # A subscriber that joins at this moment gets the frame once: either here or on joining.
+            # A subscriber that connects now gets the frame exactly once: either here or in accept().
             with self._latch_lock:
                 self._latched = frame
                 links = self.links
@@ -138,7 +134,7 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return why it is refused.
+        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return the reason for refusing it.
 
         On the loop.
         """
@@ -161,10 +157,10 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node connects but once: it lost the old link, where frames wait for a peer that is not there.
+                # A node connects only once per topic: it has lost the old link, whose frames have no receiver.
                 other.close()
-        # A subscriber that has the header counts on all that is published from then on: the link takes frames
-        # before the header goes.
+        # A subscriber that has the header expects all messages published from then on, so the link accepts frames
+        # before the header is sent.
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched if self.latch else None
@@ -175,18 +171,18 @@ class Publication:
             if self._on_link:
                 self._on_link(link, True)
         except BaseException:
-            # The caller closes the socket: a link without one must not be counted, or be closed later.
+            # The caller closes the socket: a link without a socket must not be counted, or closed later.
             link.close()
             raise
         return None
 
     def forget_latched(self) -> None:
-        """Send the last frame to no subscriber that comes later."""
+        """Stop sending the last frame to new subscribers."""
         with self._latch_lock:
             self._latched = None
 
     def close(self) -> None:
-        """End all links (on the loop)."""
+        """Close all links (on the loop)."""
         close_each([link.close for link in self.links])
 
     def _link_closed(self, link: OutLink) -> None:
@@ -206,58 +202,56 @@ class InLink:
     received: int = 0
     received_bytes: int = 0
     closed: bool = field(default=False)
-    latched: Frame | None = None
-    """The last message of a publisher that latches."""
+    latched: Frame | None = None  # the last message of a latching publisher
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
-    returned: bool = False
-    """Whether its publisher has left the master's list, and come back while the link was open."""
+    returned: bool = False  # the publisher left the master's list and came back while the link was open
 
     @property
     def number(self) -> int:
-        """The link's number among those of the node: its file descriptor."""
+        """The link's number within the node: its file descriptor."""
         return self.sock.fileno()
 
     @property
     def transport(self) -> str:
-        """The protocol's name."""
+        """The name of the transport protocol."""
         return "TCPROS" if self.sock.family in sockets.FAMILIES else local.PROTOCOL
 
     @property
     def local_port(self) -> int:
-        """The port at this end; 0 if it has none, or is closed."""
+        """The local port; 0 if there is none, or the socket is closed."""
         try:
             return int(self.sock.getsockname()[1]) if self.transport == "TCPROS" else 0
         except OSError:
             return 0
 
     def close(self) -> None:
-        """Have the reader end; it closes the socket."""
+        """Shut the connection down, so that the reader stops and closes the socket."""
         self.closed = True
         sockets.hang_up(self.sock)
 
 
 class Unreachable:
-    """Logs publishers that cannot be reached: one line for all topics of a node, such as those of a bridge that was killed.
+    """Logs publishers that cannot be reached, in one line for all topics of a node, such as those of a killed bridge.
 
     On the loop.
     """
 
     def __init__(self) -> None:
-        # A list may name a thousand publishers that refuse: to log all of them takes the loop 0.2 s.
+        # A list may contain a thousand refusing publishers: logging all of them takes 0.2 s of the loop.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """By the publisher's URI: topics, the error and the advice of the first one."""
+        """Publisher's URI -> its topics, and the error and advice for the first one."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log a publisher a moment later, together with the other topics that lose it."""
+        """Log an unreachable publisher a moment later, together with its other topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
 
     def close(self) -> None:
-        """Log what waits, and how many lines were omitted. Idempotent."""
+        """Log the pending lines, and the number of omitted ones. Idempotent."""
         if self._timer:
             self._timer.cancel()
         self._report()
@@ -279,12 +273,12 @@ class Unreachable:
 
 
 class Subscription:
-    """A topic that this node listens to: one connection to each publisher, made again when it breaks.
+    """A topic that this node subscribes to: one connection to each publisher, re-established when it breaks.
 
-    Each connection is read by a separate worker that calls ``deliver``: one publisher's messages stay in
-    order, and neither topics nor publishers wait for each other. With ``on_loop``, ``deliver`` is called
-    on the loop instead and must be quick; what takes longer is an :class:`InTurns` instead. ``newest`` may be changed
-    at any time: of the messages that came while a delivery lasted, only so many are delivered, the newest (0: all).
+    A separate worker reads each connection and calls ``deliver``: messages of one publisher stay in order, and neither topics
+    nor publishers wait for each other. With ``on_loop``, ``deliver`` is called on the loop instead and must be quick; for
+    longer work pass an :class:`InTurns`. ``newest`` may be changed at any time: if more messages arrive during a delivery,
+    only the newest ``newest`` are delivered (0: all).
     """
 
     def __init__(
@@ -304,9 +298,9 @@ class Subscription:
         this_host: str = "",
         unreachable: Unreachable | None = None,
     ) -> None:
-        """``this_host``: what :func:`local.this_host` says, where publishers of this machine may be reached so.
+        """Take ``this_host``, the value of :func:`local.this_host`, or "" to not use Unix sockets.
 
-        ``unreachable``: that of the node, whose other subscriptions may lose the same publisher.
+        ``unreachable`` is shared by all subscriptions of the node, since several may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
@@ -322,8 +316,7 @@ class Subscription:
         self._header_memory = header_memory
         self._on_loop = on_loop or isinstance(deliver, InTurns)
 
-        self.lists = 0
-        """How many lists of publishers have been received."""
+        self.lists = 0  # number of lists of publishers received
         self._plan = SubscriptionPlan()
         self._named: list[str] = []
         self._settling: asyncio.TimerHandle | None = None
@@ -332,19 +325,18 @@ class Subscription:
         # /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
-        # Links to publishers that have left the master's list, and what closes those links in the end.
+        # Links to publishers that have left the master's list, with the timer that closes each link.
         self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
-        self.on_connected: list[Callable[[], object]] = []
-        """Called on the loop when a publisher is connected."""
+        self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
         self._closed = False
 
     @property
     def links(self) -> tuple[InLink, ...]:
-        """The connections to publishers, one to each at most."""
+        """The connections to publishers, at most one to each."""
         return tuple(self._links.values())
 
     def publishers_changed(self, uris: Iterable[str]) -> None:
-        """Take over the master's list of publishers (on the loop)."""
+        """Apply the master's list of publishers (on the loop)."""
         if self._closed:
             return
         self.lists += 1
@@ -356,9 +348,9 @@ class Subscription:
                 self._start_connecting(action)
 
     def registered_again(self, uris: Iterable[str]) -> None:
-        """Take over the first list of a master that had forgotten everything (on the loop).
+        """Apply the first list from a master that had lost its state (on the loop).
 
-        Its lists lack nodes that are not registered again yet, so for a while no connected publisher is dropped.
+        The list lacks nodes that have not registered again yet, so for a while no connected publisher is dropped.
         """
         if self._settling:
             self._settling.cancel()
@@ -366,7 +358,7 @@ class Subscription:
         self.publishers_changed(uris)
 
     def close(self) -> None:
-        """End all links (on the loop)."""
+        """Close all links (on the loop)."""
         self._closed = True
         self._unreachable.close()
         self._limited_log.close()
@@ -378,11 +370,11 @@ class Subscription:
             self._disconnect(uri)
 
     async def wait_closed(self) -> None:
-        """Wait, after :meth:`close`, for the end of what was being connected."""
+        """Wait, after :meth:`close`, until pending connection attempts have stopped."""
         await asyncio.gather(*self._connecting.values(), return_exceptions=True)
 
     def _settle(self) -> None:
-        """Forget publishers that the master does not list, unless the link is up: nodes of rospy never register again."""
+        """Forget publishers that the master does not list, unless their link is up: rospy nodes never register again."""
         self._settling = None
         for action in self._plan.publishers_changed(self._named):
             if isinstance(action, Connect):
@@ -391,9 +383,9 @@ class Subscription:
                 self._disconnect(action.uri)
 
     def _leave(self, uri: str) -> None:
-        """Read a publisher that has unregistered to its end: what it published before may still be on its way.
+        """Keep reading from a publisher that has unregistered: messages that it published before may still be in transit.
 
-        It closes the connection itself when all is sent. One that does not is disconnected after a while.
+        The publisher closes the connection when everything is sent. Otherwise it is disconnected after a while.
         """
         link = self._links.get(uri)
         if not link:
@@ -407,7 +399,7 @@ class Subscription:
         task = self._connecting.pop(uri, None)
         if task:
             task.cancel()
-        # Immediately: a link itself ends when its reader has noticed.
+        # Remove it immediately: the link itself closes only when its reader has noticed.
         link = self._links.pop(uri, None)
         if link:
             link.close()
@@ -418,7 +410,7 @@ class Subscription:
 
     def _start_connecting(self, action: Connect) -> None:
         if action.uri in self._leaving:
-            # A second connection would deliver each message twice, where the publisher has kept the first.
+            # If the publisher kept the first connection, a second one would deliver each message twice.
             link, timer = self._leaving.pop(action.uri)
             timer.cancel()
             link.returned = True
@@ -454,7 +446,7 @@ class Subscription:
             self._retry(uri, error)
         else:
             if self._closed or self._connecting.get(uri) is not asyncio.current_task():
-                # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the last byte.
+                # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the last byte.
                 link.sock.close()
                 return
 
@@ -491,7 +483,7 @@ class Subscription:
     async def _open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
-            # After TCPROS: third-party nodes look at the first protocol only.
+            # After TCPROS, since third-party nodes read the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
@@ -503,7 +495,7 @@ class Subscription:
                 self.type,
                 self._caller_id,
                 tcp_nodelay=self.tcp_nodelay,
-                # Peers on other hosts get the fields of ROS 1, and no more.
+                # Peers on other hosts get only the header fields of ROS 1.
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
             await tcp.send_header(sock, fields)
@@ -512,19 +504,19 @@ class Subscription:
         except BaseException:
             sock.close()
             raise
-        # As rospy, whose count includes the header that it sends.
+        # Like rospy, count the sent header too.
         link = InLink(uri, address, sock, header, received_bytes=len(serialize_header(fields)))
-        # Third-party nodes leave the topic out; user code reads it.
+        # Third-party nodes omit the topic, but user code reads it.
         header.setdefault("topic", self.topic)
         return link
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
-        """Return a socket that is connected to the publisher which gave this answer, and its address."""
+        """Return a socket connected to the publisher that gave this answer, and its address."""
         unix = local.parse_answer(answer) if self._this_host else None
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # Something between the two, such as a sandbox, separates them.
+            # Something, such as a sandbox, separates the two processes.
             host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
@@ -553,7 +545,7 @@ class Subscription:
         except (OSError, WireError) as error:
             link.fault = error
         except MemoryError:
-            # To keep a message, or to give it to a callback that has no memory either.
+            # Neither for the message nor for a callback.
             link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
@@ -568,12 +560,13 @@ class Subscription:
             return
         del self._links[link.uri]
         if link.returned:
-            # It was the connection of a publisher before; that of today is to be had immediately.
+            # The closed connection was to the publisher's previous registration; connect to the present one
+            # immediately.
             self._start_connecting(Connect(link.uri))
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Logged once: what follows in such a stream is garbage too.
+            # Logged once: everything after the error in such a stream is invalid too.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self._plan.worked(link.uri)
@@ -587,14 +580,14 @@ class Subscription:
         _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
         cause = error.__cause__ or error
         if isinstance(error, ThreadLimitError) or is_file_limit(cause):
-            # A limit of this process, and no fault of the publisher.
+            # A limit of this process, not a fault of the publisher.
             if is_file_limit(cause):
                 self._limited_log.error("no connection for %s: %s", self.topic, explain(cause))
             self._start_connecting(action)
             return
 
         nameless = isinstance(cause, socket.gaierror)
-        # A publisher that is shutting down refuses or disconnects; silence is the address's fault, or a firewall's.
+        # A publisher that is shutting down refuses or disconnects; a timeout points to a wrong address or a firewall.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
@@ -603,7 +596,7 @@ class Subscription:
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return whose address is wrong, and which variable sets it."""
+    """Return advice on which host's address is wrong, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):
@@ -635,11 +628,11 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
 
 
 class _NoPublisher(WireError):
-    """An answer that no publisher gives: a retry would bring the same, and rospy does not retry either."""
+    """The answer cannot come from a publisher: a retry would fail again, and rospy does not retry either."""
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
-    """(host, port) out of a publisher's answer to requestTopic. Raise WireError."""
+    """Return (host, port) from a publisher's answer to requestTopic. Raise WireError."""
     match answer:
         case [1, _, ["TCPROS", str(host), int(port), *_]]:
             return host, port

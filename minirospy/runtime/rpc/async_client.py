@@ -34,23 +34,23 @@ _KEEP_PER_SERVER = 8
 _KEEP_AT_MOST = 100
 _KEEP_SECONDS = 10.0
 
-# 10035: what Windows says of a connection that is being made.
+# 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
 
-# Nearly all URIs of nodes; taking one apart by the rules costs as much as the call.
+# Matches nearly all URIs of nodes; a complete parse costs as much as the call.
 _USUAL_URI = re.compile(r"http://([A-Za-z0-9._-]+):([1-9][0-9]{0,3}|[1-5][0-9]{4})(/[A-Za-z0-9._/-]*)?")
 
 _Address = tuple[str, int]
 
 
 class AsyncRpcClient:
-    """Calls methods of any server; a few connections to each are kept for a while and reused."""
+    """Calls methods of any server; a few connections to each server are kept for a while and reused."""
 
     def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
-        """``same_host``: a Unix socket is tried first. ``max_answer``: bytes that an answer may have."""
+        """Take ``same_host``, to try a Unix socket first, and ``max_answer``, the limit of an answer in bytes."""
         self.same_host = same_host
         self.max_answer = max_answer
-        # Of each server, in the order of their last use.
+        # The idle connections to each server, in the order of their last use.
         self._idle: dict[_Address, list[_Connection]] = {}
         self._sweep: asyncio.TimerHandle | None = None
         self.under_way: Deadlines[Call] = Deadlines(Call.end_late)
@@ -71,17 +71,17 @@ class AsyncRpcClient:
     def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
-        """Do the same without a coroutine, which costs a master as much as all the rest of a call.
+        """Do the same with callbacks; on a busy master a coroutine would double the cost of a call.
 
-        ``body`` is the call as XML, perhaps in pieces. ``done`` is called on the loop, perhaps immediately, with the
-        answer as XML, or with what :meth:`call` would raise.
+        ``body`` is the call as XML, possibly in pieces. ``done`` is called on the loop, possibly immediately, with the
+        answer as XML, or with the exception that :meth:`call` would raise.
         """
         call = Call(self, uri, body, timeout, done)
         call.start()
         return call
 
     async def close(self) -> None:
-        """Close the kept connections, and give up what is under way. Idempotent."""
+        """Close the idle connections, and abort calls in progress. Idempotent."""
         self.closed = True
         if self._sweep:
             self._sweep.cancel()
@@ -95,7 +95,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
-        """Return a kept connection."""
+        """Return an idle connection to a server, or None."""
         kept = self._idle.get(address)
         if not kept:
             return None
@@ -123,7 +123,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Forget a kept connection, which has closed."""
+        """Forget an idle connection, which has closed."""
         connection.close()
         kept = self._idle[connection.address]
         kept.remove(connection)
@@ -131,7 +131,7 @@ class AsyncRpcClient:
             del self._idle[connection.address]
 
     def _close_idle(self) -> None:
-        """Close what was not used for a while: at the other end it may hold a thread."""
+        """Close connections that were not used for a while: each may occupy a thread of the server."""
         loop = asyncio.get_running_loop()
         end = loop.time() - _KEEP_SECONDS / 2
         for connection in [each for kept in self._idle.values() for each in kept if each.used < end]:
@@ -140,7 +140,7 @@ class AsyncRpcClient:
 
 
 class _Connection:
-    """A connection to a server, for one call after the other; the loop watches it as long as it is open."""
+    """A connection to a server, for sequential calls; the loop watches it as long as it is open."""
 
     __slots__ = ("_client", "_fd", "_is_watched", "_loop", "address", "call", "reader", "sock", "used")
 
@@ -151,7 +151,7 @@ class _Connection:
         self._loop = loop
         self.sock = sock
         self.address = address
-        # A number, since the loop makes a text of what it does not know yet.
+        # The loop formats an unregistered socket as a string, which costs more than a number.
         self._fd = sock.fileno()
         self.call: Call | None = None
         self.reader = HttpReader(client.max_answer)
@@ -159,21 +159,21 @@ class _Connection:
         self._is_watched = False
 
     def watch(self) -> None:
-        """Take what comes from now on. Idempotent."""
+        """Start reading. Idempotent."""
         if not self._is_watched:
             self._is_watched = True
             self._loop.add_reader(self._fd, self._readable)
 
     def write_on(self, function: Callable[[], None]) -> None:
-        """Call ``function`` when there is room to write."""
+        """Call ``function`` when the socket is writable."""
         self._loop.add_writer(self._fd, function)
 
     def stop_writing(self) -> None:
-        """Call it no more."""
+        """Stop calling that function."""
         self._loop.remove_writer(self._fd)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         if self._is_watched:
             self._loop.remove_reader(self._fd)
         self.sock.close()
@@ -193,15 +193,14 @@ class _Connection:
         if call:
             call.received(data)
         else:
-            # Nothing was asked: it is the end.
+            # No call is in progress, so this is end of file.
             self._client.drop(self)
 
 
 class Call:
-    """One call: its request and its answer, on a connection that was kept or on a new one.
+    """One call: its request and its answer, on an idle connection or a new one.
 
-    Plain callbacks: a coroutine and its tasks would cost a master, which calls thousands of nodes, more than
-    all the rest of a call.
+    It uses plain callbacks: on a master, which calls thousands of nodes, a coroutine and its tasks would double the cost.
     """
 
     __slots__ = (
@@ -236,7 +235,7 @@ class Call:
         self._address: _Address = ("", 0)
 
         self._request = [body] if isinstance(body, bytes) else body
-        # Of these parts, the first that has not been started.
+        # The index of the next part of the request to send.
         self._next = 0
         self._left: bytes | memoryview = b""
         self._connection: _Connection | None = None
@@ -244,7 +243,7 @@ class Call:
         self._connecting: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin: once."""
+        """Start the call. Call this once."""
         try:
             host, port, path = _parts(self._uri)
         except RpcUnreachable as error:
@@ -256,7 +255,7 @@ class Call:
         if size < _LARGE:
             self._request = [serialize_request(f"{host}:{port}", path, b"".join(self._request))]
         else:
-            # Not copied: several calls may send the same one.
+            # Do not copy the body: several calls may share it.
             self._request = [serialize_request_head(f"{host}:{port}", path, size), *self._request]
 
         client = self._client
@@ -270,17 +269,17 @@ class Call:
             self._connect()
 
     def cancel(self) -> None:
-        """Give up, and say nothing. Idempotent."""
+        """Cancel the call without calling ``done``. Idempotent."""
         if self._done:
             self._done = None
             self._end()
 
     def end_late(self) -> None:
-        """Give up: the time is up."""
+        """Fail the call because its time limit has passed."""
         self.fail(TimeoutError("timed out"))
 
     def fail(self, error: Exception) -> None:
-        """Give up, and say why. Idempotent."""
+        """Fail the call, and report the error. Idempotent."""
         if not isinstance(error, TimeoutError | asyncio.TimeoutError):
             unreachable = RpcUnreachable(self._uri, explain(error) or "the connection was closed")
         elif self._connection and not self._left:
@@ -291,7 +290,7 @@ class Call:
         self._finish(error if isinstance(error, RpcError) else unreachable)
 
     def received(self, data: bytes) -> None:
-        """Bytes of the answer have come; b"" is the end."""
+        """Accept bytes of the answer; b"" means end of file."""
         assert self._connection
         reader = self._connection.reader
         try:
@@ -305,20 +304,20 @@ class Call:
             self._answered(messages[0], is_all=len(messages) == 1 and reader.is_idle)
 
     def broken(self, error: Exception) -> None:
-        """Give up this connection and try another one."""
+        """Close this connection and try another one."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
-            # The peer closed it meanwhile: once more on a new one.
+            # The peer has closed an idle connection: retry on a new one.
             self._is_kept = False
             self._connect()
         elif isinstance(error, ConnectionRefusedError) and _literal(self._address[0]) != self._address[0]:
-            # "localhost" may be served at its IPv6 address alone.
+            # "localhost" may be served only at its IPv6 address.
             self._look_up()
         else:
             self.fail(error)
 
     def _connect(self) -> None:
-        """Open a new connection, immediately where the host needs no look-up."""
+        """Open a new connection, immediately if the host needs no DNS look-up."""
         host, port = self._address
         unix = local.reach(host, port) if self._client.same_host else None
         if unix:
@@ -334,7 +333,7 @@ class Call:
         try:
             sock = socket.socket()
         except OSError as error:
-            # No file descriptor is left.
+            # There is no free file descriptor.
             self.fail(error)
             return
         sock.setblocking(False)
@@ -362,7 +361,7 @@ class Call:
                 self.fail(error)
             else:
                 if not self._done:
-                    # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the connection.
+                    # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the connection.
                     sock.close()
                     return
                 self._use(self._connected_by(sock))
@@ -380,7 +379,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Use a connection to this machine, which is open by now, although the loop has not reported it yet."""
+        """Use a connection on this machine, which is open by now, although the loop has not reported it yet."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)
@@ -414,7 +413,7 @@ class Call:
     def _sent(self, count: int) -> None:
         assert self._connection
         if count < len(self._left):
-            # A view: a Unix socket takes a large request in many pieces.
+            # Slice a view, without copying: a Unix socket accepts a large request in many pieces.
             self._left = memoryview(self._left)[count:]
             self._write_on(self._send)
         elif self._next < len(self._request):
@@ -478,13 +477,13 @@ def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
 
 
 def _parts(uri: str) -> tuple[str, int, str]:
-    """Host, port and path. Raise RpcUnreachable."""
+    """Return host, port and path. Raise RpcUnreachable."""
     usual = _USUAL_URI.fullmatch(uri)
     return (usual[1], int(usual[2]), usual[3] or "/") if usual else parse_http_uri(uri)
 
 
 def _literal(host: str) -> str:
-    """Return the IPv4 address that ``host`` is, or surely has; else ""."""
+    """Return the IPv4 address if ``host`` is one or is known to resolve to one; else ""."""
     if host == "localhost":
         return "127.0.0.1"
     try:

@@ -18,21 +18,21 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
+# The kernel accepts connections even for a busy program: after this the server counts as absent
 _CONNECT_SECONDS = 5.0
-"""The system answers for a program that is busy: what does not connect within this is not there."""
 
 
 class RpcClient:
     """Calls methods of one server. Many threads may call; connections are kept and reused.
 
-    A call takes a connection out of the pool while it lasts, so that a signal handler which calls in the
-    middle of another call of the same thread gets a separate one.
+    A call takes a connection out of the pool while it runs, so a signal handler that makes a call during another call of
+    the same thread gets a separate connection.
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
-        """``timeout`` in seconds bounds each wait for bytes, and connecting, which takes 5 s at most.
+        """Take ``timeout``, the limit in seconds of each wait for bytes, and of connecting, which takes 5 s at most.
 
-        ``same_host``: a Unix socket is tried first.
+        ``same_host``: try a Unix socket first.
 
         Raise RpcUnreachable on a bad URI.
         """
@@ -43,7 +43,7 @@ class RpcClient:
         self._idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: object) -> Any:
-        """Return the value that ``method`` answers.
+        """Return the answer of ``method``.
 
         Raise RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
         """
@@ -65,7 +65,7 @@ class RpcClient:
             sock = None
         try:
             if sock is not None:
-                # A kept connection may have been closed by the peer meanwhile: then once more on a new one.
+                # The peer may have closed an idle connection meanwhile: retry on a new one.
                 with contextlib.suppress(ConnectionError, EOFError):
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)
@@ -83,7 +83,7 @@ class RpcClient:
             return unix
         seconds = min(self._timeout, _CONNECT_SECONDS)
         try:
-            # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
+            # "localhost" may resolve to IPv6 first, where a ROS 1 server listens only with ROS_IPV6.
             host: Any = sockets.resolvable("127.0.0.1" if self._host == "localhost" else self._host)
             sock = socket.create_connection((host, self._port), seconds)
         except ConnectionRefusedError:
@@ -123,7 +123,7 @@ class RpcClient:
 
 
 def parse_http_uri(uri: str) -> tuple[str, int, str]:
-    """(host, port, path) of ``http://host:port/path``. Raise RpcUnreachable."""
+    """Return (host, port, path) of ``http://host:port/path``. Raise RpcUnreachable."""
     try:
         return split_uri(uri)
     except ValueError as error:

@@ -1,7 +1,7 @@
 """One client of the XML-RPC server: bytes in, requests out, and their answers in order.
 
-The server (``runtime/rpc/server.py``) accepts clients and limits what they all together have it hold; what one client may do is
-decided here.
+This module limits each client; the server (``runtime/rpc/server.py``) accepts clients and limits the memory of all
+clients together.
 """
 
 from __future__ import annotations
@@ -36,30 +36,28 @@ __all__ = ["Connection", "State"]
 
 _log = logging.getLogger(__name__)
 
-_REQUEST_SECONDS = 30.0
-"""Time limit for a started request to be complete, and for an answer to be read."""
+_REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read an answer
 
 _LINGER_SECONDS = 2.0
-"""Who is refused may still be sending: so long it is heard out, or the answer would be lost with the connection."""
+"""Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the answer is lost."""
 
-_SHORT_BODY = 4096
-"""A longer request is read in steps."""
+_SHORT_BODY = 4096  # bytes; a longer request is read in steps
 
+# Bytes; longer requests are read one at a time, since their values may take several times as much memory
 _ALONE_BODY = 1024 * 1024
-"""Of requests beyond this one is read at a time: its values may take some times as much memory."""
 
-_PROGRESS = 65536
-"""Bytes that have moved restart the time limit: a poor radio may need long for a large value."""
+_PROGRESS = 65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes at a time, of a new request and of the rest of a long one: what one client pipelines is taken apart before
-the next one has its turn."""
+"""Bytes to receive at a time, of a new request and of the rest of a long one. Pipelined requests within these are parsed
+before the next client is served.
+"""
 
 _END_OF_HEAD = b"\r\n\r\n"
 
+# Requests answered immediately if several arrive together; the others are answered in steps
 _ANSWERS_AT_ONCE = 1
-"""Of requests that came together; the others are answered in steps."""
 
 
 class State(Enum):
@@ -77,7 +75,7 @@ _OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State
 
 
 class Connection:
-    """One client: feed, take messages, answer them in order."""
+    """One client: receives data, finds messages, and answers them in order."""
 
     __slots__ = (
         "_fd",
@@ -108,33 +106,33 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        # The request that is answered next; further ones that came with it are bytes yet.
+        # The next request to answer; further requests that arrived with it are still unparsed bytes.
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
-        # Bytes since the time limit was set.
+        # Bytes transferred since the time limit was set.
         self._moved = 0
 
         self._task: asyncio.Task[None] | None = None
-        # A long request that is being answered in steps, and the bytes of its body.
+        # The steps that answer a long request, and the bytes of its body.
         self._work: Steps[None] | None = None
         self._work_bytes = 0
-        # It changes something: it is brought to its end, whether or not the client waits for it.
+        # The work changes state, so it is finished whether or not the client waits for the answer.
         self._must_finish = False
         self._held = 0
-        # Set while it is read from in steps.
+        # Set while the socket is read in steps.
         self._reading: object | None = None
 
         loop.add_reader(self._fd, self.readable)
 
     @property
     def is_idle(self) -> bool:
-        """Return whether no request is under way."""
+        """Return whether no request is in progress."""
         return self._state is _OPEN and self._reader.is_idle and not self._is_answering and not self._out
 
     @property
     def is_refused(self) -> bool:
-        """Return whether nothing more is answered."""
+        """Return whether nothing more will be answered."""
         return self._state is _REFUSED or self._state is _ENDED
 
     @property
@@ -142,7 +140,7 @@ class Connection:
         return self._task is not None or self._work is not None
 
     def end(self) -> None:
-        """Hang up. Idempotent."""
+        """Close the connection. Idempotent."""
         if self._state is _ENDED:
             return
         self._state = _ENDED
@@ -156,16 +154,16 @@ class Connection:
         self._server.deadlines.drop(self)
 
     def received(self, data: bytes) -> None:
-        """Bytes of requests have come."""
+        """Accept bytes of requests."""
         self._moved += len(data)
         self._find_message(data)
         self._answer_waiting()
         self._set_deadline()
 
     def _find_message(self, data: bytes = b"") -> bool:
-        """Take the next request out of what has come, with ``data``; return whether it is complete.
+        """Parse the next request from the received bytes and ``data``; return whether it is complete.
 
-        Only one: what a client pipelines takes longer to parse than a request of another client.
+        Only one, so that parsing a client's pipelined requests does not delay other clients.
         """
         try:
             message = self._reader.feed_one(data) if data else self._reader.next_message()
@@ -190,7 +188,7 @@ class Connection:
         return True
 
     def _receive(self, most: int = _RECEIVE) -> bytes | None:
-        """Return the bytes that have arrived; b"" at the end, None if there are none."""
+        """Return the bytes that have arrived; b"" at end of file, None if there are none."""
         try:
             return self._sock.recv(most)
         except (BlockingIOError, InterruptedError):
@@ -199,12 +197,12 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, as there is something, unless others come first: the loop calls this again in its next iteration."""
+        """Read, unless other connections come first: then the loop calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 
     def read(self) -> None:
-        """Read what there is: the rest of a long request in steps, as what a client sends that was refused."""
+        """Read available bytes; in steps for the rest of a long request or a client that was refused."""
         if not self._held and self._state is not _REFUSED:
             self._take(self._receive())
             return
@@ -213,7 +211,7 @@ class Connection:
         self._server.turns.start(self._read_much(reading))
 
     def _read_much(self, reading: object) -> Steps[None]:
-        """Read until nothing more is there, or until something else has stopped or started reading."""
+        """Read until nothing more is available, or until other code has stopped or restarted reading."""
         while self._reading is reading:
             data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
             if data is None:
@@ -223,7 +221,7 @@ class Connection:
             yield None
 
     def _stop_reading(self) -> None:
-        """Read nothing for now. Idempotent."""
+        """Stop reading for now. Idempotent."""
         self._loop.remove_reader(self._fd)
         self._server.drop_late(self)
         self._reading = None
@@ -233,12 +231,12 @@ class Connection:
         self._loop.add_reader(self._fd, self.readable)
 
     def _take(self, data: bytes | None) -> None:
-        """Take what has come: b"" is the end, None is nothing."""
+        """Process received bytes: b"" is end of file, None is nothing."""
         if data is None:
             return
 
         if self._state is _REFUSED:
-            # Whatever it still says.
+            # Ignore all further data.
             if not data:
                 self.end()
             return
@@ -246,11 +244,11 @@ class Connection:
         if data:
             self._server.connections.move_to_end(self)
             if data.endswith(_END_OF_HEAD):
-                # Clients in Python send the body right behind its head: mostly it is there by now.
+                # Python clients send the body right after the head, so usually it has arrived by now.
                 data += self._receive() or b""
             self.received(data)
         elif self._out and self._state is _OPEN:
-            # It sends no more requests, but waits for answers.
+            # The client sends no more requests, but waits for answers.
             self._state = _CLOSING
             self._stop_reading()
         else:
@@ -270,7 +268,7 @@ class Connection:
             self._answer(message)
 
     def _answer_rest(self) -> Steps[None]:
-        """Answer many requests that came together, or rather those of them that come next."""
+        """Answer the next of several requests that arrived together."""
         yield None
         self._work = None
         self._go_on()
@@ -283,13 +281,13 @@ class Connection:
             self._set_deadline()
 
     def _pause(self) -> None:
-        """Read nothing until the present requests are answered."""
+        """Stop reading until the present requests are answered."""
         if self._state is _OPEN:
             self._state = _BUSY
             self._stop_reading()
 
     def _answer(self, message: HttpMessage) -> None:
-        """Answer immediately, or start a task or work in steps for what takes longer."""
+        """Answer immediately, or start a task or steps for longer work."""
         if message.method != "POST":
             self.refuse(405, "this is an XML-RPC server: send POST")
             return
@@ -331,7 +329,7 @@ class Connection:
         self._server.turns.start(work)
 
     def _read_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> Steps[None]:
-        """Read a long request, and answer it."""
+        """Parse a long request in steps, and answer it."""
         if len(body) > _ALONE_BODY:
             yield ALONE
 
@@ -361,7 +359,7 @@ class Connection:
         yield from self._serialize_in_steps(method, value, keep_alive)
 
     def _serialize_in_steps(self, method: str, value: object, keep_alive: bool) -> Steps[None]:
-        """Answer with a value that may be long, or that steps return."""
+        """Answer with a value that may be long, or that is computed in steps."""
         pieces: Sequence[bytes]
         try:
             if isinstance(value, Generator):
@@ -395,7 +393,7 @@ class Connection:
         self._finish(body, keep_alive)
 
     def _finish(self, body: bytes, keep_alive: bool) -> None:
-        """Send the answer to what took longer, and go on with the next request."""
+        """Send the answer of longer work, and continue with the next request."""
         self._work = None
         if not self.is_refused:
             self._send(body, keep_alive)
@@ -406,7 +404,7 @@ class Connection:
         self._sent(keep_alive)
 
     def _send_pieces(self, pieces: Sequence[bytes], keep_alive: bool) -> None:
-        """Send an answer, which is not joined if it is long."""
+        """Send an answer in pieces; a long answer is not joined."""
         if len(pieces) == 1:
             self._send(pieces[0], keep_alive)
             return
@@ -418,11 +416,11 @@ class Connection:
             self._close()
 
     def log_refusal(self, why: str) -> None:
-        """Log that the client was refused something."""
+        """Log that a request of the client was refused."""
         self._server.log_refusal(self._sock, why)
 
     def _drop_request(self) -> None:
-        """Forget what was requested."""
+        """Discard the present request."""
         self._message = None
         self._reader.close()
         self._work_bytes = 0
@@ -434,7 +432,7 @@ class Connection:
             self._task.cancel()
 
     def refuse(self, status: int, text: str) -> None:
-        """Answer with an error, and read no more requests."""
+        """Answer with an error, and accept no more requests."""
         if self.is_refused:
             return
         self._drop_request()
@@ -449,7 +447,7 @@ class Connection:
             self._limit(_LINGER_SECONDS)
 
     def _close(self) -> None:
-        """Hang up once what is written has been taken."""
+        """Close the connection after the pending output has been sent."""
         self._message = None
         if not self._out:
             self.end()
@@ -459,7 +457,7 @@ class Connection:
             self._state = _CLOSING
 
     def _write(self, *pieces: bytes) -> None:
-        """Send what the socket takes, and keep the rest."""
+        """Send as much as the socket accepts, and queue the rest."""
         if self._state is _ENDED:
             return
         was_empty = not self._out
@@ -476,13 +474,13 @@ class Connection:
         self._count_unread(kept)
         self._set_deadline()
         if self._state is _OPEN and self._out.size > MAX_UNREAD:
-            # The client does not read its answers: it gets no more of them, and is not read from.
+            # The client does not read its answers: send no more of them, and stop reading its requests.
             self._state = _FULL
             self._stop_reading()
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
-        """Count bytes that were added to the answers that wait, or taken from them."""
+        """Count ``more`` bytes added to the unread answers, or removed from them if negative."""
         self._server.unread += more
         if not self._out:
             self._server.slow.pop(self, None)
@@ -523,7 +521,7 @@ class Connection:
             self._sock.shutdown(socket.SHUT_WR)
 
     def _hold(self) -> None:
-        """Count the bytes of the present request."""
+        """Update the count of bytes buffered for the present request."""
         count = self._reader.held + self._work_bytes
         if count == self._held:
             return
@@ -535,7 +533,7 @@ class Connection:
             self._server.holders.pop(self, None)
 
     def _set_deadline(self) -> None:
-        """Set the time limit of a request that has started, or an answer that waits; an idle connection has none."""
+        """Set the time limit of a started request or a pending answer; an idle connection has none."""
         if self._out or not self._reader.is_idle:
             is_due = not self._has_deadline or self._moved > _PROGRESS
             if is_due and self._state is not _ENDED and self._state is not _REFUSED:

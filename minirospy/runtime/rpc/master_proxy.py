@@ -1,4 +1,4 @@
-"""The master and the nodes as Python objects: typed calls, answers unwrapped, errors named.
+"""The master and the nodes as Python objects: typed calls, unwrapped answers, specific errors.
 
 Blocking, without asyncio. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API,
 http://wiki.ros.org/ROS/Parameter%20Server%20API.
@@ -26,7 +26,7 @@ class SystemState(NamedTuple):
 
 
 class BusConnection(NamedTuple):
-    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` where the node reports it."""
+    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them."""
 
     id: object
     destination: str
@@ -38,7 +38,7 @@ class BusConnection(NamedTuple):
 
 
 def unwrap(method: str, answer: object) -> Any:
-    """Return the value of a ROS API answer. Raise RpcRefused where its status is not 1."""
+    """Return the value of a ROS API answer. Raise RpcRefused if its status is not 1."""
     match answer:
         case [1, _, value]:
             return value
@@ -49,7 +49,7 @@ def unwrap(method: str, answer: object) -> Any:
 
 
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
-    """Return the error of a master that cannot be called: it does not answer, or this process has no socket left."""
+    """Return the error for a failed call of the master: it does not answer, or this process can open no more sockets."""
     cause = error.__cause__
     if isinstance(error, RpcTimeout):
         return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")
@@ -63,7 +63,7 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 class MasterProxy:
     """The master at ``uri``, called as the node ``caller_id``.
 
-    Each method raises MasterUnreachableError if it does not answer, RpcRefused where it refuses.
+    Each method raises MasterUnreachableError if the master does not answer, RpcRefused if it refuses the call.
     """
 
     def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
@@ -75,7 +75,7 @@ class MasterProxy:
             raise MasterUnreachableError(uri) from error
 
     def call(self, method: str, *args: object) -> Any:
-        """Call any method of the API; the caller's id is put in front."""
+        """Call any method of the API; the caller's id is prepended to the arguments."""
         try:
             return unwrap(method, self._client.call(method, self.caller_id, *args))
         except RpcUnreachable as error:
@@ -190,7 +190,7 @@ class SlaveProxy:
         self._client = RpcClient(uri, timeout, same_host=same_host)
 
     def call(self, method: str, *args: object) -> Any:
-        """Call any method of the API; the caller's id is put in front."""
+        """Call any method of the API; the caller's id is prepended to the arguments."""
         return unwrap(method, self._client.call(method, self.caller_id, *args))
 
     def close(self) -> None:
@@ -206,25 +206,25 @@ class SlaveProxy:
         return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
 
     def get_bus_stats(self) -> list[object]:
-        """Return statistics, as the node reports them."""
+        """Return the statistics that the node reports."""
         return list(self.call("getBusStats"))
 
     def get_master_uri(self) -> str:
-        """Return the master that the node registered with."""
+        """Return the URI of the master that the node registered with."""
         return str(self.call("getMasterUri"))
 
     def shutdown(self, reason: str = "") -> None:
-        """Ask the node to stop."""
+        """Request the node to shut down."""
         self.call("shutdown", reason)
 
     def get_subscriptions(self) -> list[tuple[str, str]]:
-        """Return (topic, type) of what the node subscribes to."""
+        """Return (topic, type) of each subscription of the node."""
         return [(topic, type_) for topic, type_ in self.call("getSubscriptions")]
 
     def get_publications(self) -> list[tuple[str, str]]:
-        """Return (topic, type) of what the node publishes."""
+        """Return (topic, type) of each publication of the node."""
         return [(topic, type_) for topic, type_ in self.call("getPublications")]
 
     def request_topic(self, topic: str, protocols: list[list[object]]) -> list[object]:
-        """Return where the topic is found, as [protocol, host, port]."""
+        """Return the topic's address, as [protocol, host, port]."""
         return list(self.call("requestTopic", topic, protocols))

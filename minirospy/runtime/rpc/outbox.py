@@ -1,4 +1,4 @@
-"""The bytes of answers that wait for a client to read them."""
+"""A queue of answer bytes that a client has not read yet."""
 
 from __future__ import annotations
 
@@ -8,27 +8,25 @@ from collections.abc import Sequence
 
 __all__ = ["MAX_UNREAD", "Outbox"]
 
-MAX_UNREAD = 256 * 1024
-"""Bytes of answers that wait for a client to read them, before it gets no more."""
+MAX_UNREAD = 256 * 1024  # bytes; a client with more unread answers gets no further ones
 
 
 class Outbox:
-    """A queue of bytes in front of a socket that does not block. True if something waits in it."""
+    """A queue of bytes in front of a non-blocking socket. It is true if it contains bytes."""
 
     __slots__ = ("_pieces", "_sock", "size")
 
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
         self._pieces: deque[memoryview] = deque()
-        self.size = 0
-        """Bytes that wait."""
+        self.size = 0  # bytes in the queue
 
     def __bool__(self) -> bool:
-        """Return whether something waits."""
+        """Return whether the queue contains bytes."""
         return self.size > 0
 
     def write(self, pieces: Sequence[bytes]) -> int:
-        """Send what the socket takes, and keep the rest; return how many bytes that is. Raise OSError."""
+        """Send as much as the socket accepts, and queue the rest; return the number of bytes sent. Raise OSError."""
         sent = 0
         if not self.size:
             try:
@@ -49,7 +47,7 @@ class Outbox:
         return kept
 
     def flush(self) -> int:
-        """Send what the socket takes of the queue; return how many bytes it took. Raise OSError."""
+        """Send as much of the queue as the socket accepts; return the number of bytes sent. Raise OSError."""
         sent = 0
         try:
             while self._pieces and sent < MAX_UNREAD:
@@ -68,7 +66,7 @@ class Outbox:
         return sent
 
     def clear(self) -> int:
-        """Forget what waits; return how many bytes that was."""
+        """Discard the queue; return the number of bytes discarded."""
         self._pieces.clear()
         size, self.size = self.size, 0
         return size

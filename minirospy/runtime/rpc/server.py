@@ -1,11 +1,11 @@
 """An XML-RPC server on the event loop.
 
-Its connections are plain sockets that the loop watches: a master serves thousands of short ones, and an asyncio
-transport for each would cost more than all that is done with it.
+Its connections are plain sockets that the loop watches: a master serves thousands of short connections, and an asyncio
+transport for each would cost more than all other work.
 
-No client delays the others: a short request is answered immediately, a long one (a large body, a large answer, many
-calls in one) in steps, for a few milliseconds in each turn of the loop (``runtime/rpc/turns.py``). What clients have the
-server hold in memory is limited for all of them together: requests that are incomplete, and answers that are not read.
+No client delays the others: a short request is answered immediately. A long one (a large body, a large answer, many
+calls in one) is processed in steps, for a few milliseconds in each loop iteration (``runtime/rpc/turns.py``). Memory
+is limited for all clients together, both for incomplete requests and for unread answers.
 """
 
 from __future__ import annotations
@@ -32,35 +32,36 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
+# Bytes of requests that are incomplete or being read, of all clients; beyond that the largest are refused
 _MAX_HELD = 72 * 1024 * 1024
-_LARGE = 32 * 1024
-"""Bytes of requests that are incomplete or being read, of all clients; beyond that the largest are refused."""
+_LARGE = 32 * 1024  # bytes; requests up to this size are not refused for that
 
+# Unread bytes of all clients; then the client that has read nothing for longest is disconnected
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
-"""Bytes of answers that wait for all clients; beyond that those that read nothing for longest are hung up on."""
 
 _BACKLOG = 4096
-"""Connections that wait to be accepted. Of a client that finds no room the kernel drops the first segments, and sends
-them again after a growing time: 1, 3, 7 s if it has not connected, up to 25 s for its request if it has."""
+"""Connections that wait to be accepted. If the queue is full, the kernel drops a client's first segments, and the client
+resends them after growing delays: 1, 3, 7 s while connecting, up to 25 s for its request after that.
+"""
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
 _READ_SECONDS = 0.003
-"""Connections in one turn of the loop, how long that may take, and how long they are read from immediately.
+"""Connections to accept per loop iteration, the seconds this may take, and the seconds to read from them immediately.
 
-Thousands may connect together, and one that does so after them waits until all of them are accepted: 30 us for each."""
+Thousands of clients may connect together; a later one waits until all of them are accepted, 30 us each.
+"""
 
-_ACCEPTS_BETWEEN = 64
-"""Connections that are accepted between others that are read from."""
+_ACCEPTS_BETWEEN = 64  # connections to accept before others are read from
 
+# Connections to read from, some 1 ms, before accepting new ones: thousands may be readable together
 _READS_AT_ONCE = 16
-"""Connections that are read from before new ones are accepted, some 1 ms: thousands may have data, or end, at a time."""
 
+# Connections to read from per loop iteration, and the seconds this may take; the rest come first in the next one
 _MAX_READS, _READS_SECONDS = 256, 0.01
-"""Connections in one iteration of the loop, and how long that may take; the others come first in the next one."""
 
 
 Dispatch = Callable[[str, list[object]], object]
-"""Method name and arguments in, value out, or an awaitable of it, or steps that return it; raises RpcFault."""
+"""Takes a method name and arguments; returns the value, an awaitable of it, or steps that compute it; raises RpcFault."""
 
 
 class RpcServer:
@@ -77,50 +78,46 @@ class RpcServer:
         access: Access | None = None,
         known_as: Iterable[str] = (),
     ) -> None:
-        """Port 0 takes a free one, out of ``ports`` where these are given.
+        """Listen on ``port``; port 0 means any free port, chosen from ``ports`` if given.
 
-        Processes of this machine that know the server by one of the hosts ``known_as`` may come by a Unix socket.
+        Processes on this machine that know the server by one of the host names ``known_as`` may connect through a Unix socket.
 
-        ``most_idle`` clients are kept, those that spoke last (None: all). Clients that ``access`` does not
-        allow are hung up on.
+        The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
+        disconnected.
         """
         self.dispatch = dispatch
         self.port = port
-        self.refused = 0
-        """How many connections were not allowed."""
-        self.held = 0
-        """Bytes of requests that are incomplete or being read."""
-        self.holders: dict[Connection, int] = {}
-        """The connections that they are of, and how many."""
-        self.unread = 0
-        """Bytes of answers that wait for their clients."""
+        self.refused = 0  # number of connections that were not allowed
+        self.held = 0  # bytes of requests that are incomplete or being read
+        self.holders: dict[Connection, int] = {}  # connection -> its share of ``held``, in bytes
+        self.unread = 0  # bytes of answers that clients have not read yet
         self.slow: OrderedDict[Connection, None] = OrderedDict()
-        """The connections that they are for; those that read last are at the end."""
+        """The connections with unread answers; those that read most recently are last."""
         self.turns = Turns()
         self.connections: OrderedDict[Connection, None] = OrderedDict()
-        """Those that spoke last are at the end."""
+        """All connections; the most recently active are last."""
 
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
-        # Those that are accepted together may take each other's places: each is read from first.
+        # With few places, clients accepted together may displace each other, so each is read from first.
         self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
-        # Those at which nobody is accepted for a moment.
+        # Sockets that pause accepting for a moment.
         self._resting: set[socket.socket] = set()
-        # Connections that were read from in this iteration of the loop, when the time for that ends, and whether it is over.
+        # Connections read from in this loop iteration, the time limit for reading, and whether it is over.
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
-        # Those that wait for the next iteration: new ones, and those that have requested something before.
+        # Connections to read in the next iteration: new ones, and ones that have made a request before.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
 
         self.deadlines: Deadlines[Connection] = Deadlines(Connection.end)
-        """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
+        """Time limits for receiving a request or sending an answer; idle connections have none."""
         self._limited_log = RateLimitedLogger(_log)
         self._strangers = RateLimitedLogger(_log, 10)
         self._unaccepted = RateLimitedLogger(_log)
@@ -131,17 +128,17 @@ class RpcServer:
         return len(self.connections)
 
     def listen(self) -> None:
-        """Take the port, alone; clients that connect wait until :meth:`start`. Idempotent. Raise OSError.
+        """Bind the port exclusively; clients that connect wait until :meth:`start`. Idempotent. Raise OSError.
 
-        With port 0 ``port`` is the one that was free from here on.
+        With port 0, ``port`` is set to the chosen port.
         """
         if self._sock is not None:
             return
         sock = tcp.bind(self._bind_host, self.port, self._ports)
         try:
-            # Those that are accepted take it over.
+            # Accepted sockets inherit this option.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # Two sockets may be bound to one port, as long as none of them listens.
+            # Two sockets may be bound to one port as long as neither listens.
             sock.listen(_BACKLOG)
         except BaseException:
             sock.close()
@@ -161,7 +158,7 @@ class RpcServer:
                 self._watch(unix)
 
     async def close(self) -> None:
-        """Stop listening and end all connections. Idempotent."""
+        """Stop listening and close all connections. Idempotent."""
         while self._listening:
             sock = self._listening.pop()
             asyncio.get_running_loop().remove_reader(sock)
@@ -181,9 +178,9 @@ class RpcServer:
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
     def admit(self, connection: Connection, *, is_new: bool) -> bool:
-        """Return whether a connection that has data, or has ended, is read from now; else it is soon.
+        """Return whether to read now from a readable connection; if not, it is read in the next iteration.
 
-        ``is_new``: it has requested nothing yet.
+        ``is_new``: the connection has made no request yet.
         """
         if self._may_read():
             return True
@@ -191,12 +188,12 @@ class RpcServer:
         return False
 
     def drop_late(self, connection: Connection) -> None:
-        """Do not read from a connection that waits for it. Idempotent."""
+        """Remove a connection from those to read in the next iteration. Idempotent."""
         self._late_new.pop(connection, None)
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection is read from in this iteration of the loop, after new ones were accepted."""
+        """Return whether one more connection may be read in this loop iteration; accepts new connections in between."""
         if self._reads_over:
             return False
         self._reads += 1
@@ -213,12 +210,12 @@ class RpcServer:
         return not self._reads_over
 
     def _start_iteration(self) -> None:
-        """Read from those that could not be read from in the last iteration, before the loop gets to any others."""
+        """Read the connections left over from the last iteration, before the loop handles any others."""
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # In turns, so that a crowd of one kind does not keep the others waiting: those that have said nothing for long
-            # and disconnect, those that connect, those that request much.
+            # Alternate, so that many of one kind do not delay the others: long silent connections that disconnect,
+            # new ones, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
@@ -243,7 +240,7 @@ class RpcServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                # Out of file descriptors: the longest silent one makes room, a moment later.
+                # Out of file descriptors: the longest silent connection is closed to make room; retry a moment later.
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)
@@ -260,7 +257,7 @@ class RpcServer:
         try:
             peer.setblocking(False)
         except OSError:
-            # It has gone already.
+            # The peer has already disconnected.
             peer.close()
             return
         if self._most is not None and len(self.connections) >= self._most:
@@ -268,20 +265,20 @@ class RpcServer:
         connection = Connection(self, peer, loop)
         self.connections[connection] = None
         if reads:
-            # Mostly the first request is there by now.
+            # Usually the first request has arrived by now.
             connection.read()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
-        """Log that a request was refused; a flood of them is summed up."""
+        """Log a refused request, with a rate limit."""
         try:
-            # Who comes by a Unix socket has no address.
+            # A peer on a Unix socket has no address.
             name = sock.getpeername()[0] if sock.family in sockets.FAMILIES else "this machine"
         except OSError:
             name = "a client"
         self._limited_log.warning("a request from %s was refused: %s", name, why)
 
     def limit_held(self, connection: Connection) -> bool:
-        """Refuse the largest requests where all together hold too much; return whether ``connection`` remains."""
+        """Refuse the largest requests if their total exceeds the limit; return whether ``connection`` remains."""
         while self.held > _MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= _LARGE:
@@ -290,14 +287,14 @@ class RpcServer:
         return not connection.is_refused
 
     def limit_unread(self) -> None:
-        """Hang up on the slowest clients where too many answers wait."""
+        """Disconnect the slowest clients if the total of unread answers exceeds the limit."""
         while self.unread > _MAX_UNREAD_OF_ALL and len(self.slow) > 1:
             slowest = next(iter(self.slow))
             slowest.log_refusal("its answers were not read")
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """Close an idle connection, or else the one that was silent longest."""
+        """Close the idle connection that was silent longest, or else any connection that was."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()
@@ -316,5 +313,5 @@ class RpcServer:
 
 
 def is_address_in_use(error: OSError) -> bool:
-    """Return whether listening failed because somebody else listens there."""
+    """Return whether listening failed because another process listens on the port."""
     return error.errno == errno.EADDRINUSE or getattr(error, "winerror", None) == 10048

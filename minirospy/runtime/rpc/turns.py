@@ -1,4 +1,4 @@
-"""Long work on the event loop, a few milliseconds in each of its turns, so that nobody else waits for it."""
+"""Long work on the event loop: a few milliseconds in each loop iteration, so that other work is not delayed."""
 
 from __future__ import annotations
 
@@ -14,25 +14,22 @@ __all__ = ["Turns"]
 
 _log = logging.getLogger(__name__)
 
-_SECONDS = 0.003
-"""Of each turn of the loop, for all the work together."""
+_SECONDS = 0.003  # of each loop iteration, for all work together
 
-_PAUSE = 0.005
-"""Seconds, while all that is left is waiting for something."""
+_PAUSE = 0.005  # seconds to pause while all remaining work waits for something
 
-_AT_ONCE = 16
-"""Pieces of work that are under way: those that have not started take hardly any memory."""
+_AT_ONCE = 16  # number of generators in progress; those not started yet take hardly any memory
 
 
 class Turns:
-    """Runs work side by side, in equal shares, some at a time. All of it on one event loop."""
+    """Runs generators concurrently on one event loop, a limited number at a time, with equal shares of time."""
 
     def __init__(self, seconds: float = _SECONDS, clock: Callable[[], float] = time.perf_counter) -> None:
         self._seconds = seconds
         self._clock = clock
         self._queue: deque[Steps[None]] = deque()
         self._backlog: deque[Steps[None]] = deque()
-        # What takes much memory: the one that runs, and those that wait for it.
+        # The work that takes much memory: the generator that runs, and those that wait for it.
         self._alone: Steps[None] | None = None
         self._waiting: deque[Steps[None]] = deque()
         self._running: Steps[None] | None = None
@@ -42,22 +39,22 @@ class Turns:
         return len(self._queue) + len(self._waiting) + len(self._backlog)
 
     def start(self, steps: Steps[None]) -> None:
-        """Run ``steps`` from the next turn of the loop on."""
+        """Run ``steps`` from the next loop iteration on."""
         (self._queue if len(self._queue) < _AT_ONCE else self._backlog).append(steps)
         self._schedule()
 
     def cancel(self, steps: Steps[None]) -> None:
-        """Stop some work where it is. Idempotent."""
+        """Cancel the work ``steps``. Idempotent."""
         for queue in (self._queue, self._waiting, self._backlog):
             if steps in queue:
                 queue.remove(steps)
         self._release(steps)
-        # What ends its own connection is in its last step.
+        # A generator that cancels itself is in its last step.
         if steps is not self._running:
             steps.close()
 
     def close(self) -> None:
-        """Stop all of it. Idempotent."""
+        """Cancel all work. Idempotent."""
         for steps in [*self._queue, *self._waiting, *self._backlog]:
             self.cancel(steps)
 
@@ -90,7 +87,7 @@ class Turns:
         return self._clock() >= end
 
     def _run(self, steps: Steps[None], end: float) -> bool:
-        """Run some work up to ``end``; return whether it is to go on."""
+        """Run ``steps`` until the time ``end``; return whether work remains."""
         self._running = steps
         try:
             while True:
@@ -109,7 +106,7 @@ class Turns:
         return False
 
     def _claim(self, steps: Steps[None]) -> bool:
-        """Return whether it may go on alone; else it waits."""
+        """Return whether ``steps`` may run alone now; otherwise it waits."""
         if self._alone is None:
             self._alone = steps
         if self._alone is steps:

@@ -1,1 +1,1 @@
-"""Sockets: TCP and Unix, links of topics, the loop and its threads, limits."""
+"""Transport: TCP and Unix sockets, links of topics, the event loop, worker threads, limits."""

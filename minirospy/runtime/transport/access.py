@@ -8,32 +8,32 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
-    # Without networks, as in nearly every node, it is not imported.
+    # Imported only if networks are given, which nearly no node does.
     from ipaddress import IPv4Network, IPv6Network
 
 __all__ = ["Access", "listening_lines"]
 
 
 class Access:
-    """Peers of these networks may connect, and this machine itself; without any network everybody may."""
+    """Allows peers in these networks, and this machine itself; without any network, allows all peers."""
 
     def __init__(self, networks: Iterable[str] = ()) -> None:
-        """``networks``: as 192.168.65.0/24 or a single address. Raise UsageError."""
+        """Take ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError."""
         self.networks = tuple(_network(text) for text in networks)
-        # A robot's peers are few and come often.
+        # A cache: a robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod
     def parse(cls, text: str) -> Access:
-        """Return the access of networks with commas or spaces between them; "" admits everybody. Raise UsageError."""
+        """Parse networks separated by commas or spaces; "" allows all peers. Raise UsageError."""
         networks = text.replace(",", " ").split()
         if text and not networks:
-            # Perhaps variables that are not set: they must not admit everybody.
+            # Perhaps the text came from unset variables, which must not allow all peers.
             raise UsageError(f"'{text}' names no network: write as 192.168.65.0/24, or an address")
         return cls(networks)
 
     def allows(self, peer: str, here: str = "") -> bool:
-        """Return whether a connection from the address ``peer`` is allowed; ``here`` is this end's address."""
+        """Return whether a connection from the address ``peer`` is allowed; ``here`` is the local address."""
         if not self.networks:
             return True
         known = self._known.get(peer)
@@ -59,7 +59,7 @@ class Access:
 
 
 def listening_lines(bind_host: str, port: int, access: Access, *, local: bool = False) -> list[str]:
-    """Return where a server can be reached, and a warning where that is from the open internet."""
+    """Return lines with the addresses of a server, and a warning if it is reachable from the open internet."""
     import ipaddress
 
     if local:

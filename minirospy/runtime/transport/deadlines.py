@@ -1,4 +1,4 @@
-"""Time limits of many things that nearly always complete in time: one timer of the loop serves them all."""
+"""Time limits of many operations that nearly always complete in time, with a single timer of the loop."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _T = TypeVar("_T")
 
 
 class Deadlines(Generic[_T]):
-    """The time limit of each thing under way.
+    """The time limit of each operation in progress.
 
-    ``late`` is called, on the loop, with each one that has passed its limit, in the order of the limits.
+    ``late`` is called, on the loop, with each operation that has passed its limit, in the order of the limits.
     """
 
     def __init__(self, late: Callable[[_T], object]) -> None:
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # When the timer fires: no later than the first of the ends.
+        # When the timer fires: no later than the earliest limit.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -31,14 +31,14 @@ class Deadlines(Generic[_T]):
         return iter(self._ends)
 
     def set(self, each: _T, seconds: float) -> None:
-        """Limit it to this many seconds from now on; replaces the limit that it had."""
+        """Limit ``each`` to this many seconds from now; replaces its previous limit."""
         loop = asyncio.get_running_loop()
         end = self._ends[each] = loop.time() + seconds
         if self._timer is None or end < self._next:
             self._watch(loop, end)
 
     def drop(self, each: _T) -> None:
-        """Remove the limit of one that has completed. Idempotent."""
+        """Remove the limit of an operation that has completed. Idempotent."""
         self._ends.pop(each, None)
 
     def close(self) -> None:
@@ -61,12 +61,12 @@ class Deadlines(Generic[_T]):
         loop = asyncio.get_running_loop()
         now = loop.time()
 
-        # After a stall several are late: in the order of their ends, whatever the order in which they were set.
+        # After a stall several may be late: process them in the order of their limits, not in the order of set().
         late = sorted(
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )
         for end, _, each in late:
-            # The end of an earlier one may have completed this one, or given it more time.
+            # The call for an earlier one may have completed this one, or extended its limit.
             if self._ends.get(each) == end:
                 self.drop(each)
                 self._late(each)

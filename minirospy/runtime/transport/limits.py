@@ -1,4 +1,4 @@
-"""The system's limits on threads and open files, named where this process meets one."""
+"""The system's limits on threads and open files, with errors that name the limit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def naming_thread_limit() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        # Of a Python that is exiting; from 3.13 on it has its own error.
+        # Raised by an exiting Python; since 3.13 with a separate class.
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise
         if "interpreter shutdown" in str(error):
@@ -31,12 +31,12 @@ def naming_thread_limit() -> Iterator[None]:
 
 
 def is_file_limit(error: BaseException | None) -> bool:
-    """Return whether an error says that this process, or this machine, can open no more files and sockets."""
+    """Return whether an error means that this process, or this machine, can open no more files and sockets."""
     return isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE)
 
 
 def explain(error: BaseException) -> str:
-    """Return an error's text; of a file limit: which one it is, and what to do."""
+    """Return an error's text; for a file limit also which limit it is and how to raise it."""
     if not is_file_limit(error):
         return str(error)
     assert isinstance(error, OSError)

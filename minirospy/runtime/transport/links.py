@@ -20,23 +20,20 @@ from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 __all__ = ["OutLink"]
 
 _GATHER = 64
-_PUSH_SECONDS = 0.005
-_PUSH_WAIT_MS = 1
-"""How long the thread that publishes a large message writes it into the socket, and waits for one step."""
+_PUSH_SECONDS = 0.005  # during which a publishing thread itself writes a large message into the socket
+_PUSH_WAIT_MS = 1  # for a single wait meanwhile
 
-_Waiting = bytes | list[bytes | memoryview]
-"""A frame in an outbox: whole, or what is left of its buffers."""
+_Waiting = bytes | list[bytes | memoryview]  # a frame in an outbox: whole, or the buffers not sent yet
 
 
 class OutLink:
-    """The publisher's end of one connection: frames from any thread, in order, without blocking the publisher.
+    """The publisher's end of one connection: sends frames from any thread, in order, without blocking the publisher.
 
-    A frame is written immediately by the thread that sends it. What the socket does not take waits in the
-    outbox, which the loop empties; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit).
-    Before that a thread waits for room, a few milliseconds at most, but only for a peer on this machine that has read
-    since the last wait.
+    The sending thread writes a frame immediately. Whatever the socket does not accept waits in the outbox, which the
+    loop sends; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit). Before dropping, the thread waits
+    a few milliseconds for room, but only if the peer is on this machine and has read since the last wait.
     ``header`` is sent first, when the link is opened; frames that are published before that wait behind it.
-    With ``split`` large messages are sent as split frames where they can be.
+    With ``split`` large messages are sent as split frames if possible.
     """
 
     def __init__(
@@ -83,17 +80,17 @@ class OutLink:
 
     @property
     def number(self) -> int:
-        """The link's number among those of the node: its file descriptor."""
+        """The link's number within the node: its file descriptor."""
         return self._sock.fileno()
 
     @property
     def waiting(self) -> int:
-        """Return the number of frames that wait for the socket to take them."""
+        """Return the number of queued frames."""
         return len(self._outbox)
 
     @property
     def waiting_bytes(self) -> int:
-        """Return the number of bytes that wait for the socket to take them."""
+        """Return the number of queued bytes."""
         with self._lock:
             return sum(
                 len(frame) if isinstance(frame, bytes) else sum(map(len, frame)) for frame in self._outbox
@@ -101,11 +98,11 @@ class OutLink:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is inside :meth:`send`: a signal's handler in that very thread would wait for itself."""
+        """Return whether a thread is inside :meth:`send`: a signal handler in that thread would deadlock."""
         return self._lock.locked()
 
     def open(self) -> None:
-        """Send the header, and watch for the peer's hanging up (on the loop)."""
+        """Send the header, and watch for the peer to disconnect (on the loop)."""
         self._loop_thread = threading.get_ident()
         self._loop.add_reader(self._sock, self._readable)
         with self._drained:
@@ -139,7 +136,7 @@ class OutLink:
             self._post(self._start_writing)
 
     def wait(self) -> None:
-        """Return when the socket has taken all that waits, or the link is closed (not on the loop)."""
+        """Wait until the queue is sent, or the link is closed (not on the loop)."""
         with self._drained:
             self._drained.wait_for(lambda: not self._outbox or self._closed)
 
@@ -150,7 +147,7 @@ class OutLink:
             await asyncio.sleep(0.005)
 
     def close(self) -> None:
-        """End the connection (on the loop). Idempotent."""
+        """Close the connection (on the loop). Idempotent."""
         with self._drained:
             if self._closed:
                 return
@@ -163,15 +160,15 @@ class OutLink:
         self._on_closed(self)
 
     def _has_to_wait(self, frame: _Waiting) -> bool:
-        """Put ``frame`` behind those that wait; False if meanwhile they have all gone."""
+        """Append ``frame`` to the outbox; return False if the outbox has become empty instead."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # A thread that publishes without a pause would not let the loop's come to it.
+            # A thread that publishes without pause would not let the loop's thread send.
             self._help()
             if not outbox:
                 return False
         if self._is_full():
-            # The frame in front may be half on its way: that one has to stay.
+            # The first frame may be partly sent, so it has to stay.
             del outbox[1 if self._begun else 0]
             self.dropped += 1
         outbox.append(frame)
@@ -181,10 +178,10 @@ class OutLink:
         return bool(self.queue_size) and len(self._outbox) - self._begun >= self.queue_size
 
     def _help(self) -> None:
-        """Write what the socket takes; where the outbox is full, wait a little for room."""
+        """Send as much as the socket accepts; if the outbox is full, wait a little for room."""
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # Whom it fails with, the loop finds out.
+            # Ignore errors: the loop detects them.
             with contextlib.suppress(OSError):
                 while self._outbox:
                     self._write_some()
@@ -204,8 +201,8 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # No socket takes a large message in one call, and a peer that reads makes room in microseconds: to hand
-            # each step to the loop would cost more than to stay.
+            # No socket accepts a large message in one call, and a peer that reads makes room in microseconds: handing
+            # each step to the loop would cost more than waiting here.
             try:
                 left -= self._gather(buffers)
             except (BlockingIOError, InterruptedError):
@@ -227,7 +224,7 @@ class OutLink:
         return self._is_same_host and threading.get_ident() != self._loop_thread
 
     def _gather(self, buffers: list[bytes | memoryview]) -> int:
-        """Write some of ``buffers``, take it off them, and return how many bytes it was. Raise OSError."""
+        """Send some of ``buffers``, remove the sent bytes, and return their number. Raise OSError."""
         # Windows has no sendmsg.
         gather = getattr(self._sock, "sendmsg", None)
         count: int = gather(buffers) if gather else self._sock.send(buffers[0])
@@ -245,7 +242,7 @@ class OutLink:
 
     def _writable(self) -> None:
         if not self._drained.acquire(blocking=False):
-            # A thread that publishes is at it, and the loop has others to serve.
+            # A publishing thread is already sending, so the loop continues with other work.
             self._loop.remove_writer(self._sock)
             self._loop.call_later(_PUSH_SECONDS, self._start_writing)
             return
@@ -268,10 +265,10 @@ class OutLink:
             self._drained.release()
 
     def _write_some(self) -> None:
-        """Write some of what waits. Raise OSError."""
+        """Send some of the queue. Raise OSError."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # A partly sent frame, and a large one, is sent alone.
+            # A partly sent frame or a large one is sent separately.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:
@@ -297,7 +294,7 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """Close the link: a subscriber sends nothing, so what becomes readable is its end."""
+        """Close the link: a subscriber sends nothing, so a readable socket means end of file."""
         try:
             if self._sock.recv(4096):
                 return
@@ -309,7 +306,7 @@ class OutLink:
 
 
 def _take_off(buffers: list[bytes | memoryview], count: int) -> None:
-    """Take the first ``count`` bytes off ``buffers``."""
+    """Remove the first ``count`` bytes from ``buffers``."""
     while count:
         first = buffers[0]
         if count < len(first):

@@ -1,8 +1,8 @@
-"""Connections between two processes of one machine, over a Unix socket in place of TCP.
+"""Connections between two processes of one machine, through a Unix socket in place of TCP.
 
-Each port of a server has a socket of Linux' abstract kind, whose name is made of the server's host and
-port: no file, so nothing is left behind, however a process ends. It is seen by those that share the machine's
-network, as the port is. Source: docs/transports.md.
+Each port of a server has a Linux abstract socket, whose name is made from the server's host and port. It is not a
+file, so nothing is left behind when a process is killed. Like the port, it is visible to processes in the same network
+namespace. Source: docs/transports.md.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ from minirospy.runtime.transport import sockets
 __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
-_PREFIX = "minirospy-"
-"""How the names of sockets start."""
+_PREFIX = "minirospy-"  # the start of socket names
 
-_TRUSTED = frozenset({0})
-"""Users that are trusted besides this process's own: root."""
+_TRUSTED = frozenset({0})  # user ids that are trusted in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):
-    """A publisher's answer: the socket's name, and where TCPROS is served for one who cannot reach it."""
+    """A publisher's answer: the socket's name, and the TCPROS address as a fallback."""
 
     name: str
     host: str
@@ -34,7 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a text that two processes share if, and only if, abstract sockets connect them; "" where there are none."""
+    """Return a string that is equal in two processes if and only if abstract sockets connect them; "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:
@@ -45,13 +43,13 @@ def this_host() -> str:
 
 
 def name_of(host: str, port: int) -> str:
-    """Return the name of the socket beside ``port`` of a server that is known as ``host``."""
+    """Return the name of the socket for ``port`` of a server that is known as ``host``."""
     host = host.strip("[]").lower()
     return f"{_PREFIX}{'127.0.0.1' if host == 'localhost' else host}:{port}"
 
 
 def bind(host: str, port: int) -> socket.socket | None:
-    """Return the socket beside ``port`` of a server that is known as ``host``; None if there can be none."""
+    """Return a bound socket for ``port`` of a server that is known as ``host``; None if that is not possible."""
     if sys.platform != "linux":
         return None
     try:
@@ -61,14 +59,14 @@ def bind(host: str, port: int) -> socket.socket | None:
 
 
 def connect(name: str) -> socket.socket:
-    """Return a connected, non-blocking socket; a Unix socket needs no waiting. Raise OSError."""
+    """Return a connected, non-blocking socket; connecting a Unix socket does not block. Raise OSError."""
     return _open(name, lambda sock, address: sock.connect(address))
 
 
 def reach(host: str, port: int) -> socket.socket | None:
     """Return a connected, non-blocking socket to the server of ``host`` at ``port``; None if only TCP reaches it.
 
-    Other users of this machine could take a name before its server does: so the server is this user's or root's.
+    Another user of this machine could bind the name first, so the server must belong to this user or root.
     """
     if sys.platform != "linux":
         return None
@@ -84,9 +82,9 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Return the address out of a publisher's answer to requestTopic; None if it is of another protocol."""
+    """Return the address from a publisher's answer to requestTopic; None if it is for another protocol."""
     match answer:
-        # A peer must not choose any other socket of this machine, such as a display's or a message bus's.
+        # A peer must not be able to choose any other socket of this machine, such as a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:
@@ -98,7 +96,7 @@ def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.sock
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        # A zero byte makes it abstract. As UTF-8 in any locale: the two ends may have different ones.
+        # A zero byte makes it abstract. Use UTF-8 in any locale, since the two processes may have different ones.
         use(sock, b"\0" + name.encode(errors="surrogatepass"))
     except BaseException:
         sock.close()

@@ -1,4 +1,4 @@
-"""The bridge between a program's threads and the one asyncio loop of the process."""
+"""A connection between a program's threads and the single asyncio loop of the process."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
-_CLOSE_SECONDS = 2.0
-"""How long :meth:`LoopThread.close` waits for the last steps of what runs on the loop."""
+_CLOSE_SECONDS = 2.0  # how long :meth:`LoopThread.close` waits for the loop's tasks to finish
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
@@ -24,7 +23,7 @@ def new_event_loop() -> asyncio.AbstractEventLoop:
 
 
 class LoopClosedError(RuntimeError):
-    """The event loop has ended."""
+    """The event loop has closed."""
 
 
 class LoopThread:
@@ -32,7 +31,7 @@ class LoopThread:
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
-        # A signal handler may run while its thread holds it.
+        # A signal handler may run while its own thread holds the lock.
         self._lock = threading.RLock()
         self._is_ending = False
         self._end = asyncio.Event()
@@ -44,20 +43,20 @@ class LoopThread:
             self.loop.close()
             raise
         except BaseException:
-            # Ctrl-C while the thread starts, which closes the loop itself.
+            # Ctrl-C came while the thread started; the thread closes the loop itself.
             self.post(self._end.set)
             raise
 
     def run(self, coroutine: Coroutine[object, object, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.
 
-        Raise TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
-        and RuntimeError on the loop's own thread, which would wait for itself.
+        Raise TimeoutError after ``timeout`` seconds, LoopClosedError if the loop closes before it is done,
+        and RuntimeError on the loop's own thread, which would deadlock.
         """
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls.
+        """Start ``coroutine``, as the first half of :meth:`run`; several start in the order of these calls.
 
         Return the function that waits for the result, to be called once.
         """
@@ -74,7 +73,7 @@ class LoopThread:
 
             def has_ended(task: asyncio.Task[_T]) -> None:
                 if not task.cancelled():
-                    # A caller that is interrupted does not retrieve it.
+                    # Mark the exception as retrieved: an interrupted caller never retrieves it.
                     task.exception()
                 pending.release()
 
@@ -86,8 +85,8 @@ class LoopThread:
         return functools.partial(self._wait, tasks, pending)
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
-        # Not concurrent.futures.Future, whose lock the caller would hold for some steps of its wait, and the loop needs: a
-        # signal's handler that waits for the loop in one of those steps would wait forever.
+        # Do not use concurrent.futures.Future: the caller holds its lock for parts of the wait, and the loop needs
+        # it, so a signal handler that waits for the loop at such a moment would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):
                 raise TimeoutError
@@ -104,7 +103,7 @@ class LoopThread:
             self.loop.call_soon_threadsafe(function, *args)
 
     def close(self) -> None:
-        """End the loop: what still runs on it is cancelled."""
+        """Close the loop; tasks that still run are cancelled."""
         if not self._thread.is_alive():
             return
         # Not loop.stop(): a second one would interrupt the last steps of the thread.
@@ -119,7 +118,8 @@ class LoopThread:
         finally:
             with self._lock:
                 self._is_ending = True
-            # What was started by then becomes a task here, and what has just ended reports it: else callers would wait for ever.
+            # Let posted calls become tasks here, and finished tasks report their result; otherwise callers would wait
+            # forever.
             self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:

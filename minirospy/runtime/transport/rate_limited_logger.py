@@ -1,4 +1,4 @@
-"""A logger for what may fail a thousand times a second."""
+"""A logger for messages that may repeat a thousand times a second."""
 
 from __future__ import annotations
 
@@ -24,21 +24,20 @@ class RateLimitedLogger:
         self._limit = lines
         self._logged = 0
         self._omitted = 0
-        self._end = 0.0
-        """When the current ten seconds are over."""
+        self._end = 0.0  # when the current ten seconds are over
 
     def close(self) -> None:
-        """Log how many were omitted last. Idempotent."""
+        """Log the number of lines omitted last. Idempotent."""
         if self._omitted:
             self._log.warning("%d more like the last ones", self._omitted)
             self._omitted = 0
 
     def info(self, text: str, *args: object) -> None:
-        """Log what is no fault, or count it."""
+        """Log an information, or count it."""
         self._write(logging.INFO, text, args)
 
     def close_later(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Have :meth:`close` called when the current ten seconds are over, if the line before was the first to be omitted."""
+        """Schedule :meth:`close` for the end of the current ten seconds, if the last line was the first one omitted."""
         if self._omitted == 1:
             loop.call_later(max(0.0, self._end - time.monotonic()), self.close)
 
@@ -65,6 +64,6 @@ class RateLimitedLogger:
             return
 
         self._logged += 1
-        # Names and errors of peers: what is not text is ours.
+        # Arguments come from peers (names, errors) unless they are neither strings nor exceptions.
         shown = [escaped(str(arg)) if isinstance(arg, str | Exception) else arg for arg in args]
         self._log.log(level, text, *shown, stacklevel=3)

@@ -1,6 +1,6 @@
-"""A subscriber's end of a link: the frames that a connection carries after its handshake.
+"""A subscriber's end of a link: the connection that carries a topic's frames after the handshake.
 
-They are read by a worker (:func:`read_frames`) or on the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
+A worker reads the frames (:func:`read_frames`), or the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
 """
 
 from __future__ import annotations
@@ -33,19 +33,17 @@ from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive,
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096
-"""Bytes that are received at a time, and kept for each connection, where frames are read in turns."""
+_TURN_CHUNK = 4096  # bytes per receive, and of each connection's buffer, for frames read in turns
 
 _DRAIN_BYTES = 64 * 1024 * 1024
-_CLAIM = 16 * 1024 * 1024
-"""Largest receive, in bytes: a length is only a claim until the bytes arrive."""
+_CLAIM = 16 * 1024 * 1024  # bytes per receive: a length prefix must not allocate more before the data arrives
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 _log = logging.getLogger(__name__)
 
 
 class QueueSize(Protocol):
-    """The number of frames kept for a slow receiver; it may change at any time."""
+    """The number of frames to keep for a slow receiver; it may change at any time."""
 
     newest: int
 
@@ -54,20 +52,19 @@ class QueueSize(Protocol):
 class ReaderSet:
     """The readers of a node's topics. A reader that is the only active one may busy-poll for its next message.
 
-    Two would wait for each other's GIL, which takes longer than to be woken.
+    Two readers would wait for each other's GIL, which takes longer than waking up.
     """
 
-    last: object = None
-    """The reader that has read last."""
+    last: object = None  # the reader that was active last
 
 
 def read_frames(
     sock: socket.socket, deliver: Callable[[Frame], None], size: QueueSize, readers: ReaderSet
 ) -> None:
-    """Read frames in the calling thread until the peer ends; closes the socket.
+    """Read frames in the calling thread until the peer closes; closes the socket.
 
-    ``size.newest``: of what is ready when the thread reads, only so many frames, the newest, are
-    delivered (0: all), so that a slow receiver sees the present. Raise OSError or WireError.
+    If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so
+    that a slow receiver gets recent data. Raise OSError or WireError.
     """
     source = _FrameSource(sock, readers)
     try:
@@ -93,9 +90,9 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop: for receivers that do so little that a thread each would cost more.
+    """Read frames on the loop: for receivers so quick that a thread for each would cost more.
 
-    ``on_fault`` gets what ended the connection, an OSError or WireError, before ``on_end`` is called.
+    ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
     reader = FrameReader()
 
@@ -131,7 +128,7 @@ def watch_frames_in_turns(
 ) -> None:
     """Read frames on the loop in steps, which ``start_steps`` runs in turns with those of other connections.
 
-    Frames of more than ``most`` bytes are left out; ``on_left_out`` is called when one comes.
+    Frames of more than ``most`` bytes are skipped; ``on_left_out`` is called for each.
     """
     reader = FrameReader(most, skips=True, chunk=_TURN_CHUNK)
 
@@ -141,7 +138,7 @@ def watch_frames_in_turns(
 
     def read() -> Steps[None]:
         if sock.fileno() < 0:
-            # It was closed meanwhile.
+            # The socket was closed meanwhile.
             return
         skipped = reader.skipped
         try:
@@ -166,7 +163,7 @@ def watch_frames_in_turns(
 
 
 class _FrameSource:
-    """Frames off a blocking socket: small ones by the bufferful, each large one in its own memory."""
+    """Reads frames from a blocking socket: small ones by the bufferful, each large one into separate memory."""
 
     def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
         self.sock = sock
@@ -178,13 +175,13 @@ class _FrameSource:
         self._is_fast = False
 
     def read(self) -> Iterable[Frame]:
-        """Wait for the next frames; they are valid until the next call, large ones for good.
+        """Wait for the next frames. Small ones are valid until the next call, large ones permanently.
 
         Raise _Ended, OSError, WireError.
         """
         reader = self._reader
         if self._was_large:
-            # Another large one is likely: its first bytes are kept out of the small ones' buffer.
+            # Another large frame is likely: keep its first bytes out of the buffer for small ones.
             word = self._take(LENGTH_BYTES)
             length = parse_length(word)
             if length > CHUNK:
@@ -197,7 +194,7 @@ class _FrameSource:
         return self._small(count)
 
     def _receive(self, space: memoryview) -> int:
-        """Wait for bytes; busy-poll where the last ones came within the time that waking up takes."""
+        """Wait for bytes; busy-poll if the last ones arrived faster than a thread wakes up."""
         start = time.perf_counter()
         count = None
         if self._is_fast and self._readers.last is self:
@@ -205,7 +202,7 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # Also if the bytes were there, but the GIL was not: other threads of this process need it.
+        # This is also false if bytes were ready but the GIL was not: then other threads of this process need it.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
@@ -260,7 +257,7 @@ class _FrameSource:
 def _deliver_newest(
     source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
-    """Read on while something is ready, then deliver the newest frames."""
+    """Read while frames are ready, then deliver the newest ones."""
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
     ended = False
@@ -285,4 +282,4 @@ def _deliver_newest(
 
 
 class _Ended(Exception):
-    """The peer has ended the connection."""
+    """The peer has closed the connection."""

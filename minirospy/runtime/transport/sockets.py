@@ -1,4 +1,4 @@
-"""Sockets, without a loop: what is set on them, and how they are polled and closed."""
+"""Functions for sockets that need no loop: setting options, polling, and closing."""
 
 from __future__ import annotations
 
@@ -27,27 +27,23 @@ __all__ = [
     "tune",
 ]
 
-FAMILIES = (socket.AF_INET, socket.AF_INET6)
-"""The address families of TCP sockets."""
+FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sockets
 
-HANDSHAKE_SECONDS = 10.0
-"""A peer may never answer: each handshake ends after this."""
+HANDSHAKE_SECONDS = 10.0  # time limit of each handshake: a peer may never answer
 
-BUSY_POLL_SECONDS = 0.0002
-"""Most answers of a process on the same host come within this."""
+BUSY_POLL_SECONDS = 0.0002  # most answers of a process on the same host arrive within this
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between probes, number of probes. macOS calls the first TCP_KEEPALIVE."""
+"""Seconds of silence, seconds between probes, number of probes. macOS calls the first one TCP_KEEPALIVE."""
 
+# Requested bytes for a Unix socket, as many as TCP buffers; Linux caps it at net.core.wmem_max (208 kB)
 _SEND_BUFFER = 4 * 1024 * 1024
-"""What a Unix socket is to hold: TCP holds as much. Linux allows 208 kB unless net.core.wmem_max is raised, and counts double."""
 
-_PEER = struct.Struct("iII")
-"""The system's record of a peer, see Peer."""
+_PEER = struct.Struct("iII")  # layout of the kernel's credentials of a peer, see Peer
 
 
 class Peer(NamedTuple):
-    """The numbers of a process, its user and its group."""
+    """The process id, user id and group id of a process."""
 
     process: int
     user: int
@@ -57,7 +53,7 @@ class Peer(NamedTuple):
 def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
     """Set TCP_NODELAY as requested, and keepalive, so that a peer that lost power is noticed within a minute.
 
-    A socket of another kind is left as it is.
+    Sockets of other kinds remain unchanged.
     """
     if sock.family not in FAMILIES:
         return
@@ -71,9 +67,9 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket take some megabytes in one step, as far as the kernel allows; TCP enlarges its own buffers.
+    """Let a Unix socket buffer some megabytes, as far as the kernel allows; TCP enlarges its own buffers.
 
-    Otherwise a message of 1 MB needs the receiver several times, and each time a busy machine may run another process.
+    Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process each time.
     """
     if sock.family not in FAMILIES:
         with contextlib.suppress(OSError):
@@ -81,9 +77,9 @@ def enlarge_send_buffer(sock: socket.socket) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """Return a host's name as a resolver takes it. Raise OSError if it is not a host name.
+    """Return a host name in the form that a resolver accepts. Raise OSError if it is not a host name.
 
-    A str would have the resolver import the IDNA codec, which takes a command a tenth of its time.
+    A str would make the resolver import the IDNA codec, which takes a tenth of a command's time.
     """
     try:
         return host.encode("ascii" if host.isascii() else "idna")
@@ -92,18 +88,18 @@ def resolvable(host: str) -> bytes:
 
 
 def peer(sock: socket.socket) -> Peer:
-    """Return the process that has connected this Unix socket, or listened for it. Linux only."""
+    """Return the process at the other end of this Unix socket. Linux only."""
     return Peer(*_PEER.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)))
 
 
 def hang_up(sock: socket.socket) -> None:
-    """End a connection; a thread that is blocked in a read of it wakes up and closes it."""
+    """Shut a connection down; a thread that is blocked in a read of it wakes up and closes it."""
     with contextlib.suppress(OSError):
         sock.shutdown(socket.SHUT_RDWR)
 
 
 def is_readable(sock: socket.socket) -> bool:
-    """Return whether a read would not wait. poll, since select fails on descriptors above 1023."""
+    """Return whether a read would not block. Uses poll, since select fails on descriptors above 1023."""
     if hasattr(select, "poll"):
         return bool(_poll(sock, select.POLLIN).poll(0))
     return bool(select.select([sock], [], [], 0)[0])
@@ -121,22 +117,22 @@ def is_writable(sock: socket.socket, milliseconds: int) -> bool:
 def busy_poll(sock: socket.socket) -> None:
     """Busy-poll for the answer of another process, for up to a fifth of a millisecond.
 
-    To be woken takes as long as such a call. The processor is yielded to other processes meanwhile: the peer may need it.
-    Does nothing with a socket that may not be busy-polled.
+    Waking up takes as long as such an answer. The processor is yielded to other processes meanwhile, since the peer may
+    need it. Does nothing for a socket that may not be busy-polled.
     """
     if may_busy_poll(sock):
         _busy_poll(sock, select.POLLIN)
 
 
 def may_busy_poll(sock: socket.socket) -> bool:
-    """Return whether the peer is another process of this machine, at a Unix socket; a peer in this process needs the GIL."""
+    """Return whether the peer is another process on this machine, at a Unix socket; a peer in this process needs the GIL."""
     return sys.platform == "linux" and sock.family == socket.AF_UNIX and peer(sock).process != os.getpid()
 
 
 def busy_receive(sock: socket.socket, space: memoryview) -> int:
-    """Receive what another process sends within a fifth of a millisecond, by busy-polling.
+    """Receive data that another process sends within a fifth of a millisecond, by busy-polling.
 
-    For a socket of which ``may_busy_poll`` is true. Raise BlockingIOError if nothing comes, OSError.
+    Only for a socket for which ``may_busy_poll`` is true. Raise BlockingIOError if nothing arrives, OSError.
     """
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
@@ -149,11 +145,11 @@ def busy_receive(sock: socket.socket, space: memoryview) -> int:
 
 
 def _busy_poll(sock: socket.socket, events: int) -> bool:
-    """Poll for the events for up to a fifth of a millisecond; return whether they have come."""
+    """Poll for the events for up to a fifth of a millisecond; return whether they occurred."""
     poll = _poll(sock, events)
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
-        # First, since the peer may wait for this processor.
+        # Yield first, since the peer may wait for this processor.
         os.sched_yield()
         if poll.poll(0):
             return True

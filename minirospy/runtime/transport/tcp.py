@@ -1,7 +1,7 @@
-"""Sockets: listening, connecting, and the exact reads of a handshake, on the loop.
+"""TCP sockets on the loop: listening, connecting, and the exact reads of a handshake.
 
-A handshake reads exactly a header's bytes, so nothing of what follows is read with it, and the
-socket can be passed to a worker or a writer as it is.
+A handshake reads exactly a header's bytes and nothing after them, so the socket can be passed on to a worker or a
+writer.
 """
 
 from __future__ import annotations
@@ -31,20 +31,18 @@ __all__ = [
     "send_header",
 ]
 
-MAX_HANDSHAKES = 200
-"""Handshakes under way at a time: one more ends the oldest, since a genuine one takes milliseconds."""
+MAX_HANDSHAKES = 200  # in progress; one more closes the oldest, since a genuine one takes milliseconds
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-_MAX_LONG_HEADERS = 16 * 1024 * 1024
-"""Bytes of headers that are longer than that and incomplete, of all peers of a node."""
+_MAX_LONG_HEADERS = 16 * 1024 * 1024  # bytes, of all incomplete headers above _SHORT_HEADER of a node's peers
 
 _REFUSALS_LOGGED = 10
 _log = logging.getLogger(__name__)
 
 
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
-    """Return a socket that is bound to an address of this machine; port 0 takes a free one, out of ``ports`` if given.
+    """Return a socket that is bound to an address of this machine; port 0 means any free port, from ``ports`` if given.
 
     Raise OSError.
     """
@@ -60,7 +58,7 @@ def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
 
 
 async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECONDS) -> socket.socket:
-    """Return a connected, non-blocking socket. Raise OSError, also if the time is up."""
+    """Return a connected, non-blocking socket. Raise OSError, also on a timeout."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
 
@@ -86,21 +84,20 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
 
 
 class HeaderMemory:
-    """The memory that long headers take while they are received, of many peers."""
+    """The memory reserved for long headers that are being received from many peers."""
 
     def __init__(self, most: int = _MAX_LONG_HEADERS) -> None:
-        self.held = 0
-        """Bytes that are reserved."""
+        self.held = 0  # bytes reserved
         self._most = most
 
     def reserve(self, count: int) -> None:
-        """Reserve memory, to be returned by :meth:`free`. Raise WireError if it is too much."""
+        """Reserve memory; return it with :meth:`free`. Raise WireError if the limit is exceeded."""
         if self.held + count > self._most:
             raise WireError("too many long connection headers are being received at the same time")
         self.held += count
 
     def free(self, count: int) -> None:
-        """Return memory."""
+        """Release reserved memory."""
         self.held -= count
 
 
@@ -109,7 +106,7 @@ async def receive_header(
 ) -> Header:
     """Return the peer's connection header. Raise WireError or OSError.
 
-    With ``memory``, a long header is refused where others take it all.
+    With ``memory``, a long header is refused if other headers use up the limit.
     """
     at_hand = _header_at_hand(sock)
     if at_hand is not None:
@@ -122,7 +119,7 @@ async def send_header(sock: socket.socket, fields: Header) -> None:
     """Send a connection header."""
     data = serialize_header(fields)
     try:
-        # It is short, and a socket that was just made is empty.
+        # Does not block: the header is short, and the buffer of a new socket is empty.
         sent = sock.send(data)
     except (BlockingIOError, InterruptedError):
         sent = 0
@@ -131,10 +128,10 @@ async def send_header(sock: socket.socket, fields: Header) -> None:
 
 
 class Listener:
-    """A listening TCP socket; each connection is passed to ``accept`` in its own task.
+    """A listening TCP socket; each connection is passed to ``accept`` in a separate task.
 
-    ``accept(socket, address)`` does the handshake. What it raises, OSError or WireError, is logged, and the
-    connection is closed. The number of unfinished handshakes is limited. ``allows(peer's
+    ``accept(socket, address)`` does the handshake. If it raises OSError or WireError, the error is logged and the
+    connection closed. The number of unfinished handshakes is limited. ``allows(peer's
     address, own address)`` returns whether a peer may connect.
     """
 
@@ -146,13 +143,13 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # In the order of their start, with the address of the peer.
+        # Handshake -> the peer's address, in the order in which they started.
         self._handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
-        """Listen on ``host``; port 0 takes a free one, out of ``ports`` if given. Raise OSError."""
+        """Listen on ``host``; port 0 means any free port, from ``ports`` if given. Raise OSError."""
         sock = bind(host, port, ports)
         self.listen(sock)
         self.port = sock.getsockname()[1]
@@ -168,7 +165,7 @@ class Listener:
         self._watch()
 
     async def close(self) -> None:
-        """Stop listening, and end handshakes that are under way. Idempotent."""
+        """Stop listening, and cancel handshakes in progress. Idempotent."""
         if self._sock is not None:
             asyncio.get_running_loop().remove_reader(self._sock)
             self._sock.close()
@@ -180,7 +177,7 @@ class Listener:
         self._limited_log.close()
 
     def log_refusal(self, line: str) -> None:
-        """Log why a connection was refused; a flood of such lines is counted."""
+        """Log the reason for refusing a connection, with a rate limit."""
         self._limited_log.warning("%s", line)
 
     def _watch(self) -> None:
@@ -188,13 +185,14 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection; the loop comes back for the next, so that accepted ones proceed meanwhile."""
+        """Accept one connection; the loop calls this again for the next, so that accepted ones proceed meanwhile."""
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            # Out of file descriptors, or the peer has disconnected already: the next one may succeed, a moment later.
+            # Out of file descriptors, or the peer has already disconnected: accepting the next one may succeed a
+            # moment later.
             self.log_refusal(f"a connection could not be accepted: {explain(error)}")
             if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")
@@ -219,7 +217,7 @@ class Listener:
         def done(finished: asyncio.Task[None]) -> None:
             self._handshakes.pop(finished, None)
             if finished.cancelled():
-                # Perhaps before its first step.
+                # The task may have been cancelled before its first step.
                 peer.close()
 
         task.add_done_callback(done)
@@ -253,7 +251,7 @@ def _bind(host: str, port: int) -> socket.socket:
             # On Windows the option would let two servers share a port.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if family == socket.AF_INET6:
-            # Peers without ROS_IPV6 come by IPv4.
+            # Peers without ROS_IPV6 connect by IPv4.
             sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         sock.bind((host, port))
     except BaseException:
@@ -263,9 +261,9 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | int | bytes, ...]]]:
-    """(family, address) of a host; an address or "localhost" needs no resolver. Raise OSError.
+    """Return (family, address) for each address of a host; an IP address or "localhost" needs no resolver. Raise OSError.
 
-    IPv4 comes first: there the servers of ROS 1 listen, and many resolvers name IPv6 first.
+    IPv4 comes first: ROS 1 servers listen there, while many resolvers return IPv6 first.
     """
     if host == "localhost":
         return [(socket.AF_INET, ("127.0.0.1", port)), (socket.AF_INET6, ("::1", port))]
@@ -277,13 +275,13 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
         name = sockets.resolvable(host)
         infos = await asyncio.get_running_loop().getaddrinfo(name, port, type=socket.SOCK_STREAM)
     except RuntimeError as error:
-        # Python starts no thread once the interpreter is shutting down.
+        # Python starts no threads during interpreter shutdown.
         raise OSError(f"the address of {host} was not looked for: {error}") from error
     return sorted(((info[0], info[4]) for info in infos), key=lambda found: found[0] != socket.AF_INET)
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has come as a whole, as the header of a new peer mostly has: no task, no timer."""
+    """Return a header that has already arrived completely, as most do; this saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
@@ -294,7 +292,7 @@ def _header_at_hand(sock: socket.socket) -> Header | None:
 
 
 class _NothingSaidError(WireError):
-    """The peer connected and disconnected."""
+    """The peer connected and disconnected without sending anything."""
 
 
 async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
@@ -307,7 +305,7 @@ async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
 async def _receive_exactly(
     sock: socket.socket, count: int, memory: HeaderMemory, nothing: type[WireError] = WireError
 ) -> bytes:
-    """``count`` bytes. Raise WireError, or ``nothing`` where not one came."""
+    """Return ``count`` bytes. Raise WireError, or ``nothing`` if not a single byte arrived."""
     loop = asyncio.get_running_loop()
     data = bytearray()
     taken = 0
@@ -327,7 +325,7 @@ async def _receive_exactly(
 
 @contextlib.contextmanager
 def _time_limit(doing: str) -> Iterator[None]:
-    """Turn asyncio's TimeoutError, which is not the built-in one before Python 3.11, into one that names what was done."""
+    """Convert asyncio's TimeoutError, which is not the built-in one before Python 3.11, into one that names the operation."""
     try:
         yield
     except asyncio.TimeoutError:

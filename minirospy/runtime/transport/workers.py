@@ -1,4 +1,4 @@
-"""Worker threads: user code runs here, so that it never runs on the loop."""
+"""Worker threads, in which user code runs, so that it never runs on the loop."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ _log = logging.getLogger(__name__)
 
 
 class Workers:
-    """Daemon threads that are kept for a while when their work is done, since starting one costs.
+    """A pool of daemon threads that are kept for a while after their work, since starting a thread is expensive.
 
-    Their number is not limited: each connection that waits for bytes has one, and peers are
-    limited where they are accepted.
+    Their number is not limited: each connection that waits for bytes uses one, and the number of peers is limited when they
+    are accepted.
     """
 
     def __init__(self) -> None:
         self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
-        # Reentrant: the main thread may hold it when a signal's handler runs a shutdown hook, which starts one, too.
+        # Reentrant: a signal handler may run a shutdown hook, which starts a worker, while the main thread holds the
+        # lock.
         self._lock = threading.RLock()
         self._idle = 0
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` in a worker; an exception that it lets out is logged. Raise ThreadLimitError."""
+        """Run ``function(*args)`` in a worker; an uncaught exception is logged. Raise ThreadLimitError."""
         with self._lock:
             if self._idle:
-                # A claimed worker takes an entry in any case: it exits only when it can withdraw itself.
+                # A claimed worker always takes an entry: before exiting it must withdraw itself from the idle ones.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -59,7 +60,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # Claimed at the moment of exiting: the entry is about to come.
+                # Claimed at the moment of exiting: the entry will arrive immediately.
                 function, args = self._work.get()
 
 
@@ -73,7 +74,7 @@ class InOrder:
         self._is_running = False
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` when those before it are done; an exception that it lets out is logged."""
+        """Run ``function(*args)`` after those started before; an uncaught exception is logged."""
         with self._lock:
             self._waiting.append((function, args))
             if self._is_running:
@@ -82,7 +83,7 @@ class InOrder:
         try:
             self._workers.start(self._run)
         except ThreadLimitError as error:
-            # The functions wait for the next start.
+            # The queued functions wait for the next call of start().
             with self._lock:
                 self._is_running = False
             _log.error("a callback is late: %s", error)

@@ -1,1 +1,1 @@
-"""The dashboard: one page about the graph and the board, served by the bridge. What there is: docs/dashboard.md."""
+"""The dashboard: one page for the graph and the board, served by the bridge. Its functions: docs/dashboard.md."""

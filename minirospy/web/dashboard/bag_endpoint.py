@@ -1,12 +1,12 @@
-"""Bags for the page: recording topics, and looking into a bag and playing it, by JSON over WebSocket.
+"""Bags for the page: record topics, and open and play bags, with JSON over WebSocket.
 
 A client sends ``{"op": NAME, ...}``: list; record {topics, name, suffix, compression}, stop; open {name}, close;
 play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {topics}; density {start, end, bins};
 thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
-``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the message of the moment, 2 one for a
+``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the current message, 2 one for a
 thumbnail), the topic's number (u16), its time (f64), the serialized message.
-Times are seconds since the bag's start. Only a client that has the read-write token may do any of it: files are read and written
-as the user of the dashboard.
+Times are seconds since the bag's start. All operations require the read-write token, because files are read and written as the
+dashboard's user.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _SECOND = 10**9
 
 
 class BagEndpoint(JsonEndpoint["BagSession"]):
-    """Serves the bags of a folder; all clients see the same recording."""
+    """Serves the bags of a folder; all clients share the same recording."""
 
     def __init__(self, folder: BagFolder, master_uri: str, graph: Callable[[], SharedGraph]) -> None:
         super().__init__(SUBPROTOCOL, lambda client: BagSession(self, client))
@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed meanwhile: its child must not be lost.
+        # The page may be closed during the start: the child process must not be lost.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -80,7 +80,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         self.changed()
 
     async def stop(self) -> None:
-        """Complete the recording, if there is one, or one is being started."""
+        """Complete the recording, if one is running or starting."""
         if self._starting:
             await asyncio.wait([self._starting])
         if self.recording:
@@ -88,7 +88,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
             self.changed()
 
     async def close(self) -> None:
-        """End all sessions, whose connections have ended, and complete the recording."""
+        """End all sessions, whose connections are closed, and complete the recording."""
         await super().close()
         await self._close_recording()
 
@@ -99,7 +99,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
 
 
 class BagSession(JsonSession):
-    """One client. What reads files blocks, so it runs in the thread of the session."""
+    """One client's session. File access blocks, so it runs in the session's thread."""
 
     subject: ClassVar[str] = "bags"
     owners_only: ClassVar[str] = "record or open bags"
@@ -108,7 +108,7 @@ class BagSession(JsonSession):
         self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
-        """Topics whose messages are sent, and the time of the last one, -1 before."""
+        """Topics whose messages are sent, and the time of the last message sent, -1 if none."""
         self._thumbnails: deque[tuple[str, int]] = deque()
         self._sent: dict[str, str] = {}
         handlers: Mapping[str, Handler] = {
@@ -128,7 +128,7 @@ class BagSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the recording's state, the player's, the messages of the moment that are shown, a thumbnail that waits."""
+        """Send the states of the recording and the player, the current messages of shown topics, and a pending thumbnail."""
         recording = self._endpoint.recording
         state = recording.state() if recording else None
         self._send_changed("recording", state._asdict() if state else None)
@@ -141,7 +141,7 @@ class BagSession(JsonSession):
         return 0.0 if self._thumbnails else pause
 
     async def left(self) -> None:
-        """End the player, and close the bag."""
+        """Stop the player, and close the bag."""
         await self._close_bag()
 
     # --- recording
@@ -188,7 +188,7 @@ class BagSession(JsonSession):
         try:
             bag = self._bag = await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            # The page was closed meanwhile: what is opened for nobody is closed in that thread.
+            # The page was closed during the opening: close the bag in that thread.
             future.add_done_callback(_close_opened)
             raise
         start, end = bag.span
@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # A client that leaves now cancels the waiting, not the closing.
+            # If the client leaves now, only the wait is cancelled, not the closing.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -234,7 +234,8 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # All messages of one time are a step; after a seek those of that very moment are shown already, and not published yet.
+        # A step is all messages of one time. After a seek, the messages at that time are already shown but not yet
+        # published.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:
@@ -253,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # What was latched before would never reach those who subscribe now.
+        # Publish earlier latched messages, which new subscribers would not receive otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)
@@ -327,7 +328,7 @@ class BagSession(JsonSession):
 
     @staticmethod
     def _time(bag: OpenBag, seconds: object) -> int:
-        """Return the bag's time of a client's number."""
+        """Convert a client's seconds to the bag's time."""
         start, end = bag.span
         return min(max(start + round(number(seconds) * _SECOND), start), end)
 

@@ -1,6 +1,6 @@
-"""The bags that the page may open: those of one folder and below it, and those that the command line names.
+"""The bags that the page may open: those in or below one folder, and those on the command line.
 
-A name that comes from the page is never a path: it is looked up among what was found here.
+A name from the page is never used as a path: it is looked up among the bags that were found.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ __all__ = ["BagFolder", "FoundBag"]
 _SUFFIXES = (".bag", ".mcap")
 _MAX_BAGS = 1000
 _MAX_ENTRIES = 50_000
-"""Files and folders that are looked at: the command may have been started in a home folder."""
+"""Files and folders to visit: the working folder may be a home folder."""
 
 _DEEPEST = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-"""Devices of Windows."""
+"""Device names of Windows."""
 
 
 class FoundBag(NamedTuple):
-    """A bag: its name for the page, with slashes; its size in bytes and the time of its last change in seconds."""
+    """A bag: its name for the page, with slashes, its size in bytes, and its modification time in seconds."""
 
     name: str
     size: int
@@ -36,7 +36,7 @@ class FoundBag(NamedTuple):
 
 
 class BagFolder:
-    """A folder with bags; ``given`` are the files of the command line, which may be anywhere."""
+    """A folder with bags; ``given`` are the files on the command line, which may be in any folder."""
 
     def __init__(self, root: Path, given: Sequence[Path] = ()) -> None:
         self.root = root.absolute()
@@ -44,11 +44,11 @@ class BagFolder:
 
     @property
     def given(self) -> list[str]:
-        """Return the names of the files of the command line."""
+        """Return the names of the files on the command line."""
         return list(self._given)
 
     def bags(self) -> list[FoundBag]:
-        """Return the bags, the newest first. Links are not followed, and folders that start with a dot are left out."""
+        """Return the bags, newest first. Links are not followed, and folders whose name starts with a dot are skipped."""
         found: dict[str, FoundBag] = {}
         for name, path in self._given.items():
             try:
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the file of a name that :meth:`bags` has, or would have. Raise BagError."""
+        """Return the file of an existing bag, by its name as in :meth:`bags`. Raise BagError."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")
@@ -90,7 +90,7 @@ class BagFolder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Return the file for a recording. Raise UsageError if the name is none, or is in use."""
+        """Return the file for a new recording. Raise UsageError if the name is not valid, or is in use."""
         stem = name.removesuffix(suffix)
         if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
             raise UsageError(
@@ -104,7 +104,7 @@ class BagFolder:
         return path
 
     def _entries(self) -> Iterator[os.DirEntry[str]]:
-        """Yield the bags of the folder and below, level by level."""
+        """Yield the bags in the folder and below, level by level."""
         left = _MAX_ENTRIES
         level = [self.root]
         for _ in range(_DEEPEST):

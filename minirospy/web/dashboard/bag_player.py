@@ -1,4 +1,4 @@
-"""One opened bag: its contents by time, and the player of `rosbag play`, whose output is the dashboard's graph."""
+"""One opened bag: its timeline, and the player of `rosbag play`, which publishes to the dashboard's graph."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _log = logging.getLogger(__name__)
 
 _SECOND = 10**9
 _MAX_WAITING = 200
-"""Messages that wait for the loop; then the player waits, too."""
+"""Messages queued for the loop; if the queue is full, the player waits."""
 
 
 class GraphOutput:
-    """Publishes what a player plays into a graph of a loop: the topics that are switched on, and the clock."""
+    """Publishes a player's messages on the loop's graph: the enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
-        """On the loop."""
+        """Must be called on the loop."""
         self._graph = graph
         self._loop = asyncio.get_running_loop()
         self._publications: dict[str, Publication] = {}
@@ -48,7 +48,7 @@ class GraphOutput:
 
     @property
     def published(self) -> list[str]:
-        """Return the topics that are switched on."""
+        """Return the enabled topics."""
         return sorted(self._publications)
 
     @property
@@ -57,7 +57,7 @@ class GraphOutput:
         return self._clock is not None
 
     def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
-        """Publish these topics from now on, and no others; return one line for each that cannot be published."""
+        """Enable exactly these topics; return one line for each that cannot be published."""
         refused = []
         for topic in [each for each in self._publications if each not in topics]:
             self._publications.pop(topic).close()
@@ -86,13 +86,13 @@ class GraphOutput:
         return refused
 
     def send(self, topic: str, body: bytes) -> None:
-        """Publish a message, if its topic is switched on."""
+        """Publish a message if its topic is enabled."""
         publication = self._publications.get(topic)
         if publication:
             publication.publish(body)
 
     def close(self) -> None:
-        """Publish nothing any more. Idempotent."""
+        """Stop publishing. Idempotent."""
         self._is_closed.set()
         for publication in self._publications.values():
             publication.close()
@@ -104,20 +104,20 @@ class GraphOutput:
     # --- in the player's thread
 
     def open(self, player: Controls) -> None:
-        """See :meth:`Output.open`: the session ends the player."""
+        """See :meth:`Output.open`: nothing to do, the session stops the player."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """See :meth:`Output.advertise`: that is done when a topic is switched on."""
+        """See :meth:`Output.advertise`: nothing to do, a topic is advertised when it is enabled."""
 
     def offer(self, player: Controls) -> None:
-        """See :meth:`Output.offer`: the page controls the player."""
+        """See :meth:`Output.offer`: nothing to do, the page controls the player."""
 
     def has_all_subscribers(self) -> bool:
         """See :meth:`Output.has_all_subscribers`."""
         return True
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """See :meth:`Output.running`: there are no keys, and the process has other work."""
+        """See :meth:`Output.running`: reads no keys, because the process has other work."""
         return nullcontext()
 
     def publish(self, number: int, message: StoredMessage) -> None:
@@ -132,18 +132,18 @@ class GraphOutput:
             self._post(lambda: self._send_clock(time))
 
     def waiting_bytes(self) -> int:
-        """See :meth:`Output.waiting_bytes`: they are taken when the playing has ended, too."""
+        """See :meth:`Output.waiting_bytes`: none, because queued messages are sent even after the player has stopped."""
         return 0
 
     def print(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Output.print`: nothing is printed, the page shows the state."""
+        """See :meth:`Output.print`: prints nothing, the page shows the state."""
 
     def _send_clock(self, time: int) -> None:
         if self._clock:
             self._clock.publish(CLOCK.pack(*divmod(time, _SECOND)))
 
     def _post(self, send: Callable[[], None]) -> None:
-        """Have the loop publish; wait while it is behind."""
+        """Call ``send`` on the loop; wait while too many messages are queued."""
 
         def run() -> None:
             self._free.release()
@@ -155,14 +155,14 @@ class GraphOutput:
         try:
             self._loop.call_soon_threadsafe(run)
         except RuntimeError:
-            # The loop has ended.
+            # The loop is closed.
             self._free.release()
 
 
 class OpenBag:
-    """A bag that is shown: a timeline, and a player that is paused at its start. Methods block: not on the loop.
+    """An opened bag: a timeline, and a player that is paused at the start. Methods block: do not call them on the loop.
 
-    ``on_change`` is called in the player's thread when that has moved, or ended. Raise BagError, OSError.
+    ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError or OSError.
     """
 
     def __init__(
@@ -170,8 +170,7 @@ class OpenBag:
     ) -> None:
         self.name = name
         self.output = output
-        self.failure = ""
-        """Why the playing has ended, if it has."""
+        self.failure = ""  # error that stopped the player, "" for none
         self._files = ExitStack()
         with ExitStack() as opened:
             try:
@@ -188,17 +187,17 @@ class OpenBag:
         self._thread = threading.Thread(target=self._play, name="bag-player", daemon=True)
         if self.timeline.topics:
             self._thread.start()
-            # Before that it cannot be controlled.
+            # The player cannot be controlled before it is ready.
             self._is_ready.wait()
 
     @property
     def state(self) -> PlayerState:
-        """Return the state of the player; its time is in the bag from the first moment on. From any thread."""
+        """Return the player's state, with its time limited to the bag's. May be called from any thread."""
         found = self.player.state()
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """Return the last message of each of these topics that is latched, which late subscribers need."""
+        """Return the last message of each latched topic of these, for late subscribers."""
         return [
             (topic, message.body)
             for topic in topics
@@ -207,7 +206,7 @@ class OpenBag:
         ]
 
     def close(self) -> None:
-        """End the player, and close the file."""
+        """Stop the player, and close the file."""
         self.player.end()
         if self._thread.ident is not None:
             self._thread.join()

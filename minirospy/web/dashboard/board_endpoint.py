@@ -1,8 +1,8 @@
-"""The virtual board for the page: its lights, buttons and person, by JSON over WebSocket.
+"""The virtual board for the page: its lights, buttons and simulated person, with JSON over WebSocket.
 
-The server sends ``{"name", "boards", "leds": [[pin, color, level]], "buttons": [[pin, level]], "pins": [[pin, function, level]],
-"person": [x, y] | null, "fields": [...], "writes"}`` whenever something has changed; a client sends ``{"press": pin}``,
-``{"release": pin}`` and ``{"person": [x, y] | null}``. What a client holds down is released when it disconnects.
+The server sends ``{"name", "boards", "leds": [[pin, color, level]], "buttons": [[pin, level]], "pins": [[pin, function,
+level]], "person": [x, y] | null, "fields": [...], "writes"}`` after each change; a client sends ``{"press": pin}``,
+``{"release": pin}`` and ``{"person": [x, y] | null}``. Buttons that a client has pressed are released when it disconnects.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ _LOOK_SECONDS = 0.02
 
 
 class BoardEndpoint(JsonEndpoint["BoardSession"]):
-    """Serves boards of this machine; each client names its own, ``?board=NAME``."""
+    """Serves the boards of this machine; each client selects its board with ``?board=NAME``."""
 
     def __init__(self) -> None:
         super().__init__(SUBPROTOCOL, BoardSession)
 
 
 class BoardSession(JsonSession):
-    """One client. The board's calls block, so they run in the thread of the session."""
+    """One client's session. The board's calls block, so they run in the session's thread."""
 
     subject: ClassVar[str] = "the board"
     longest: ClassVar[int] = 1000
@@ -66,7 +66,7 @@ class BoardSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        """See :meth:`JsonSession.parse`: the name of an operation is its only field."""
         (name,) = fields
         return name, fields
 
@@ -76,7 +76,7 @@ class BoardSession(JsonSession):
         try:
             directory = BoardDirectory.find(name)
             self._boards = await self.in_thread(directory.names)
-            # A board that is opened is started where it does not run: a program.
+            # Opening a board starts it, a process, if it does not run.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
                     f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
@@ -88,7 +88,7 @@ class BoardSession(JsonSession):
             self.send_error(str(error))
 
     async def follow(self) -> float | None:
-        """Send what has changed."""
+        """Send the board's state if it has changed."""
         if self._board is None:
             return None
         state = {**state_of(self._board), "boards": self._boards, "writes": self.client.may_write}
@@ -99,13 +99,13 @@ class BoardSession(JsonSession):
         return _LOOK_SECONDS
 
     async def left(self) -> None:
-        """Release what the client holds down, and disconnect from the board."""
+        """Release the client's pressed buttons, and disconnect from the board."""
         if self._opening:
             await asyncio.wrap_future(self._thread.submit(_leave, self._opening, self._pressed))
 
     async def _press(self, fields: Fields) -> None:
         pin = _pin(fields["press"])
-        # Released in any case, also if the client leaves before the answer.
+        # Record it first, so that it is released even if the client leaves before the answer.
         self._pressed.add(pin)
         await self.in_thread(partial(self._opened().press, pin))
 
@@ -128,7 +128,7 @@ class BoardSession(JsonSession):
 
 
 def state_of(board: Board) -> dict[str, object]:
-    """Return what the page shows of a board."""
+    """Return a board's state for the page."""
     state = board.state()
     wired = {*LEDS, *BUTTONS}
     others = [
@@ -155,7 +155,7 @@ def _pin(value: object) -> int:
 
 
 def _leave(opening: Future[Board], pressed: set[int]) -> None:
-    """Release the buttons, and disconnect from the board, if it was opened; on the session's thread."""
+    """Release the buttons and disconnect from the board, if it was opened. Runs in the session's thread."""
     if opening.cancelled() or opening.exception():
         return
     board = opening.result()

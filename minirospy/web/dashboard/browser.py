@@ -1,7 +1,8 @@
-"""Opening a link in the browser of the person at this machine, where there is one.
+"""Open a link in the local user's browser, if there is one.
 
-The link has a secret in it, and every user of the machine may list command lines. So the browser is started with a file that only
-this user can read: a page that leads to the link. Browsers send no Referer and no Origin for a page that was opened from a file.
+The link contains a secret, and every user of the machine can list command lines. So the browser is started with a file that
+only this user can read: a page that redirects to the link. Browsers send neither Referer nor Origin for a page opened from
+a file.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ from minirospy.base.private_files import create_file
 __all__ = ["LinkFile", "has_screen", "link_page", "open_link"]
 
 _SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
-"""Browsers that can read neither the temporary folder nor hidden folders, but other files of the home folder."""
+"""Browsers that cannot read the temporary folder or hidden folders, but can read other files in the home folder."""
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
-    """Return whether a browser can show itself: without a screen, a browser of text would take the terminal."""
+    """Return whether a browser has a display: without one, a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME", "BROWSER"))
 
 
 def link_page(link: str) -> str:
-    """Return a page that leads the browser to a link, with a script or without."""
+    """Return a page that redirects the browser to a link, with or without JavaScript."""
     shown = html.escape(link)
     return (
         '<!doctype html>\n<html><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">\n'
@@ -42,11 +43,11 @@ def link_page(link: str) -> str:
 
 
 class LinkFile:
-    """The page of a link in a folder that only this user may enter."""
+    """A link's page in a folder that only this user can access."""
 
     def __init__(self, link: str) -> None:
         """Create the file. Raise OSError."""
-        # mkdtemp gives the folder to this user alone, on Windows by its access list.
+        # mkdtemp makes the folder accessible to this user only, on Windows by its access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:
@@ -62,14 +63,14 @@ class LinkFile:
 
 
 def open_link(link: str) -> Callable[[], object] | None:
-    """Open a link without waiting for the browser; return what removes its file, or None if nothing was opened.
+    """Open a link without waiting for the browser; return a function that removes its file, or None if nothing was opened.
 
-    Nothing is opened without a screen, or if the file cannot be made.
+    Nothing is opened without a display, or if the file cannot be created.
     """
     if not has_screen(os.environ):
         return None
     if os.environ.get("WSL_DISTRO_NAME"):
-        # A browser of Windows cannot open a file by its path in Linux.
+        # A Windows browser cannot open a file by its Linux path.
         return _open(link, lambda: None)
     try:
         file = LinkFile(link)
@@ -79,13 +80,13 @@ def open_link(link: str) -> Callable[[], object] | None:
 
 
 def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
-    # A browser that starts may block for seconds; one that never returns does not keep this process alive.
+    # Starting a browser may block for seconds; a daemon thread does not keep this process alive.
     threading.Thread(target=webbrowser.open, args=(address,), name="browser", daemon=True).start()
     return remove
 
 
 def _parent() -> Path | None:
-    """Return where the file's folder is made, None for the system's folder of temporary files."""
+    """Return the parent of the file's folder, None for the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in _SNAPS) and os.access(home, os.W_OK):
         return home

@@ -1,8 +1,8 @@
-"""Codes that the browser of this machine exchanges for the token: the token itself is never in a file or a command line.
+"""One-time codes that the local browser exchanges for the token, so that the token is never in a file or a command line.
 
-A code is valid once, for a minute. It is in a file that only this user can read (browser.py). On Linux the connection that sends
-it must also belong to this user or to root; a connection without a known owner is refused. Other systems have no table
-of connections that an unprivileged program can read: there the code alone decides.
+A code is valid once, for a minute. It is in a file that only this user can read (browser.py). On Linux the connection that
+sends it must also belong to this user or to root; a connection whose owner is unknown is refused. Other systems have no
+table of connections that an unprivileged program can read: there the code alone is sufficient.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LIFETIME", "Codes"]
 
-LIFETIME = 60.0  # seconds; the browser is started immediately, and asks within a few
+LIFETIME = 60.0  # seconds; the browser starts immediately, and sends the code within a few seconds
 _ROOT = 0
 
 
@@ -36,7 +36,7 @@ class _Code(NamedTuple):
 
 
 class Codes:
-    """The codes that have not been used. On the loop."""
+    """The unused codes. Runs on the loop."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -50,7 +50,7 @@ class Codes:
         return code
 
     def when_ended(self, code: str, action: Callable[[], object]) -> None:
-        """Call ``action`` once, when a code has been used, has expired or is forgotten."""
+        """Call ``action`` once, when a code has been used, has expired or has been discarded."""
         found = self._waiting.get(code)
         if found:
             self._waiting[code] = found._replace(on_end=action)
@@ -58,30 +58,30 @@ class Codes:
             action()
 
     def token_of(self, code: str) -> str:
-        """Return the token of a code, which stays valid; "" if there is none."""
+        """Return a code's token, without using up the code; "" if the code is not valid."""
         self.forget_expired()
         found = self._waiting.get(code)
         return found.token if found else ""
 
     def redeem(self, code: str) -> str:
-        """Return the token of a code, which is valid no longer; "" if there is none."""
+        """Return a code's token and invalidate the code; "" if the code is not valid."""
         token = self.token_of(code)
         self._forget(code)
         return token
 
     def forget_expired(self) -> None:
-        """Forget the codes whose time is over."""
+        """Discard expired codes."""
         now = self._clock()
         for code in [code for code, found in self._waiting.items() if now >= found.end]:
             self._forget(code)
 
     def close(self) -> None:
-        """Forget all codes. Idempotent."""
+        """Discard all codes. Idempotent."""
         for code in list(self._waiting):
             self._forget(code)
 
     def serve(self, exchange: Exchange) -> None:
-        """Answer the page that sends a code as a bearer token. A refused request leaves the code valid."""
+        """Answer a page that sends a code as a bearer token. If the request is refused, the code stays valid."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
         if not self.token_of(code):
             exchange.respond(403, b"this link has been used\n")
@@ -97,7 +97,7 @@ class Codes:
 
 
 def _is_trusted(request: HttpRequest) -> bool:
-    """Return whether a request is from this user or root; on other systems than Linux the code is the only proof."""
+    """Return whether a request is from this user or root; always True on other systems than Linux."""
     if sys.platform != "linux":
         return True
     return owner_of((request.peer, request.peer_port), (request.address, request.port)) in (

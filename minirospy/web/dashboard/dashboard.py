@@ -1,4 +1,4 @@
-"""The dashboard as a whole: a bridge at one port, with the page and its endpoints in it."""
+"""The whole dashboard: a bridge on one port that also serves the page and its endpoints."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PORT = 8766
 
 
 class Dashboard:
-    """Serves the page. On the node's loop."""
+    """Serves the page. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -35,10 +35,10 @@ class Dashboard:
         *,
         publishes_joints: bool = False,
     ) -> None:
-        """``options.foxglove_port`` is the port of the page and of its data; the 3D view opens ``rviz_file``.
+        """``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``.
 
-        ``bags`` are those that may be opened, of the working folder unless given. ``publishes_joints``: as
-        joint_state_publisher_gui does, also while no page is open.
+        ``bags``: the bags that may be opened, by default those in the working folder. ``publishes_joints``: publish joints as
+        joint_state_publisher_gui does, even if no page is open.
         """
         master_uri = node._node.environment.master_uri
         self.codes = Codes()
@@ -56,7 +56,7 @@ class Dashboard:
 
     @property
     def port(self) -> int:
-        """Return the port of the page, once it is served."""
+        """Return the port of the page after :meth:`start`."""
         return self.bridge.listeners["foxglove"].port
 
     async def start(self) -> None:
@@ -69,7 +69,8 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # In reverse, and all, whichever fails. Players publish until their sessions end, and the graph is the bridge's.
+            # Close in reverse order, and all even if one fails. Players use the bridge's graph until their sessions
+            # end.
             for part in (
                 self._tools,
                 self._board,

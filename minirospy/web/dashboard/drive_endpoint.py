@@ -1,11 +1,12 @@
-"""Driving from the page: what a person holds is published, and zero as soon as the page lets go, is lost, or is silent.
+"""Driving from the page: publish velocities while the user holds a control, and a zero velocity afterwards.
 
-A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic", "axes": [...],
-"buttons": [...]}``, again and again while something is held, and ``{"leave": topic}`` for a topic that it drives no more. The
-server sends ``{"writes": bool}`` at first, ``{"stopped": topic}`` where it has stopped what was silent, and
+A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic", "axes":
+[...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives a topic.
+The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic without commands, and
 ``{"error": text, "topic"}``.
-The last message of each topic is zero, whatever happens to the client: it is published by this process, and for a client that
-is silent by a thread of its own (:mod:`minirospy.runtime.stop_guard`), whatever holds up the event loop.
+The last message of each topic is zero, whether the control is released or the connection is lost. This process publishes
+it; for a client that stops sending, a separate thread does (:mod:`minirospy.runtime.stop_guard`), even if the event loop is
+blocked.
 """
 
 from __future__ import annotations
@@ -45,32 +46,30 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds something and sends nothing for this long is lost: what it drives is stopped."""
+"""A client that holds a control and sends nothing for this long is considered lost, and its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 
 _MAX_TOPICS = 20
 _MAX_VALUES = 100
-_LONGEST = 20_000
-"""Characters of a command."""
+_LONGEST = 20_000  # characters in a command
 
-_LARGEST_AXIS = 3.4028234663852886e38
-"""Of a float32."""
+_LARGEST_AXIS = 3.4028234663852886e38  # largest float32
 
 
 @dataclass(frozen=True)
 class Velocity:
-    """A geometry_msgs/Twist: metres a second, radians a second."""
+    """A geometry_msgs/Twist, in m/s and rad/s."""
 
     values: tuple[float, ...]
 
     @property
     def is_zero(self) -> bool:
-        """Return whether nothing moves."""
+        """Return whether the velocity is zero."""
         return not any(self.values)
 
     def zero(self) -> Velocity:
-        """Return that which stops."""
+        """Return a zero velocity."""
         return Velocity((0.0,) * 6)
 
 
@@ -83,24 +82,24 @@ class Joystick:
 
     @property
     def is_zero(self) -> bool:
-        """Return whether nothing is held."""
+        """Return whether no control is held."""
         return not any(self.axes) and not any(self.buttons)
 
     def zero(self) -> Joystick:
-        """Return the same joystick with nothing held."""
+        """Return the same joystick with no control held."""
         return Joystick((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
 
 @dataclass(frozen=True)
 class Command:
-    """What a client sends: a topic, and what is to be published there; None: it drives the topic no more."""
+    """A client's command: a topic, and the message to publish; None: the client no longer drives the topic."""
 
     topic: str
     held: Velocity | Joystick | None
 
 
 def parse(text: str) -> Command:
-    """Return the command of a text. Raise ValueError."""
+    """Parse a command. Raise ValueError."""
     if len(text) > _LONGEST:
         raise ValueError(f"it has more than {_LONGEST} characters")
     try:
@@ -151,7 +150,7 @@ def _numbers(values: object) -> tuple[float, ...]:
 
 
 class DriveEndpoint:
-    """Opens a session for each client; ``graph`` returns the graph that they publish to."""
+    """Opens a session for each client; ``graph()`` returns the graph on which they publish."""
 
     def __init__(self, graph: Callable[[], SharedGraph]) -> None:
         self._graph = graph
@@ -169,7 +168,7 @@ class DriveEndpoint:
 
 
 class DriveSession:
-    """One client. On the loop."""
+    """One client's session. Runs on the loop."""
 
     def __init__(self, client: WebClient, graph: SharedGraph, guard: StopGuard) -> None:
         self._client = client
@@ -179,7 +178,7 @@ class DriveSession:
         self._send(writes=client.may_write)
 
     def received_text(self, text: str) -> None:
-        """Carry out a command."""
+        """Execute a command."""
         if not self._client.may_write:
             self._send(error="this token is read-only: it drives nothing")
             return
@@ -194,11 +193,11 @@ class DriveSession:
             self._send(error=str(error), topic=command.topic)
 
     def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
+        """Report an error: clients send no binary messages."""
         self._send(error="binary messages have no meaning here")
 
     def ended(self) -> None:
-        """Stop everything that the client drives, and leave it."""
+        """Stop and leave every topic that the client drives."""
         for topic in list(self._driven):
             try:
                 self._driven.pop(topic).close()
@@ -229,7 +228,7 @@ class DriveSession:
 
 
 class _Driven:
-    """A topic that a client drives. Commands come on the loop; the guard's thread stops what is silent."""
+    """A topic that a client drives. Commands arrive on the loop; the guard's thread stops it if they stop arriving."""
 
     def __init__(
         self,
@@ -239,7 +238,7 @@ class _Driven:
         held: Velocity | Joystick,
         stopped: Callable[[str], None],
     ) -> None:
-        """Raise BridgeError if the topic may not be published, or has another type."""
+        """Raise BridgeError if clients may not publish the topic, or it has another type."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard
@@ -247,19 +246,20 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # For what follows: a command on the loop and the guard's zero are published one after the other.
+        # The lock protects the following: commands on the loop and the guard's zero are published one after the
+        # other.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Velocity | Joystick) -> None:
-        """Publish what is held; it is zero where no more comes in time. Raise BridgeError if nothing could stop it."""
+        """Publish a command, and zero if no other arrives in time. Raise BridgeError if it could not be stopped."""
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:
             self._guard.disarm(self._silent)
         else:
-            # Before it moves: what cannot be stopped is not driven.
+            # Arm the guard before publishing: never send a command that could not be stopped.
             self._guard.arm(self._silent, deadline)
         with self._lock:
             self._deadline = deadline
@@ -268,32 +268,32 @@ class _Driven:
             self._joining = self._graph.spawn(self._publish_joined())
 
     def close(self) -> None:
-        """Stop, and leave the topic."""
+        """Publish zero, and leave the topic."""
         self._guard.disarm(self._silent)
         with self._lock:
             self._deadline = math.inf
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # The zero is published by that task; the topic stays until then.
+            # That task publishes the zero; keep the topic open until then.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()
 
     def _silent(self) -> None:
-        """Stop what is silent, in the guard's thread."""
+        """Publish zero because no command has arrived. Runs in the guard's thread."""
         with self._lock:
             if self._deadline > time.monotonic():
-                return  # a command has come at this moment, or the topic was left
+                return  # a command has arrived just now, or the topic was left
             self._deadline = math.inf
-            # The topic is closed where the node has ended: then nothing is published there any more.
+            # If the node is shut down, the topic is closed, and nothing is published on it any more.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
-        with contextlib.suppress(RuntimeError):  # the loop has ended
+        with contextlib.suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Velocity | Joystick) -> None:
-        """Publish now, or, while subscribers are being connected, the newest as soon as they are. With the lock."""
+        """Publish now or, if subscribers are still connecting, the newest command after that. The caller holds the lock."""
         self._last = held
         if self._publication.has_joined:
             self._publication.publish(self._body())

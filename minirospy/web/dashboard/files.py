@@ -1,6 +1,6 @@
-"""The files of the page, and the headers that they are served with. Pure but for reading the folder once.
+"""The files of the page, and their HTTP headers. Pure except for reading the folder once.
 
-Every path that is served is in a table that is made of the folder's files: a request cannot name another file.
+Paths are served from a table of the folder's files, so a request cannot name any other file.
 The page has no secrets, so it needs no token; its WebSocket does. Source: CSP level 3 (w3.org/TR/CSP3).
 """
 
@@ -28,22 +28,22 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".txt": "text/plain; charset=utf-8",
 }
-"""What is served; other files of the folder are not."""
+"""Served file types; other files in the folder are not served."""
 
 SECURITY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; worker-src 'self'; connect-src 'self'; "
     "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cross-Origin-Resource-Policy": "same-origin",
-    # The browser keeps the file, and compares its tag at each start: a new release is never mixed with an old one.
+    # The browser caches the file but revalidates its ETag at each start, so that releases are never mixed.
     "Cache-Control": "no-cache",
 }
-"""The headers of the page: no inline script, nothing of other sites, not inside of other pages."""
+"""The security headers of the page: no inline scripts, no content from other sites, no embedding in other pages."""
 
 
 @dataclass(frozen=True)
 class PageFile:
-    """One file: its bytes, the same compressed by gzip, its type and its tag (an ETag)."""
+    """A file: its bytes, its gzip-compressed bytes, its media type and its ETag."""
 
     body: bytes
     packed: bytes
@@ -52,7 +52,7 @@ class PageFile:
 
 
 def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
-    """Return the files by the path of their request; ``/`` is index.html."""
+    """Return the files by request path; ``/`` is index.html."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content_type = _TYPES.get(path.suffix)
@@ -67,7 +67,7 @@ def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
 
 
 def handlers(files: Mapping[str, PageFile]) -> dict[str, HttpHandler]:
-    """Return what answers the request of each file."""
+    """Return the request handler of each file."""
     return {path: partial(_serve, file) for path, file in files.items()}
 
 

@@ -1,6 +1,7 @@
-"""The joints of a robot for the page: joint_state_publisher_gui, with its sliders in a browser, by JSON over WebSocket.
+"""The joints of a robot for the page: joint_state_publisher_gui with its sliders in a browser, with JSON over WebSocket.
 
-A client sends ``{"op": NAME, ...}``: set {positions: {joint: number}}, center, randomize, publish {on}, reload. The server sends
+A client sends ``{"op": NAME, ...}``: set {positions: {joint: number}}, center, randomize, publish {on}, reload. The
+server sends
 ``{"writes"}``, ``{"joints": {"robot", "rows", "rate", ...} or null, "why"}``, ``{"state": {"positions", "publishing",
 "others"}}`` and ``{"error"}``. All clients set the same joints. Parameters and zeros: see
 minirospy/ros/robot_state_publisher/joint_parameters.py.
@@ -54,7 +55,7 @@ _FARTHEST = 1e6
 
 
 class JointEndpoint(JsonEndpoint["JointSession"]):
-    """Serves the joints of robot_description. ``always_publishes``: as the node joint_state_publisher_gui does."""
+    """Serves the joints of robot_description. ``always_publishes``: publish as the node joint_state_publisher_gui does."""
 
     def __init__(
         self, node: Node, graph: Callable[[], SharedGraph], *, always_publishes: bool = False
@@ -64,13 +65,11 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
         self.parameters: JointParameters | None = None
-        self.why = ""
-        """Why there are no joints."""
+        self.why = ""  # reason why there are no joints
         self.warnings: list[str] = []
         self.kinds: dict[str, str] = {}
         self.robot = ""
-        self.generation = 0
-        """Counts descriptions that were read."""
+        self.generation = 0  # number of descriptions read so far
         self.is_publishing = False
         self._graph = graph
         self._values: dict[str, object] = {}
@@ -90,7 +89,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return super().open(client)
 
     def left(self, session: JointSession) -> None:
-        """See :meth:`JsonEndpoint.left`: nothing is published for nobody."""
+        """See :meth:`JsonEndpoint.left`: stop publishing when the last client has left."""
         if not self.sessions:
             self._graph().unwatch(self._graph_changed)
             self.publish(is_on=False)
@@ -99,7 +98,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     def publish(self, *, is_on: bool) -> None:
-        """Publish from now on, or no more. Raise UsageError if clients may not publish the topic."""
+        """Start or stop publishing. Raise UsageError if clients may not publish the topic."""
         topic = self.node.resolve(_TOPIC)
         if is_on and not self._graph().filters.publishable(topic):
             raise UsageError(f"topic [{topic}] may not be published by clients")
@@ -108,7 +107,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     async def close(self) -> None:
-        """End all sessions, and publish nothing any more. Idempotent."""
+        """End all sessions, and stop publishing. Idempotent."""
         await super().close()
         working, self._working = self._working, None
         tasks = [*self._sources, *([working] if working else [])]
@@ -122,7 +121,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
     # --- the joints
 
     def start_work(self) -> None:
-        """Follow the parameters, and publish where wanted, from now on, while there is somebody who wants that."""
+        """Start the task that follows the parameters and publishes, while there are clients or ``always_publishes``."""
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
             self._working = asyncio.ensure_future(keep_running(self._work, self._reporter))
@@ -138,7 +137,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             now = loop.time()
             if now >= next_load:
                 next_load = now + _RELOAD_SECONDS
-                with contextlib.suppress(MinirospyError):  # no master for a while
+                with contextlib.suppress(MinirospyError):  # the master is unreachable: retry later
                     await self.load()
             end = next_load
             if self.parameters and self.is_publishing:
@@ -150,11 +149,11 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
                 publisher, self._publisher = self._publisher, None
                 await publisher.close()
             await wait_until(self._work_changed, end)
-        # The next page follows them again.
+        # Unsubscribe; the task for the next page subscribes again.
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
-        """Read the parameters, and the description again where one has changed. Raise MinirospyError."""
+        """Read the parameters, and parse the description again if one has changed. Raise MinirospyError."""
         private = await self.node.get_param("~", {})
         values: dict[str, object] = {}
         missing = object()
@@ -177,7 +176,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
-            # A large description takes seconds.
+            # Parsing a large description takes seconds.
             loop = asyncio.get_running_loop()
             joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
         except (JointError, UrdfError) as error:
@@ -189,7 +188,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             if (why := why_illegal(topic))
         ]
 
-        # Clients are sent each generation once: it is complete before it is counted.
+        # Clients are sent each generation once, so complete it before incrementing the counter.
         self._values, self.parameters, self.joints = values, parameters, joints
         self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
         self.generation += 1
@@ -201,7 +200,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return [topic for topic in sources if not why_illegal(topic)]
 
     def _follow(self, topics: Sequence[str]) -> None:
-        """Follow these topics of source_list, and no others."""
+        """Subscribe to exactly these topics of source_list."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:
@@ -241,7 +240,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             self.changed()
 
     def set(self, positions: Mapping[str, float]) -> None:
-        """Set joints, within their limits. Raise UsageError on a joint that cannot be set."""
+        """Set joint positions within their limits. Raise UsageError if a joint cannot be set."""
         free = self._free()
         for name in positions:
             if name not in free:
@@ -257,7 +256,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     def randomize(self) -> None:
-        """Set all joints anywhere between their limits."""
+        """Set all joints to random positions within their limits."""
         for joint in self._free().values():
             joint.position = random.uniform(joint.lower, joint.upper)
         self.changed()
@@ -266,7 +265,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return self.joints.free if self.joints else {}
 
     def description(self) -> dict[str, object]:
-        """Return what the page shows of the joints, but for their positions."""
+        """Return the joints for the page, without their positions."""
         joints, parameters = self.joints, self.parameters
         if joints is None or parameters is None:
             return {"joints": None, "why": self.why}
@@ -287,9 +286,9 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return {"joints": found, "why": ""}
 
     def state(self) -> dict[str, object]:
-        """Return the positions of all joints, also of those that follow others, and who publishes."""
+        """Return the positions of all joints, including mimic joints, and the other publishers of the topic."""
         values = self.joints.values() if self.joints else None
-        # A source may publish what JSON does not have.
+        # A source may publish infinity or NaN, which JSON lacks.
         pairs = zip(values.name, values.position, strict=False) if values else ()
         positions = {name: position if math.isfinite(position) else None for name, position in pairs}
         publishers = self._graph().snapshot.publishers.get(self.node.resolve(_TOPIC), ())
@@ -298,7 +297,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
 
 
 class JointSession(JsonSession):
-    """One client."""
+    """One client's session."""
 
     subject: ClassVar[str] = "joints"
 
@@ -320,7 +319,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints, where they have been read again, and their positions."""
+        """Send the joints, if they have been read again, and their positions."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -346,7 +345,7 @@ class JointSession(JsonSession):
 
 
 def _finite(value: float) -> float:
-    """Return a number that JSON has: limits may be infinite."""
+    """Return a number that JSON can represent: limits may be infinite."""
     return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
 
 
@@ -360,13 +359,13 @@ def _positions(fields: Fields) -> dict[str, float]:
 def _described(
     parameters: JointParameters, warn: Callable[[str], None]
 ) -> tuple[JointStates, str, dict[str, str]]:
-    """Return the joints of the description, the robot's name and the kinds of joints. Raise UrdfError, JointError."""
+    """Return the description's joints, the robot's name and the joints' types. Raise UrdfError or JointError."""
     joints = read_joints(parameters.description, parameters.options, warn)
     return (joints, *_kinds(parameters.description))
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:
-    """Return the robot's name, and the types of its joints, which have different units."""
+    """Return the robot's name and the types of its joints, which determine their units."""
     root = parse_xml(description, "robot_description")
     kinds = {
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")

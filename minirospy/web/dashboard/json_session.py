@@ -1,8 +1,8 @@
-"""Sessions of the page's endpoints: operations of a client come in as JSON, answers go out as JSON.
+"""Sessions of the page's endpoints: clients send operations as JSON, and receive answers as JSON.
 
-A text is an object that names its operation, ``{"op": NAME, ...}``. A client that may not carry it out, a text that is too long
-or is not an operation, and whatever goes wrong are answered with one line, ``{"error": text}``. Operations are carried out one
-after another in a task of the session. What a client is shown is looked at when something has changed, not all the time.
+An operation is an object with its name, ``{"op": NAME, ...}``. If the client lacks the permission, the string is too long
+or not an operation, or the operation fails, the answer is ``{"error": text}`` with one line. Operations run one after
+another in a task of the session. The state that a client is shown is read after changes, not at regular intervals.
 """
 
 from __future__ import annotations
@@ -31,47 +31,43 @@ _log = logging.getLogger(__name__)
 
 _LONGEST_ERROR = 1000
 _VALUE_FACTOR = 4
-"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
+"""Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
 
-_INTERNAL_ERROR = 1011
-"""Of a WebSocket that is closed, RFC 6455, section 7.4.1."""
+_INTERNAL_ERROR = 1011  # WebSocket close code, RFC 6455, section 7.4.1
 
 _CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
-"""Of the loop's clock: 16 ms in Windows before Python 3.13."""
+"""Resolution of the loop's clock: 16 ms on Windows before Python 3.13."""
 
 _T = TypeVar("_T")
 Fields = Mapping[str, object]
 Handler = Callable[[Fields], Awaitable[object]]
-"""Carries out an operation; what it returns is sent."""
+"""Executes an operation; its result is sent to the client."""
 
 
 class JsonSession:
-    """One client. Subclasses have the table of operations, and send what has changed in :meth:`follow`."""
+    """One client's session. Subclasses provide the table of operations, and send changes in :meth:`follow`."""
 
     subject: ClassVar[str]
-    """For texts of errors: an operation on this."""
+    """What operations act on, for error messages."""
 
     owners_only: ClassVar[str] = ""
-    """What only a client that has the token may do; empty: others may have a part."""
+    """What only clients with the token may do, for error messages; empty if others may do some of it."""
 
     longest: ClassVar[int] = 256_000
-    """Characters of an operation: parsing it holds up all clients."""
+    """Characters in an operation: parsing it delays all clients."""
 
     most_waiting: ClassVar[int] = 100
-    pace: ClassVar[float] = 0.05
-    """Seconds from one look to the next at least, however often something changes."""
+    pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
-        """``handlers`` are what carries out the operations, by name."""
+        """``handlers``: the functions that execute the operations, by name."""
         self.client = client
         self.is_ended = False
         self._handlers = handlers
         self._operations: deque[tuple[str, Fields, int]] = deque()
-        """Name, fields and memory of those that wait."""
-        self._carried_out_size = 0
-        """Memory of those that are carried out."""
-        self._operation_size = 0
-        """Memory of the operation that was received last."""
+        """Name, fields and memory (bytes) of the queued operations."""
+        self._carried_out_size = 0  # memory of the running operations, in bytes
+        self._operation_size = 0  # memory of the last received operation, in bytes
         self._thread = ThreadPoolExecutor(1, type(self).__name__)
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
@@ -85,30 +81,30 @@ class JsonSession:
     # --- for subclasses
 
     def refusal(self) -> str:
-        """Return why this client may carry out no operation, empty if it may."""
+        """Return why this client may not execute operations, "" if it may."""
         if self.owners_only and not self.client.is_owner:
             return self.client.why_not_owner(self.owners_only)
         return ""
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """Return an operation's name and fields. Raise ValueError, TypeError, LookupError."""
+        """Return an operation's name and fields. Raise ValueError, TypeError or LookupError."""
         return str(fields["op"]), fields
 
     async def started(self) -> None:
-        """Send what comes first."""
+        """Send the first messages."""
         self.send({"writes": not self.refusal()})
         if self.owners_only and (why := self.refusal()):
             self.send_error(why)
 
     async def follow(self) -> float | None:
-        """Send what has changed; return the seconds after which it changes by itself, None: it does not."""
+        """Send what has changed; return the seconds until it should be called again, None for after the next change."""
         return None
 
     async def left(self) -> None:
-        """Release what the client had."""
+        """Release the client's resources."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
-        """Have an operation carried out after those that wait."""
+        """Queue an operation."""
         if len(self._operations) >= self.most_waiting:
             self.send_error("too many operations wait: this one was dropped", fields)
             return
@@ -117,11 +113,11 @@ class JsonSession:
         self._wake.set()
 
     def count(self) -> None:
-        """Count what is kept of the client in the account of the server."""
+        """Add the memory used for this client to the server's account."""
         self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """Run what blocks in the session's thread, after what was started there before."""
+        """Run a blocking function in the session's thread, after those submitted before."""
         return await self._loop.run_in_executor(self._thread, work)
 
     def send(self, fields: Fields) -> None:
@@ -129,17 +125,17 @@ class JsonSession:
         self.client.send_text(json.dumps(fields))
 
     def send_error(self, text: str, fields: Fields | None = None) -> None:
-        """Send what went wrong; ``fields`` are those of the operation."""
+        """Send an error; ``fields`` are those of the operation."""
         self.send({"error": text[:_LONGEST_ERROR]})
 
     def send_answer(self, answer: object, fields: Fields) -> None:
-        """Send what an operation returned."""
+        """Send the result of an operation."""
         self.client.send_text(json.dumps(answer))
 
     # --- from the connection
 
     def received_text(self, text: str) -> None:
-        """Take over an operation."""
+        """Parse and queue an operation."""
         if why := self.refusal():
             self.send_error(why)
             return
@@ -160,11 +156,11 @@ class JsonSession:
             self.dispatch(name, fields)
 
     def received_binary(self, data: bytes) -> None:
-        """Refuse what no client sends."""
+        """Report an error: clients send no binary messages."""
         self.send_error("binary messages have no meaning here")
 
     def ended(self) -> None:
-        """End the session. Idempotent: what it leaves is released once, and not disturbed."""
+        """End the session. Idempotent: resources are released once, without interruption."""
         if not self.is_ended:
             self.is_ended = True
             self._task.cancel()
@@ -172,15 +168,15 @@ class JsonSession:
     # --- changes
 
     def changed(self) -> None:
-        """Have :meth:`follow` called soon. On the loop."""
+        """Schedule a call of :meth:`follow`. Must be called on the loop."""
         self._next_look = min(self._next_look, self._looked + self.pace)
         self._wake.set()
 
     def post_change(self) -> None:
-        """Do the same from any thread, as often as it likes."""
+        """Schedule a call of :meth:`follow` from any thread, at any rate."""
         if not self._is_change_posted:
             self._is_change_posted = True
-            with contextlib.suppress(RuntimeError):  # the loop has ended
+            with contextlib.suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self.changed)
 
     # --- the session's task
@@ -222,7 +218,8 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # The text of other errors is for the terminal: it may name what is no client's business.
+                    # Other errors' messages are for the terminal only: they may contain details that clients must not
+                    # see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )
@@ -233,7 +230,7 @@ class JsonSession:
                 self._next_look = min(self._next_look, now + pause)
 
     async def carry_out(self, name: str, fields: Fields) -> None:
-        """Carry out an operation, and send its answer, or what went wrong."""
+        """Execute an operation, and send its answer or its error."""
         try:
             answer = await self._handlers[name](fields)
         except (MinirospyError, OSError) as error:
@@ -252,7 +249,7 @@ _S = TypeVar("_S", bound=JsonSession)
 
 
 class JsonEndpoint(Generic[_S]):
-    """Opens a session for each client of a sub-protocol; ``session`` makes one."""
+    """Opens a session for each client of a sub-protocol; ``session`` creates it."""
 
     def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:
         self.sessions: set[_S] = set()
@@ -284,23 +281,23 @@ class JsonEndpoint(Generic[_S]):
         self.left(session)
 
     def left(self, session: _S) -> None:
-        """Note that a session has ended."""
+        """Handle the end of a session."""
 
     def changed(self) -> None:
-        """Have all sessions look at what has changed. On the loop."""
+        """Notify all sessions of a change. Must be called on the loop."""
         self._is_change_posted = False
         for session in self.sessions:
             session.changed()
 
     def post_change(self) -> None:
-        """Do the same from any thread, as often as it likes."""
+        """Notify all sessions of a change from any thread, at any rate."""
         if self._loop and not self._is_change_posted:
             self._is_change_posted = True
-            with contextlib.suppress(RuntimeError):  # the loop has ended
+            with contextlib.suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self.changed)
 
     def spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
-        """Run what goes on where its client leaves, until it is done; :meth:`close` waits for it."""
+        """Run a coroutine to its end even if its client leaves; :meth:`close` waits for it."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._spawned_ended)
@@ -308,12 +305,12 @@ class JsonEndpoint(Generic[_S]):
 
     def _spawned_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
-        # What fails is reported to the client, if it is still there.
+        # MinirospyErrors are reported to the client, if it is still connected.
         if not task.cancelled() and (error := task.exception()) and not isinstance(error, MinirospyError):
             _log.error("%s: %s", type(self).__name__, error, exc_info=error)
 
     async def close(self) -> None:
-        """End all sessions, and wait for what they have started. Idempotent."""
+        """End all sessions, and wait for their tasks. Idempotent."""
         self.is_closed = True
         sessions = list(self.sessions)
         for session in sessions:
@@ -323,9 +320,10 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event, until a time of the loop at most; by then the loop's clock has passed it."""
-    # asyncio.wait_for before Python 3.12 may lose a cancelling that comes with the event.
-    # A loop calls what is due within its clock's resolution: callers that look at the clock would spin until it goes on.
+    """Wait for an event, at most until ``end`` on the loop's clock; after the timeout, the clock is past ``end``."""
+    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event. Add
+    # the clock's resolution: a loop runs timers that much early, and callers that compare times would spin until the
+    # clock advances.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
@@ -336,7 +334,7 @@ async def wait_until(event: asyncio.Event, end: float) -> None:
 
 
 def text_of(fields: Fields, name: str) -> str:
-    """Return a text of an operation. Raise LookupError, TypeError."""
+    """Return a string field of an operation. Raise LookupError or TypeError."""
     value = fields[name]
     if not isinstance(value, str):
         raise TypeError(f"{name} is a text")
@@ -344,7 +342,7 @@ def text_of(fields: Fields, name: str) -> str:
 
 
 def texts_of(fields: Fields, name: str) -> list[str]:
-    """Return a list of texts of an operation. Raise LookupError, TypeError."""
+    """Return a field of an operation that is a list of strings. Raise LookupError or TypeError."""
     value = fields[name]
     if not isinstance(value, list):
         raise TypeError(f"{name} is a list of texts")
@@ -352,14 +350,14 @@ def texts_of(fields: Fields, name: str) -> list[str]:
 
 
 def number(value: object) -> float:
-    """Return a finite number of an operation. Raise TypeError, OverflowError."""
+    """Return a field of an operation as a finite number. Raise TypeError or OverflowError."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r:.40} is not a number")
     return float(value)
 
 
 def _line(error: Exception) -> str:
-    """Return the text of an error in one line."""
+    """Return an error's message as one line."""
     if isinstance(error, KeyError):
         return f"{error.args[0]!s:.80} is missing"
     return " ".join(str(error).split()) or type(error).__name__

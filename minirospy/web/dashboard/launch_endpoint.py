@@ -1,9 +1,9 @@
-"""Launch files for the page: started, stopped, watched, by JSON over WebSocket.
+"""Launch files for the page: start, stop and watch them, with JSON over WebSocket.
 
 A client sends ``{"op": NAME, ...}``: list; describe {package, file, args}; start {package, file, args}; stop, restart,
 remove {id}; end {id, node, restarts}; follow {id, node} (node "": roslaunch's own lines; id null: nothing). The server sends
 ``{"writes"}``, ``{"files"}``, ``{"describe"}``, ``{"launches"}``, ``{"log", "text", "isFirst"}``, ``{"error"}``.
-Only a client that has the read-write token may do any of it: it starts programs as the user of the dashboard.
+All operations require the read-write token, because programs are started as the dashboard's user.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""A file that grows reports nothing: it is looked at so often while a page shows it."""
+"""Poll interval of a log file while a page shows it, because a file reports no changes."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""Launches that are kept when they have ended, with their last lines."""
+"""Ended launches that are kept, with their last lines."""
 
 _TAIL_BYTES = 64 * 1024
 
 
 class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
-    """Serves the launch files of the packages; all clients see the same launches."""
+    """Serves the launch files of the packages; all clients share the same launches."""
 
     def __init__(self, master_uri: str) -> None:
         super().__init__(SUBPROTOCOL, lambda client: LaunchSession(self, client))
@@ -50,7 +50,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.packages = Packages(self.environment)
         self.files = LaunchFiles(self.packages)
         self.runs: dict[int, LaunchRun] = {}
-        """The launches by id, in order; changed on the loop alone."""
+        """The launches by id, in order; changed only on the loop."""
         self._restarting: set[int] = set()
 
     def start(self, file: LaunchFile, path: Path, args: Mapping[str, str]) -> None:
@@ -65,9 +65,9 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """End a launch, and start its file again with the same arguments. Raise UsageError.
+        """Stop a launch, and start its file again with the same arguments. Raise UsageError.
 
-        One that another client restarts, or has restarted meanwhile, is not started twice.
+        Do nothing if another client is restarting or has restarted it.
         """
         if run.id in self._restarting or run.id not in self.runs:
             return
@@ -81,14 +81,14 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonEndpoint.changed`; of the launches that have ended only the newest are kept."""
+        """See :meth:`JsonEndpoint.changed`; also discards all but the newest ended launches."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions and all launches, and wait for that."""
+        """End all sessions and all launches, and wait for them."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -99,7 +99,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
 
 
 class _Tail:
-    """The end of a file that grows."""
+    """Reads the end of a growing log file."""
 
     def __init__(self, run: LaunchRun, node: str) -> None:
         self.run, self.node = run, node
@@ -109,11 +109,11 @@ class _Tail:
         self._count = 0
 
     def read(self) -> str:
-        """Return what is new. Blocks."""
+        """Return the new lines. Blocks."""
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Looked up first: what is written until then is in the file.
+        # Query this before reading: what the node wrote before it exited is in the file.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -128,7 +128,8 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Whole lines, unless one is endless, or the last one has no end: a character may be in two parts.
+        # Return whole lines, because a character may be split. Exceptions: a very long line, and the last line after
+        # the exit.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
@@ -137,7 +138,7 @@ class _Tail:
 
 
 class LaunchSession(JsonSession):
-    """One client. What reads files blocks, so it runs in the thread of the session."""
+    """One client's session. File access blocks, so it runs in the session's thread."""
 
     subject: ClassVar[str] = "launch files"
     owners_only: ClassVar[str] = "start programs"
@@ -160,8 +161,8 @@ class LaunchSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the launches, where one has changed, and what is new in the log."""
-        # Before the rest is sent: what a launch does meanwhile is reported as a change.
+        """Send the launches, if one has changed, and new lines of the log."""
+        # Check before sending: a change after this triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -190,7 +191,7 @@ class LaunchSession(JsonSession):
         self._run_of(fields).stop()
 
     async def _restart(self, fields: Fields) -> None:
-        # This goes on where the page is closed; meanwhile the session shows how it goes.
+        # The restart continues even if the page is closed; the session shows its progress meanwhile.
         self._endpoint.spawn(self._report_restart(self._run_of(fields)))
 
     async def _report_restart(self, run: LaunchRun) -> None:
@@ -231,7 +232,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send what is new; return whether there may be more without a change of the launch."""
+        """Send new lines; return whether more may come without a change of the launch."""
         tail = self._tail
         if tail is None:
             return False
@@ -241,7 +242,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # A file may have more than what is read at a time.
+        # The file may have more than one read returns.
         return is_growing or bool(tail.node and text)
 
 

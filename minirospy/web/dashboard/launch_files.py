@@ -1,4 +1,4 @@
-"""The launch files of the packages that are found; a page names one by its package and its path in there."""
+"""The launch files in packages; a page identifies one by its package and its path in the package."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _MOST = 5000
 
 
 class LaunchFile(NamedTuple):
-    """A launch file: its package, and its path in there with slashes."""
+    """A launch file: its package, and its path in the package, with slashes."""
 
     package: str
     path: str
 
 
 class LaunchFiles:
-    """The launch files of packages. Methods read folders, which blocks."""
+    """The launch files of packages. Methods read folders and block."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
         self._found: dict[LaunchFile, Path] = {}
 
     def scan(self) -> list[LaunchFile]:
-        """Look for launch files; return them in order."""
+        """Search for launch files; return them sorted."""
         found: dict[LaunchFile, Path] = {}
         folders = self._packages.folders()
         own = set(folders.values())
@@ -45,7 +45,7 @@ class LaunchFiles:
         return sorted(found)
 
     def path_of(self, file: LaunchFile) -> Path:
-        """Return the path of a file that was found. Raise NotFoundError: no other is started."""
+        """Return the path of a launch file that was found. Raise NotFoundError: others are not started."""
         if not self._found:
             self.scan()
         try:
@@ -57,7 +57,7 @@ class LaunchFiles:
 
 
 def _launch_files(folder: Path, packages: set[Path], depth: int) -> Iterator[Path]:
-    """Yield the launch files of a package, not those of packages in it."""
+    """Yield the launch files of a package, except for those of packages inside it."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:

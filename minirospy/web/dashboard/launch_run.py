@@ -1,4 +1,4 @@
-"""A launch file that runs for the page: roslaunch's own launcher in a thread, with all output in log files."""
+"""A launch file that runs for the page: roslaunch's launcher in a thread, with all output in log files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MAX_LINES = 2000
 class NodeState(NamedTuple):
     """A node of a launch: starting, running, ending, exited (``status``), failed (it could not be started), stopped.
 
-    ``starts``: how often it was started; ``respawns``: whether it is started again when it exits.
+    ``starts``: the number of starts; ``respawns``: whether it is restarted when it exits.
     """
 
     name: str
@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch: starting, running, stopping or ended, and then its error, "" for none."""
+    """A launch: starting, running, stopping or ended; ``error`` of an ended one, "" for none."""
 
     id: int
     package: str
@@ -55,7 +55,7 @@ class RunState(NamedTuple):
 
 
 class _Lines(Output):
-    """The lines of roslaunch itself, kept instead of printed. ``on_change`` is called after each."""
+    """roslaunch's own output, stored instead of printed. ``on_change`` is called after each line."""
 
     def __init__(self, on_change: Callable[[], object]) -> None:
         super().__init__(title=False)
@@ -65,7 +65,7 @@ class _Lines(Output):
         self._count = 0
 
     def since(self, count: int) -> tuple[list[str], int]:
-        """Return the lines after the first ``count``, as far as they are kept, and how many there were. From any thread."""
+        """Return the stored lines after the first ``count``, and the total number of lines. May be called from any thread."""
         with self._lock:
             new = min(self._count - count, len(self._lines))
             return list(self._lines)[len(self._lines) - new :], self._count
@@ -80,7 +80,7 @@ class _Lines(Output):
 
 
 class _PageLauncher(Launcher):
-    """A launcher that reports the nodes that have exited."""
+    """A launcher that reports exited nodes."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class _PageLauncher(Launcher):
 
 
 class LaunchRun:
-    """One launch file, started in a thread. ``on_change`` is called there when :meth:`state` or ``output`` has changed."""
+    """One launch file, run in a thread. ``on_change`` is called there when :meth:`state` or ``output`` has changed."""
 
     _ids: ClassVar[Iterator[int]] = itertools.count(1)
 
@@ -129,18 +129,19 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # Where this process ends without ending it, the guardian of its launcher ends the nodes.
+        # A daemon thread: if this process exits without stopping the launch, the launcher's guardian process ends the
+        # nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 
     @property
     def is_ended(self) -> bool:
-        """Return whether all of it has ended."""
+        """Return whether the launch with all its nodes has ended."""
         return self._state == "ended"
 
     @property
     def is_stopping(self) -> bool:
-        """Return whether its nodes are being ended."""
+        """Return whether its nodes are being stopped."""
         return self._state == "stopping"
 
     @property
@@ -148,12 +149,12 @@ class LaunchRun:
         return self._state in ("stopping", "ended")
 
     def has_exited(self, node: str) -> bool:
-        """Return whether a node was started, and does not run."""
+        """Return whether a node was started and no longer runs."""
         process = self._known.get(node)
         return process is not None and not process.is_running
 
     def state(self) -> RunState:
-        """Return the state now. From any thread."""
+        """Return the current state. May be called from any thread."""
         launcher = self._launcher
         for process in tuple(launcher.processes) if launcher else ():
             if process.node:
@@ -162,12 +163,12 @@ class LaunchRun:
         return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
 
     def log_file(self, node: str) -> Path | None:
-        """Return the file with what a node prints; None if there is none yet."""
+        """Return the file with a node's output; None if it does not exist yet."""
         process = self._known.get(node)
         return process.stdout_file if process else None
 
     def stop(self) -> None:
-        """End all nodes. From any thread; does not wait."""
+        """Start to stop all nodes; do not wait. May be called from any thread."""
         with self._lock:
             self._is_stopped = True
             if self._state in ("starting", "running"):
@@ -177,11 +178,11 @@ class LaunchRun:
         self._on_change()
 
     def join(self) -> None:
-        """Wait until all of it has ended."""
+        """Wait until the launch has ended."""
         self._thread.join()
 
     def end_node(self, name: str, *, restarts: bool) -> None:
-        """End one node, and start it again if wanted. Raise UsageError if it does not run."""
+        """Stop one node and, with ``restarts``, start it again. Raise UsageError if it does not run."""
         launcher, process = self._launcher, self._known.get(name)
         if not launcher or not process or not process.is_running or self._state != "running":
             raise UsageError(f"node [{name[:200]}] does not run")
@@ -194,7 +195,7 @@ class LaunchRun:
         try:
             self._launch()
         except KeyboardInterrupt:
-            pass  # stopped while it started
+            pass  # the launch was stopped during the start
         except MinirospyError as error:
             self._error = str(error)
         except Exception as error:  # noqa: BLE001 - the page shows it

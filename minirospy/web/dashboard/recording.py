@@ -1,4 +1,4 @@
-"""A recording for the page: `rosbag record` as a child, which ends with this process and completes its file first."""
+"""A recording for the page: `rosbag record` as a child process, which completes its file when this process exits."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""After SIGINT the file is completed: what waits for a slow disk takes its time."""
+"""Long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""No file is open yet: an interpreter that starts may lose a SIGINT, where it comes while a callback of importlib runs."""
+"""Short, because no file is open yet, and a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
 
 _MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
                 ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
-"""Words of `rosbag record` for each kind of file."""
+"""Arguments of `rosbag record` by file type and compression."""
 
 
 class RecordingState(NamedTuple):
-    """A recording: its file's name, topics, seconds, bytes; ``is_ended``, and then the error, "" for none."""
+    """A recording: its file's name, topics, seconds, bytes; ``is_ended``, and the error of an ended one, "" for none."""
 
     name: str
     topics: tuple[str, ...]
@@ -96,14 +96,14 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # -m imports from the working folder first: not from one with bags and a person's own modules.
+            # -m imports from the working folder first: avoid a folder with the user's own modules.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,
         )
 
     def _read(self) -> None:
-        """Keep the last lines, and notice the end."""
+        """Store the last output lines, and record the time of the exit."""
         stream = self._process.popen.stdout
         assert stream
         with stream:
@@ -113,8 +113,8 @@ class Recording:
         self._seconds = time.monotonic() - self._started
 
     def state(self) -> RecordingState:
-        """Return the state now."""
-        # First: of one that has ended the sizes are the last ones.
+        """Return the current state."""
+        # Query this first: after the exit the sizes are final.
         status = self._process.exit_code
         size = 0
         for path in self._paths:
@@ -124,7 +124,7 @@ class Recording:
                 continue
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
-        # An interpreter that starts may also end without a fault.
+        # A starting interpreter that is stopped may also exit with status 0.
         if status is not None and self._process.is_ending and not size:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:
@@ -135,7 +135,7 @@ class Recording:
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
 
     async def stop(self) -> None:
-        """Have the file completed, and wait for that. Idempotent."""
+        """Stop the recording, and wait until the file is complete. Idempotent."""
         await asyncio.get_running_loop().run_in_executor(None, self._stop)
 
     def _stop(self) -> None:

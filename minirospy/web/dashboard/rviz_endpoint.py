@@ -1,9 +1,9 @@
-"""Reading and saving .rviz files for the 3D view, by JSON over WebSocket: one operation, one answer.
+"""Read and save .rviz files for the 3D view, with JSON over WebSocket: one answer per operation.
 
-``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the file of the command, null where it does not exist yet;
-``{"save": config}`` -> ``{"name"}``: saved there, for clients that have the read-write token; ``{"parse": text}`` ->
-``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``. No
-operation names a file.
+``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the command's file, null if it does not exist yet;
+``{"save": config}`` -> ``{"name"}``: saved there, for clients with the read-write token; ``{"parse": text}`` ->
+``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``.
+Operations cannot name a file.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def read_file(path: Path) -> dict[str, object] | None:
 
 
 def _write_file(path: Path, text: str) -> None:
-    """Write a file whole or not at all: one that is half written would be lost. Raise RvizFileError."""
-    # A link stays one, and its target keeps its rights.
+    """Replace a file atomically, so that it is never half written. Raise RvizFileError."""
+    # Write to a link's target: the link stays, and the target keeps its permissions.
     file = path.resolve()
     part = file.with_name(f".{file.name}.part")
     try:
-        # Its name is known to others who may write there: what they have put is not written through.
+        # The name is predictable: create_file() refuses a link that another user has put there.
         with os.fdopen(create_file(part, 0o666), "w", encoding="utf-8") as stream:
             stream.write(text)
         with contextlib.suppress(FileNotFoundError):
@@ -65,22 +65,22 @@ def _write_file(path: Path, text: str) -> None:
 
 
 class RvizEndpoint(JsonEndpoint["RvizSession"]):
-    """Serves the file of the command, if there is one."""
+    """Serves the command's .rviz file, if there is one."""
 
     def __init__(self, file: Path | None = None) -> None:
         super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
         self.file = file
         self.thread = ThreadPoolExecutor(1, "rviz-files")
-        """Of all sessions: files that are parsed at the same time hold up the loop longer, and may be written over each other."""
+        """One thread for all sessions: parsing in parallel would delay the loop longer, and saves could conflict."""
 
     async def close(self) -> None:
-        """End all sessions; what is being saved is completed."""
+        """End all sessions after completing running saves."""
         await super().close()
         self.thread.shutdown(wait=False)
 
 
 class RvizSession(JsonSession):
-    """One client; its operations read and parse in the endpoint's thread."""
+    """One client's session; its operations read and parse in the endpoint's thread."""
 
     subject: ClassVar[str] = ".rviz files"
     longest: ClassVar[int] = 600_000
@@ -97,15 +97,15 @@ class RvizSession(JsonSession):
         super().__init__(client, handlers)
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`: an operation's name is that of its only field."""
+        """See :meth:`JsonSession.parse`: the name of an operation is its only field."""
         (name,) = fields
         return name, fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
+        """See :meth:`JsonSession.started`: sends nothing without a request."""
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`: in that of the endpoint."""
+        """See :meth:`JsonSession.in_thread`: runs in the endpoint's thread."""
         return await asyncio.get_running_loop().run_in_executor(self._endpoint.thread, work)
 
     async def _read(self, _: Fields) -> Fields:
@@ -129,7 +129,7 @@ class RvizSession(JsonSession):
             parse_rviz(text)
             _write_file(file, text)
 
-        # The page may be closed meanwhile: what was to be saved is.
+        # Complete the save even if the page is closed meanwhile.
         await asyncio.shield(self._endpoint.spawn(self.in_thread(save)))
         return {"name": file.name}
 

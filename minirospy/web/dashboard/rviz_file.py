@@ -1,7 +1,7 @@
-"""The YAML of .rviz files: text -> plain values -> text that RViz reads. Pure.
+"""Parse and format the YAML of .rviz files: text -> plain values -> text that RViz reads. Pure.
 
-Both are done here, in one pass: PyYAML's own loading and dumping take seconds for a file of 200 kB, or, where they are
-compiled, give no other thread its turn meanwhile.
+Both are implemented here in one pass, because PyYAML's loader and dumper take seconds for a file of 200 kB or, in their
+compiled form, hold the GIL for that time.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MAX_CHARACTERS = 200_000
-"""RViz's own files have some ten thousand."""
+MAX_CHARACTERS = 200_000  # RViz's own files have some 10,000
 
 _MANAGER = "Visualization Manager"
 _MAX_DEPTH = 50
@@ -34,20 +33,20 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
     (re.compile(r"-?(?:0|[1-9][0-9]{0,14})"), int),
     (re.compile(r"-?(?:[0-9]+\.[0-9]*(?:[eE][-+]?[0-9]{1,3})?|[0-9]+[eE][-+][0-9]{1,3})"), float),
 )
-"""Values that are not texts; what else YAML 1.1 takes for another type (dates, octal numbers) stays a text, as in RViz."""
+"""Values that are not strings; other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
-"""Texts that need no quotes, unless another reader takes them for a number."""
+"""Strings that need no quotes, unless they look like a number to another parser."""
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
-    """Return the contents of a .rviz file, of values that JSON has. Raise RvizFileError with ``name`` and the line."""
+    """Parse a .rviz file into JSON-compatible values. Raise RvizFileError with ``name`` and the line."""
     if len(text) > MAX_CHARACTERS:
         raise RvizFileError(name, 0, f"more than {MAX_CHARACTERS} characters")
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # The compiled parser names the line after the last one for what is missing there.
+        # For something that is missing at the end, the compiled parser reports the line after the last one.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -61,14 +60,14 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 def _built(events: Iterator[Event], name: str) -> object:
     """Return the value of the document. Raise RvizFileError."""
     result: list[object] = []
-    # The collections that are open, with the key that waits for its value; the first one is the stream.
+    # The open collections, each with the key that has no value yet; the first one is the stream.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
     for event in events:
         line = event.start_mark.line + 1 if event.start_mark else 0
         value: object
         match event:
             case yaml.AliasEvent(anchor=anchor):
-                # They would let a small text become a large one.
+                # Aliases could expand a small file to a large value.
                 raise RvizFileError(name, line, f"a file of RViz has no aliases (*{anchor})")
             case yaml.DocumentStartEvent() if result:
                 raise RvizFileError(name, line, "more than one document")
@@ -110,16 +109,16 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 
 
 def format_rviz(config: Mapping[str, object]) -> str:
-    """Return the text of a .rviz file: sorted names, lists one step to the right of their name, as RViz writes them.
+    """Return the text of a .rviz file as RViz writes it: keys sorted, lists indented below their key.
 
-    Raise RvizFileError if it is nested more deeply than what :func:`parse_rviz` reads.
+    Raise RvizFileError if it is nested more deeply than :func:`parse_rviz` accepts.
     """
     return "".join(f"{line}\n" for line in _lines(config, 1)) or "{}\n"
 
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
-    """Yield the lines of a map or a list that is not empty, with ``depth - 1`` others around it."""
-    # Each line passes through all of these, and is indented by them.
+    """Yield the lines of a nonempty map or list, nested in ``depth - 1`` others."""
+    # Limit the depth: each line passes through one generator per level, and is indented by each.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):
@@ -131,7 +130,7 @@ def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[s
 
 
 def _after(start: str, value: object, separator: str, depth: int) -> Iterator[str]:
-    """Yield the lines of what follows a name or a dash."""
+    """Yield the lines for a value after a key or a dash."""
     if not isinstance(value, dict | list) or not value:
         yield f"{start} {_word(value)}"
         return

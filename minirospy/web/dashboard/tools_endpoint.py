@@ -1,8 +1,8 @@
-"""What the views need besides the Foxglove protocol, by JSON over WebSocket: requests about nodes, types and files.
+"""Requests of the views that the Foxglove protocol lacks, about nodes, types and files, with JSON over WebSocket.
 
-A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error": "..."}``.
-The requests are in ``ToolsSession.handlers``. After ``watch`` it sends ``{"report": ...}`` every few seconds until ``unwatch``:
-the graph and all nodes, as minirospy/introspect/survey.py describes them.
+A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error":
+"..."}``. The requests are in ``ToolsSession.handlers``. After ``watch`` it sends ``{"report": ...}`` every few seconds
+until ``unwatch``: the graph and all nodes, as minirospy/introspect/survey.py describes them.
 """
 
 from __future__ import annotations
@@ -40,25 +40,25 @@ SUBPROTOCOL = "minirospy.tools.v1"
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-# bool first: it is an int, too.
+# bool comes first, because it is a subclass of int.
 _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
 _MAX_PREVIEW = 200
-"""Characters of a value that are shown while it is typed."""
+"""Characters of a value shown while the user types it."""
 
 _REPORT_SECONDS = 2.0
 _AT_ONCE = 4
-"""Requests of one client that are answered at the same time: nodes that do not answer take seconds."""
+"""Concurrent requests of one client: nodes that do not answer take seconds."""
 
 
 class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
-    """Serves the requests of pages. ``tool`` is the name by which nodes are called."""
+    """Serves the requests of pages. ``tool`` is the caller_id for calls to nodes."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
         self.parser = ThreadPoolExecutor(1, "tools-parser")
-        """Parses files, one after another: several at once would hold up the loop longer."""
+        """Parses files one after another: parsing several at the same time would delay the loop longer."""
         self._master_uri = master_uri
         self._tool = tool
         self._watching: set[ToolsSession] = set()
@@ -68,7 +68,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         self._processes = ProcessLoads()
 
     async def close(self) -> None:
-        """Cancel what still runs."""
+        """Cancel running requests."""
         await super().close()
         reporting, self._reporting = self._reporting, None
         if reporting:
@@ -78,11 +78,11 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             threads.shutdown(wait=False, cancel_futures=True)
 
     def graph(self) -> Graph:
-        """Return the graph, with a separate connection to the master: calls run in threads."""
+        """Return a graph with a separate connection to the master, because calls run in threads."""
         return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
 
     def watch(self, session: ToolsSession) -> None:
-        """Send a session a report of the graph now and every few seconds."""
+        """Send a session a report of the graph now, and then every few seconds."""
         self._watching.add(session)
         if self._reporting is None or self._reporting.done():
             self._last = None
@@ -92,7 +92,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             session.report(_report_of(describe(self._last)))
 
     def unwatch(self, session: ToolsSession) -> None:
-        """End it; nobody queries the nodes while nobody watches."""
+        """Stop sending reports to a session; without sessions, nodes are not queried."""
         self._watching.discard(session)
         if not self._watching and self._reporting:
             self._reporting.cancel()
@@ -102,7 +102,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # In one thread: where a survey is cancelled, the next one waits for its end.
+                # Use one thread: if a survey is cancelled, the next one waits for its end.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -112,11 +112,11 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             data = _report_of(fields)
             for session in tuple(self._watching):
                 session.report(data)
-            # Nodes that answer slowly are not queried without a pause.
+            # If nodes answer slowly, pause for longer.
             await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return the types of topics that the master knows; ``*`` where a subscriber takes any."""
+        """Return the topic types that the master knows; ``*`` if there are only subscribers to any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
@@ -126,7 +126,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
 
 
 class ToolsSession(JsonSession):
-    """One client. Its requests are answered as they are done, each with its ``id``."""
+    """One client's session. Each request is answered when it is done, with its ``id``."""
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
@@ -157,7 +157,7 @@ class ToolsSession(JsonSession):
         return text_of(fields, "do"), fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`: nothing is sent that was not requested."""
+        """See :meth:`JsonSession.started`: sends nothing without a request."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""
@@ -186,7 +186,7 @@ class ToolsSession(JsonSession):
         self.send({**({"id": fields["id"]} if fields else {}), "error": text[:500]})
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`: in one of several threads."""
+        """See :meth:`JsonSession.in_thread`: runs in one of several threads."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     def ended(self) -> None:
@@ -198,7 +198,7 @@ class ToolsSession(JsonSession):
         self._threads.shutdown(wait=False, cancel_futures=True)
 
     def report(self, data: bytes) -> None:
-        """Send a report; an older one that waits is dropped."""
+        """Send a report; it replaces an older one that is still queued."""
         self.client.send_text_message("report", data, newest_only=True)
 
     async def _watch(self, _: Fields) -> Fields:
@@ -210,7 +210,7 @@ class ToolsSession(JsonSession):
         return {}
 
     async def _ping(self, fields: Fields) -> Fields:
-        """Return the seconds that a call to ``node`` takes."""
+        """Return the duration of a call to ``node`` in seconds."""
 
         name = text_of(fields, "node")
 
@@ -228,7 +228,7 @@ class ToolsSession(JsonSession):
         def kill() -> None:
             with self._endpoint.graph() as graph:
                 node = find_node(graph, name)
-                ping_node(graph, node)  # of one that has exited already, the reason is reported
+                ping_node(graph, node)  # reports the reason if the node has already exited
                 kill_node(graph, node, "requested in the dashboard")
 
         await self.in_thread(kill)
@@ -249,9 +249,9 @@ class ToolsSession(JsonSession):
         return await self.in_thread(clean)
 
     async def _type(self, fields: Fields) -> Fields:
-        """Return the full definition of the message type ``name``, of the packages that are installed here.
+        """Return the full definition of the message type ``name`` from the installed packages.
 
-        With ``topic`` instead, of the type that the master knows of it, also if it is only subscribed.
+        With ``topic`` instead of ``name``, return that of the topic's type at the master, even if it has only subscribers.
         """
         if "topic" in fields:
             topic = text_of(fields, "topic")
@@ -270,18 +270,18 @@ class ToolsSession(JsonSession):
             raise UsageError(f"this token is read-only: it {what}")
 
     async def _yaml(self, fields: Fields) -> Fields:
-        """Return the values of a file of rqt_reconfigure or dynparam by name."""
+        """Return the values in a file of rqt_reconfigure or dynparam, by name."""
         text = text_of(fields, "text")
         loop = asyncio.get_running_loop()
         values = await loop.run_in_executor(self._endpoint.parser, parameter_values, text)
-        # JSON has no infinity.
+        # JSON cannot represent infinity.
         return {
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
             for name, value in values.items()
         }
 
     async def _value(self, fields: Fields) -> Fields:
-        """Return the type and the text of the value that `rosparam set` makes of ``text``."""
+        """Return the type and text of the value to which `rosparam set` converts ``text``."""
         value = await self._parsed(fields)
         return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 
@@ -305,7 +305,7 @@ class ToolsSession(JsonSession):
         text = text_of(fields, "text")
 
         def parse() -> object:
-            # No text is the empty text, as on the command line; to YAML it would be null.
+            # An empty string is a value, as on the command line; in YAML it would be null.
             value = parse_value(text) if text.strip() else ""
             check_parameter(value, "the value")
             return value
@@ -314,7 +314,7 @@ class ToolsSession(JsonSession):
 
 
 def _type_name(value: object) -> str:
-    """Return the name of a parameter's type, as roscpp and the wiki call it."""
+    """Return the name of a parameter's type, as in roscpp and the wiki."""
     for type_, name in _TYPE_NAMES.items():
         if isinstance(value, type_):
             return name

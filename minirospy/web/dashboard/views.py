@@ -1,6 +1,6 @@
-"""The views of the page, and the links to them. Pure.
+"""The views of the page, and links to them. Pure.
 
-A view and what it shows are in the fragment of the link, which no request carries: neither does the token there get into logs.
+A view and its settings are in the link's fragment, which browsers do not send, so the token there is not logged.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ VIEWS = (
     "panels",
     "layout",
 )
-"""The names of the views, as in links, in the order of their tabs; the page has one module for each."""
+"""The names of the views in links, in the order of their tabs; the page has one module for each."""
 
 LAYOUTS = ("workshop", "console", "rviz", "teleop", "classroom")
-"""The layouts that come with the page: several views side by side."""
+"""The page's built-in layouts: several views next to each other."""
 
 
 def link(
@@ -53,7 +53,7 @@ def link(
     code: str = "",
     encrypted: bool = False,
 ) -> str:
-    """Return the address of a view; ``fields`` are its settings, each may have several values. ``code``: see codes.py."""
+    """Return the URL of a view; ``fields`` are its settings, which may have several values. ``code``: see codes.py."""
     words = [(name, value) for name, values in (fields or {}).items() for value in values]
     words += [(name, value) for name, value in (("token", token), ("code", code)) if value]
     query = f"?{urlencode(words, quote_via=quote, safe='/[]:')}" if words else ""
@@ -63,13 +63,13 @@ def link(
 
 
 def plotted_fields(words: Iterable[str]) -> list[str]:
-    """Return the paths that rqt_plot's words mean: ``/a/x,/b/y`` are two, ``/pose/x:y`` is /pose/x and /pose/y.
+    """Return the paths for rqt_plot's arguments: ``/a/x,/b/y`` are two, ``/pose/x:y`` is /pose/x and /pose/y.
 
-    Raise UsageError on what is not a path.
+    Raise UsageError if one is not a path.
     """
     found: list[str] = []
     for word in (part for each in words for part in each.split(",") if part):
-        # A colon inside of brackets is a slice.
+        # A colon in brackets belongs to a slice.
         head, *others = _split_colons(word)
         base = head.rpartition("/")[0]
         if not base and not head.startswith("/"):

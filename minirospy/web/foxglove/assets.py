@@ -1,4 +1,4 @@
-"""Files for clients: meshes and pictures that a robot description names, out of known packages and nothing else."""
+"""Files for clients: meshes and images that a robot description refers to, only from known packages."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ if TYPE_CHECKING:
 __all__ = ["ALLOWED", "MAX_BYTES", "Assets"]
 
 ALLOWED = r"^package://(?:[-\w%]+/)*[-\w%.]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff|urdf|webp|xacro)$"
-"""The URIs that foxglove_bridge allows: matched as the whole, whatever the case."""
+"""The URIs that foxglove_bridge allows; the whole URI must match, ignoring case."""
 
-MAX_BYTES = 100_000_000
-"""A larger file is refused."""
+MAX_BYTES = 100_000_000  # size limit of a file
 
 
 class Assets:
-    """Reads files by ``package://`` URIs. Blocking."""
+    """Reads files by ``package://`` URIs. Methods block."""
 
     def __init__(
         self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MAX_BYTES
     ) -> None:
-        """Read from ``packages`` what a regular expression of ``allowed`` matches. Raise BridgeError on a bad one."""
+        """Read files in ``packages`` whose URI matches a regular expression in ``allowed``. Raise BridgeError if one is bad."""
         self._packages = packages
         self._most_bytes = most_bytes
         try:

@@ -1,4 +1,4 @@
-"""The channels and services that all clients of the Foxglove protocol are offered: ids for what the graph has."""
+"""The channels and services offered to all clients of the Foxglove protocol: ids for the topics and services of the graph."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 _SECONDS = 3.0
-"""The types of topics that are not installed here are waited for this long: all clients wait for what is offered."""
+"""Timeout for the types of topics that are not installed; short, because all clients wait for the list of channels."""
 
 
 class Channels:
-    """Topics as channels. A topic whose type or definition changes becomes another channel."""
+    """Topics as channels. A topic whose type or definition changes gets a new channel."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, Channel] = {}
@@ -29,7 +29,7 @@ class Channels:
         self._definitions: dict[str, set[str]] = {}
 
     def clear(self) -> None:
-        """Forget all, but not which ids were used."""
+        """Remove all channels, but do not reuse their ids."""
         for table in (self.by_id, self._by_topic, self._types, self._declared, self._definitions):
             table.clear()
 
@@ -38,7 +38,7 @@ class Channels:
         return self._types[channel_id]
 
     async def update(self, graph: SharedGraph) -> tuple[list[Channel], list[int]]:
-        """Return the channels that are new and the ids of those that are no more, after a look at the graph."""
+        """Update from the graph; return the new channels and the ids of removed ones."""
         snapshot = graph.snapshot
         wanted = {
             topic: snapshot.types[topic]
@@ -64,7 +64,7 @@ class Channels:
             else:
                 others[topic] = snapshot.publishers.get(topic, ())
 
-        # One whose publisher does not answer in time is known by its first message.
+        # If no publisher answers in time, the type is taken from the first message.
         found = await graph.texts.of_publishers(others, _SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
@@ -73,9 +73,9 @@ class Channels:
         return new, removed
 
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
-        """Return the channel that replaces one whose publisher sends messages of another definition.
+        """Return a replacement for a channel whose publisher sends messages of another definition.
 
-        None if the channel has been removed, or the definition was replaced before: publishers that contradict each other.
+        Return None if the channel has been removed, or was replaced before: then its publishers contradict each other.
         """
         md5sum = header.get("md5sum", ANY)
         if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:
@@ -104,7 +104,7 @@ class Channels:
 
 
 class Services:
-    """Services with ids; one that moves to another type becomes another."""
+    """Services with ids; a service whose type changes gets a new id."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, ServiceOffer] = {}
@@ -112,12 +112,12 @@ class Services:
         self._ids = itertools.count(1)
 
     def clear(self) -> None:
-        """Forget all, but not which ids were used."""
+        """Remove all services, but do not reuse their ids."""
         self.by_id.clear()
         self.infos.clear()
 
     def update(self, graph: SharedGraph) -> tuple[list[ServiceOffer], list[int]]:
-        """Return the services that are new and the ids of those that are no more, after a look at the graph."""
+        """Update from the graph; return the new services and the ids of removed ones."""
         infos = (graph.service_info(name) for name in graph.snapshot.services)
         wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
         removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]

@@ -1,4 +1,4 @@
-"""The Foxglove protocol's server side: what all of its clients are offered, and when that changes."""
+"""The server of the Foxglove protocol: what is offered to all clients, and its changes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions", "Playback"]
 _log = logging.getLogger(__name__)
 
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
-"""What clients may do where nothing is switched off."""
+"""The default capabilities of clients."""
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
@@ -39,10 +39,10 @@ class Playback(Protocol):
 
     @property
     def range(self) -> tuple[int, int]:
-        """Start and end of what is played, in nanoseconds."""
+        """Return the start and end of the recording, in nanoseconds."""
 
     def now(self) -> int:
-        """Return the time of what is played, which stamps messages."""
+        """Return the current time in the recording, which stamps messages."""
 
     def state(self) -> PlaybackState: ...
 
@@ -51,7 +51,7 @@ class Playback(Protocol):
 
 @dataclass(frozen=True)
 class FoxgloveOptions:
-    """``name`` is what the server calls itself; ``session_id`` differs for each start of the bridge."""
+    """``name`` is the server's name for clients; ``session_id`` differs for each start of the bridge."""
 
     name: str = "minirospy bridge"
     capabilities: Sequence[str] = CAPABILITIES
@@ -60,7 +60,7 @@ class FoxgloveOptions:
 
 
 class FoxgloveEndpoint:
-    """Serves the Foxglove protocol. On the loop."""
+    """Serves the Foxglove protocol. Runs on the loop."""
 
     def __init__(
         self,
@@ -78,8 +78,7 @@ class FoxgloveEndpoint:
 
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
-        self._waiting: set[FoxgloveSession] = set()
-        """Clients that have not been offered channels yet."""
+        self._waiting: set[FoxgloveSession] = set()  # clients that have not been sent the channels yet
         self._is_known = False
         self._updating: asyncio.Task[None] | None = None
         self._is_outdated = False
@@ -120,7 +119,7 @@ class FoxgloveEndpoint:
         return session
 
     def left(self, session: FoxgloveSession) -> None:
-        """Forget a client."""
+        """Remove a client."""
         self.sessions.discard(session)
         self._waiting.discard(session)
         if not self.sessions:
@@ -129,7 +128,7 @@ class FoxgloveEndpoint:
     # --- for sessions
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return what a client may do."""
+        """Return the capabilities of a client."""
         found = list(self._options.capabilities)
         if self.graph.node.simulated or self.playback:
             found.append("time")
@@ -155,7 +154,7 @@ class FoxgloveEndpoint:
                 session.send(serializing.advertise([replaced]))
 
     def playback_changed(self, state: PlaybackState) -> None:
-        """Report a player's state to all clients."""
+        """Send a player's state to all clients."""
         for session in list(self.sessions):
             session.client.send_binary(serializing.playback_state(state))
 
@@ -194,7 +193,7 @@ class FoxgloveEndpoint:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Offer what is new and withdraw what has disappeared, until the graph is as it was when this started."""
+        """Advertise new channels and services and remove old ones; repeat if the graph has changed meanwhile."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, removed_services = self.services.update(self.graph)

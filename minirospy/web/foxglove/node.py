@@ -1,4 +1,4 @@
-"""`rosrun foxglove_bridge foxglove_bridge`: the bridge as a node of launch files, with the parameters of the real one.
+"""`rosrun foxglove_bridge foxglove_bridge`: the bridge as a node for launch files, with the real bridge's parameters.
 
 Tokens come from the environment (MINIROSPY_BRIDGE_TOKEN, MINIROSPY_BRIDGE_READ_TOKEN), never from parameters, which every
 node can read. Source: https://github.com/foxglove/ros-foxglove-bridge (README).
@@ -36,7 +36,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options that a node's private parameters mean. Raise BridgeError."""
+    """Return the options for a node's private parameters. Raise BridgeError."""
     uses_tls = value(private, "tls", bool, False)
     certificate = value(private, "certfile", str, "")
     if uses_tls and not certificate:
@@ -64,7 +64,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _capabilities(names: Sequence[str]) -> list[str]:
-    """Return the capabilities of these names; that of time follows /use_sim_time, as in the real bridge."""
+    """Return the capabilities with these names; "time" depends on /use_sim_time, as in the real bridge."""
     unknown = [name for name in names if name not in (*CAPABILITIES, "time")]
     if unknown:
         raise BridgeError(f"~capabilities: {', '.join(unknown)}: known are {', '.join(CAPABILITIES)}")

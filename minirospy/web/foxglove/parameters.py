@@ -1,4 +1,4 @@
-"""Parameters for clients of the Foxglove protocol: reading, setting, and their changes."""
+"""Parameters for clients of the Foxglove protocol: read, set, and report changes."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Parameters:
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
         self._wanted: dict[ParameterListener, set[str] | None] = {}
-        """The names that a client subscribes to; None: all."""
+        """The names to which each client subscribes; None: all."""
         self._is_watching = False
         self._at_master = asyncio.Lock()
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
-        """Return parameters, all that are set where ``names`` is empty. Raise MasterUnreachableError, RpcError."""
+        """Return parameters, or all if ``names`` is empty. Raise MasterUnreachableError or RpcError."""
         master = self._graph.node._node.master
         allowed = self._graph.filters.parameters
         if not names:
@@ -51,7 +51,7 @@ class Parameters:
         return found
 
     async def write(self, parameters: Iterable[Parameter]) -> list[str]:
-        """Set or delete parameters; return what failed, a line for each."""
+        """Set or delete parameters; return one line for each failure."""
         master = self._graph.node._node.master
         failed = []
         for parameter in parameters:
@@ -69,7 +69,7 @@ class Parameters:
         return failed
 
     def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report the changes of parameters to a client, of all where ``names`` is empty."""
+        """Report changes of these parameters to a client, or of all if ``names`` is empty."""
         before = self._wanted.get(listener, set())
         self._wanted[listener] = None if not names or before is None else before | set(names)
         if not self._is_watching:
@@ -82,7 +82,7 @@ class Parameters:
         return len(self._wanted.get(listener) or ())
 
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report them no more, none where ``names`` is empty."""
+        """Stop reporting changes of these parameters, or of all if ``names`` is empty."""
         before = self._wanted.get(listener, set())
         rest = set() if not names or before is None else before - set(names)
         if rest:
@@ -91,7 +91,7 @@ class Parameters:
             self.forget(listener)
 
     def forget(self, listener: ParameterListener) -> None:
-        """Report nothing to a client."""
+        """Remove all subscriptions of a client."""
         self._wanted.pop(listener, None)
         if not self._wanted and self._is_watching:
             self._is_watching = False
@@ -99,16 +99,16 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.remove))
 
     async def _in_order(self, request: Callable[[str], Awaitable[object]]) -> None:
-        """Subscribe at the master, or unsubscribe, after the requests before it: each may use its own connection."""
+        """Subscribe or unsubscribe at the master after earlier requests are done: each may use its own connection."""
         async with self._at_master:
             await request(_ROOT)
 
     def _changed(self, name: str, value: object) -> None:
-        """Report a change at ``name``, a parameter or a namespace; ``{}`` is one that was deleted, or an empty one."""
+        """Report a change of ``name``, a parameter or a namespace; the value ``{}`` means deleted or empty."""
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master does not distinguish what was deleted from what is empty: reading it does.
+        # The master's notification does not distinguish deleted from empty, so read the value.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):
@@ -120,7 +120,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Report the present values of what clients subscribe to, of ``emptied`` to those that subscribe to all, too."""
+        """Report current values to subscribers; report ``emptied`` also to clients that subscribe to all."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]
@@ -129,7 +129,7 @@ class Parameters:
 
 
 def _is_affected(wanted: str, name: str, value: object) -> bool:
-    """Return whether a change at ``name`` may change a parameter in a way that ``value`` does not show."""
+    """Return whether a change of ``name`` may change ``wanted`` in a way that ``value`` does not show."""
     if name.startswith(wanted.rstrip("/") + "/"):
         return True
     if not isinstance(value, dict):

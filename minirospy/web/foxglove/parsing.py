@@ -1,4 +1,4 @@
-"""A client's JSON and binary messages of the Foxglove protocol become events, or are refused.
+"""Parse clients' JSON and binary messages of the Foxglove protocol into events.
 
 Pure. All integers are little-endian. Source: https://github.com/foxglove/ws-protocol (docs/spec.md).
 """
@@ -38,15 +38,13 @@ __all__ = [
     "parse_text",
 ]
 
-_Fields = Mapping[str, Any]
-"""An operation as JSON gives it."""
+_Fields = Mapping[str, Any]  # a parsed JSON operation
 
-_MAX_ITEMS = 100_000
-"""Entries of one array of a client."""
+_MAX_ITEMS = 100_000  # entries in one array of a client's message
 
 _MAX_VALUES = 1_000_000
 _MAX_COLLECTIONS = 100_000
-"""Of a text, marks within strings counted: parsing it takes 50 ms at most; the messages that clients publish are binary."""
+"""Brackets in a JSON message, including those in strings: limits parsing to 50 ms; messages that clients publish are binary."""
 
 _UINT32 = (1 << 32) - 1
 _SERVICE_HEAD = struct.Struct("<BIII")
@@ -55,7 +53,7 @@ _CHANNEL_ID = struct.Struct("<BI")
 
 
 def parse_text(text: str | bytes) -> Event:
-    """Return the event of a JSON message. Raise BridgeProtocolError."""
+    """Parse a JSON message. Raise BridgeProtocolError."""
     try:
         fields = load_json(text, max_values=_MAX_VALUES, max_collections=_MAX_COLLECTIONS)
     except (ValueError, RecursionError) as error:
@@ -73,7 +71,7 @@ def parse_text(text: str | bytes) -> Event:
 
 
 def parse_binary(data: bytes | bytearray | memoryview) -> Event:
-    """Return the event of a binary message. Raise BridgeProtocolError."""
+    """Parse a binary message. Raise BridgeProtocolError."""
     view = memoryview(data)
     if not view:
         raise BridgeProtocolError("Received an empty binary message")

@@ -1,6 +1,6 @@
-"""The Foxglove WebSocket protocol, version 1: the events of a client, and the records that a server sends.
+"""The Foxglove WebSocket protocol, version 1: a client's events, and a server's records.
 
-``parsing.py`` makes events of messages, ``serializing.py`` messages of records. Pure.
+``parsing.py`` parses messages into events, ``serializing.py`` serializes records. Pure.
 Source: https://github.com/foxglove/ws-protocol (docs/spec.md), and for playback https://github.com/foxglove/foxglove-sdk.
 """
 
@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
-"""The names of one protocol; the newer one is preferred where a client offers both."""
+"""Two names of the same protocol; the newer one is preferred if a client offers both."""
 
 MESSAGE_ENCODING = "ros1"
 SCHEMA_ENCODING = "ros1msg"
@@ -74,14 +74,14 @@ class PlaybackStatus(IntEnum):
 
 
 class Schema(NamedTuple):
-    """A type's name and its full text."""
+    """A type's name and its full definition."""
 
     name: str
     text: str
 
 
 class Channel(NamedTuple):
-    """A topic that clients may subscribe to. An id belongs to one topic with one schema, and is not used again."""
+    """A topic that clients may subscribe to. An id belongs to one topic with one schema, and is never reused."""
 
     id: int
     topic: str
@@ -99,7 +99,7 @@ class ServiceOffer(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """A parameter; ``is_set`` is false for one that is not set, or is to be deleted."""
+    """A parameter; ``is_set`` is False if it is not set, or to be deleted."""
 
     name: str
     value: object = None
@@ -107,7 +107,7 @@ class Parameter(NamedTuple):
 
 
 class GraphTables(NamedTuple):
-    """Names of topics or services -> the nodes on them."""
+    """Names of topics or services -> the nodes that use them."""
 
     published: Mapping[str, Sequence[str]]
     subscribed: Mapping[str, Sequence[str]]
@@ -115,7 +115,7 @@ class GraphTables(NamedTuple):
 
 
 class PlaybackState(NamedTuple):
-    """The status, position (nanoseconds) and speed of a player; ``request_id`` of the request that it answers."""
+    """A player's status, position (nanoseconds) and speed; ``request_id``: the request that it answers."""
 
     status: PlaybackStatus
     now: int
@@ -126,7 +126,7 @@ class PlaybackState(NamedTuple):
 
 @dataclass(frozen=True)
 class Subscribe:
-    """``subscriptions``: (subscription id, channel id)."""
+    """Subscribe to channels; ``subscriptions``: (subscription id, channel id)."""
 
     subscriptions: tuple[tuple[int, int], ...]
 
@@ -139,7 +139,7 @@ class Unsubscribe:
 
 
 class ClientChannel(NamedTuple):
-    """A topic that a client publishes; the id is the client's own."""
+    """A topic that a client publishes; the client chooses the id."""
 
     id: int
     topic: str
@@ -149,21 +149,21 @@ class ClientChannel(NamedTuple):
 
 @dataclass(frozen=True)
 class ClientAdvertise:
-    """Publish topics."""
+    """Advertise topics."""
 
     channels: tuple[ClientChannel, ...]
 
 
 @dataclass(frozen=True)
 class ClientUnadvertise:
-    """Publish topics no more."""
+    """Unadvertise topics."""
 
     ids: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class ClientMessage:
-    """A message of a client; ``payload`` is a view of what was received."""
+    """A message from a client; ``payload`` is a view into the received data."""
 
     channel_id: int
     payload: memoryview
@@ -171,7 +171,7 @@ class ClientMessage:
 
 @dataclass(frozen=True)
 class GetParameters:
-    """Request the values of parameters: of all where ``names`` is empty."""
+    """Request the values of parameters, or of all if ``names`` is empty."""
 
     names: tuple[str, ...]
     id: str | None
@@ -179,7 +179,7 @@ class GetParameters:
 
 @dataclass(frozen=True)
 class SetParameters:
-    """Set parameters, and delete those that are not set."""
+    """Set parameters, and delete those with ``is_set`` False."""
 
     parameters: tuple[Parameter, ...]
     id: str | None
@@ -187,26 +187,26 @@ class SetParameters:
 
 @dataclass(frozen=True)
 class SubscribeParameterUpdates:
-    """Report changes of parameters: of all where ``names`` is empty."""
+    """Subscribe to changes of parameters, or of all if ``names`` is empty."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class UnsubscribeParameterUpdates:
-    """Report changes no more: of no parameter where ``names`` is empty."""
+    """Unsubscribe from changes of parameters, or of all if ``names`` is empty."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class SubscribeConnectionGraph:
-    """Report the graph and its changes."""
+    """Subscribe to the graph and its changes."""
 
 
 @dataclass(frozen=True)
 class UnsubscribeConnectionGraph:
-    """Report the graph no more."""
+    """Unsubscribe from the graph."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True)
 class PlaybackControl:
-    """Control a player; ``seek``: where to go on (nanoseconds), None: here."""
+    """Control a player; ``seek``: the new position (nanoseconds), None for the current one."""
 
     command: PlaybackCommand
     speed: float

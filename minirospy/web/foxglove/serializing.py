@@ -1,4 +1,4 @@
-"""Records of a server become the JSON and binary messages of the Foxglove protocol.
+"""Serialize a server's records as JSON and binary messages of the Foxglove protocol.
 
 Pure. All integers are little-endian. Source: https://github.com/foxglove/ws-protocol (docs/spec.md).
 """
@@ -54,7 +54,7 @@ def server_info(
     session_id: str,
     data_range: tuple[int, int] | None = None,
 ) -> str:
-    """Return the first message; ``data_range``: start and end of what a player plays, in nanoseconds."""
+    """Return the first message; ``data_range``: start and end of a player's recording, in nanoseconds."""
     fields: dict[str, object] = {
         "op": "serverInfo",
         "name": name,
@@ -80,12 +80,12 @@ def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
 
 
 def remove_status(ids: Iterable[str]) -> str:
-    """Return the message that withdraws status messages."""
+    """Return the message that removes status messages."""
     return _dump({"op": "removeStatus", "statusIds": list(ids)})
 
 
 def advertise(channels: Iterable[Channel]) -> str:
-    """Return the message that offers channels."""
+    """Return the message that advertises channels."""
     offered = [
         {
             "id": channel.id,
@@ -101,12 +101,12 @@ def advertise(channels: Iterable[Channel]) -> str:
 
 
 def unadvertise(ids: Iterable[int]) -> str:
-    """Return the message that withdraws channels."""
+    """Return the message that removes channels."""
     return _dump({"op": "unadvertise", "channelIds": list(ids)})
 
 
 def advertise_services(services: Iterable[ServiceOffer]) -> str:
-    """Return the message that offers services, with the fields of old clients too."""
+    """Return the message that advertises services, including the fields that old clients need."""
 
     def described(schema: Schema) -> dict[str, str]:
         return {
@@ -132,7 +132,7 @@ def advertise_services(services: Iterable[ServiceOffer]) -> str:
 
 
 def unadvertise_services(ids: Iterable[int]) -> str:
-    """Return the message that withdraws services."""
+    """Return the message that removes services."""
     return _dump({"op": "unadvertiseServices", "serviceIds": list(ids)})
 
 
@@ -148,14 +148,14 @@ def parameter_values(parameters: Iterable[Parameter], id_: str | None = None) ->
 
 
 def service_call_failure(service_id: int, call_id: int, message: str) -> str:
-    """Return the message about a call that failed."""
+    """Return the message for a failed call."""
     return _dump({"op": "serviceCallFailure", "serviceId": service_id, "callId": call_id, "message": message})
 
 
 def connection_graph_update(
     changed: GraphTables, removed_topics: Iterable[str], removed_services: Iterable[str]
 ) -> str:
-    """Return the message with the tables' entries that have changed, each whole, and the names that are no more."""
+    """Return the message with the changed entries of the tables, each complete, and the removed names."""
 
     def listed(table: Mapping[str, Sequence[str]], key: str) -> list[dict[str, object]]:
         return [{"name": name, key: list(nodes)} for name, nodes in table.items()]
@@ -173,7 +173,7 @@ def connection_graph_update(
 
 
 def message_head(subscription_id: int, nanoseconds: int) -> bytes:
-    """Return the bytes in front of a message of a topic."""
+    """Return the header that precedes a topic's message."""
     return _MESSAGE_HEAD.pack(1, subscription_id, nanoseconds)
 
 
@@ -183,18 +183,18 @@ def time_frame(nanoseconds: int) -> bytes:
 
 
 def service_response_head(service_id: int, call_id: int, encoding: str = MESSAGE_ENCODING) -> bytes:
-    """Return the bytes in front of a service's response."""
+    """Return the header that precedes a service's response."""
     name = encoding.encode()
     return _SERVICE_HEAD.pack(3, service_id, call_id, len(name)) + name
 
 
 def asset_head(request_id: int) -> bytes:
-    """Return the beginning of the frame with a file, whose bytes follow."""
+    """Return the header that precedes the bytes of a file."""
     return _ASSET_HEAD.pack(4, request_id, 0, 0)
 
 
 def asset_failure(request_id: int, why: str) -> bytes:
-    """Return the frame about a file that cannot be had."""
+    """Return the frame for a file that is not available."""
     text = why.encode()
     return _ASSET_HEAD.pack(4, request_id, 1, len(text)) + text
 
@@ -223,7 +223,7 @@ def _parameter_fields(parameter: Parameter) -> dict[str, object]:
 
 
 def _json_value(value: object) -> object:
-    """Return a parameter's value as JSON has it: bytes inside of it as base64, a number that JSON lacks as a text."""
+    """Return a parameter's value for JSON: bytes become base64, numbers that JSON lacks become strings."""
     if isinstance(value, dict):
         return {str(key): _json_value(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -31,24 +31,23 @@ __all__ = ["FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""Calls and requests of one client that may be under way."""
+"""Concurrent calls and requests of one client."""
 
 _MAX_CHANNELS = 1000
-"""Topics that one client may publish, and its subscriptions: each of them gets each message."""
+"""Topics that one client may publish, and subscriptions that it may have: each receives every message."""
 
 _MAX_PARAMETERS = 10_000
-"""Names of parameters whose changes one client may subscribe to."""
+"""Parameter names to whose changes one client may subscribe."""
 
-_MAX_STATUSES = 100  # about one message of a client: it may name thousands of channels that do not exist
+_MAX_STATUSES = 100  # per message of a client, which may name thousands of nonexistent channels
 _VALUE_FACTOR = 4
-"""Memory of an operation that has been parsed, as a multiple of its text's: that of objects and lists of numbers."""
+"""Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
 
-_TIME = "time"
-"""The key under which the time waits for a slow client."""
+_TIME = "time"  # key of the time in a slow client's queue, of which the newest is kept
 
 
 class FoxgloveSession:
-    """The state of one client; called by its connection, on the loop."""
+    """The state of one client; its connection calls it on the loop."""
 
     def __init__(self, endpoint: FoxgloveEndpoint, client: WebClient) -> None:
         self.client = client
@@ -58,14 +57,12 @@ class FoxgloveSession:
         self._subscriptions: dict[int, tuple[Channel, Callable[[Arrival], None]]] = {}
         self._publications: dict[int, Publication] = {}
         self._calls: set[asyncio.Task[None]] = set()
-        self._calls_size = 0
-        """Memory of the calls under way."""
-        self._operation_size = 0
-        """Memory of the operation that is being carried out."""
+        self._calls_size = 0  # memory of the running calls, in bytes
+        self._operation_size = 0  # memory of the current operation, in bytes
         self._dropped = 0
         self._are_drops_shown = False
         self._statuses = 0
-        # About the message that is handled now.
+        # _statuses counts those about the current message.
 
         self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
             protocol.Subscribe: self._subscribe,
@@ -87,17 +84,17 @@ class FoxgloveSession:
     # --- from the connection
 
     def received_text(self, text: str) -> None:
-        """Take over a JSON message."""
+        """Handle a JSON message."""
         self._operation_size = _VALUE_FACTOR * sys.getsizeof(text)
         self._handle(parsing.parse_text, text)
 
     def received_binary(self, data: bytes) -> None:
-        """Take over a binary message."""
+        """Handle a binary message."""
         self._operation_size = len(data)
         self._handle(parsing.parse_binary, data)
 
     def ended(self) -> None:
-        """End everything that the client has."""
+        """Close the client's subscriptions, publications and calls."""
         for channel, listener in self._subscriptions.values():
             self._graph.unsubscribe(channel.topic, listener)
         self._subscriptions.clear()
@@ -116,11 +113,11 @@ class FoxgloveSession:
         self.client.send_text(text)
 
     def send_time(self, frame: bytes) -> None:
-        """Send the time; only the last one waits."""
+        """Send the time; a slow client's queue keeps only the newest."""
         self.client.send_message(_TIME, frame, b"", newest_only=True)
 
     def channels_removed(self, ids: list[int]) -> None:
-        """End the subscriptions of channels that are no more."""
+        """Close the subscriptions to removed channels."""
         for subscription_id, (channel, listener) in list(self._subscriptions.items()):
             if channel.id in ids:
                 del self._subscriptions[subscription_id]
@@ -128,7 +125,7 @@ class FoxgloveSession:
         self.send(serializing.unadvertise(ids))
 
     def report_drops(self) -> None:
-        """Say that messages were dropped, or that none are any more; called now and then."""
+        """Notify the client that messages are being dropped, or no longer are; called at intervals."""
         dropped = self.client.queue.dropped
         if dropped > self._dropped:
             counts = self.client.queue.dropped_of.most_common(3)
@@ -169,7 +166,7 @@ class FoxgloveSession:
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
-        """Raise BridgeError if the client may not do this."""
+        """Raise BridgeError if the client lacks a capability."""
         if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"
@@ -177,7 +174,7 @@ class FoxgloveSession:
             raise BridgeError(f"{doing} is not allowed: {why}")
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
-        """Start the request that was received, which keeps the content of its message."""
+        """Start a task for the received request, which keeps the request's memory."""
         if len(self._calls) >= _MAX_CALLS:
             work.close()
             raise BridgeError(f"{_MAX_CALLS} requests are under way: wait for an answer")
@@ -225,7 +222,7 @@ class FoxgloveSession:
         if (arrival.header["md5sum"] != md5sum and md5sum != ANY) or (
             not channel.schema.text and md5sum == ANY
         ):
-            # The text that the client decodes with does not fit this publisher.
+            # The definition that the client decodes with does not match this publisher's.
             self._endpoint.definition_differs(channel, arrival.header)
             return
         head = serializing.message_head(subscription_id, arrival.nanoseconds)
@@ -377,7 +374,7 @@ class FoxgloveSession:
         except (ServiceException, BridgeError) as error:
             self._call_failed(event, str(error))
         except Exception:
-            # Logged by the task; the client waits for the answer.
+            # The task logs the error; the client still needs an answer.
             self._call_failed(event, "the bridge failed on this call")
             raise
         else:

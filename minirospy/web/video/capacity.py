@@ -1,4 +1,4 @@
-"""A limit on work that goes on at the same time, by its size: what does not fit waits, in order."""
+"""A limit on the total size of concurrent work; further work waits in order."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ __all__ = ["Capacity"]
 
 
 class Capacity:
-    """So many units of work at a time. On the loop."""
+    """A limit of ``units`` of concurrent work. Runs on the loop."""
 
     def __init__(self, units: int) -> None:
         self.units = units
-        self.taken_units = 0
-        """Units of the work that goes on now."""
+        self.taken_units = 0  # units of the running work
         self._waiting: deque[tuple[int, asyncio.Future[None]]] = deque()
 
     @asynccontextmanager
     async def taken(self, units: int) -> AsyncIterator[None]:
-        """Wait until there is room, and take it for the block. Work that is larger than all there is goes on alone."""
+        """Acquire ``units`` for the block, and wait until they are free. Work that exceeds the limit runs alone."""
         units = min(units, self.units)
         if self._waiting or self.taken_units + units > self.units:
             turn = asyncio.get_running_loop().create_future()
@@ -30,7 +29,7 @@ class Capacity:
                 await turn
             except asyncio.CancelledError:
                 if not turn.cancelled():
-                    self.taken_units -= units  # its turn had come
+                    self.taken_units -= units  # the units had just been acquired
                 self._admit()
                 raise
         else:

@@ -1,4 +1,4 @@
-"""What a URL of web_video_server asks for, and the parts of its streams. Pure.
+"""Parse the URLs of web_video_server, and format the parts of its streams. Pure.
 
 Source: http://wiki.ros.org/web_video_server.
 """
@@ -26,7 +26,7 @@ _MAX_PIXELS = 10_000
 
 @dataclass(frozen=True)
 class Picture:
-    """How an image is encoded: ``format`` jpeg or png, "" for a compressed image as it came; None: its own size."""
+    """How to encode an image: ``format`` jpeg or png, "" to pass a compressed image unchanged; None: keep the size."""
 
     format: str = "jpeg"
     quality: int = 95
@@ -37,14 +37,14 @@ class Picture:
 
 @dataclass(frozen=True)
 class VideoRequest:
-    """The images of a topic, encoded."""
+    """A request for a topic's images in an encoding."""
 
     topic: str
     picture: Picture
 
 
 def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoRequest:
-    """Return what a query asks for. Raise BridgeError: no topic, a type that is not offered, a number that is none."""
+    """Parse a query. Raise BridgeError if the topic is missing, the type is not supported, or a number is invalid."""
     topic = query.get("topic", "")
     if not topic:
         raise BridgeError("the topic is missing: give ?topic=/camera/image_raw")
@@ -66,7 +66,7 @@ def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoR
         _number(query, "height", None, 1, _MAX_PIXELS),
         "invert" in query and query["invert"].lower() not in ("false", "0"),
     )
-    # web_video_server takes the compressed images beside those of the topic.
+    # web_video_server subscribes to the topic's "compressed" topic.
     return VideoRequest(f"{topic}/compressed" if type_ == "ros_compressed" else topic, picture)
 
 
@@ -84,7 +84,7 @@ def _number(query: Mapping[str, str], name: str, default: int | None, low: int, 
 
 
 def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
-    """Return the head of an image in a stream, in front of ``data``; behind it comes :data:`END`."""
+    """Return the header of an image in a stream; ``data`` and :data:`END` follow it."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     return (
         f"Content-Type: {content_type}\r\nX-Timestamp: {seconds}.{rest:09d}\r\nContent-Length: {len(data)}\r\n\r\n"
@@ -92,11 +92,11 @@ def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
 
 
 END = b"\r\n" + START
-"""The end of an image, and the boundary of the next one: a browser shows an image when its boundary has come."""
+"""The end of an image with the next boundary: a browser shows an image only after the boundary."""
 
 
 def topics_page(topics: Mapping[str, str], token: str) -> bytes:
-    """Return the page with the topics that have images, and their types; ``token`` is that of the request."""
+    """Return the page with the image topics and their types; ``token`` is that of the request."""
     rows = []
     for topic, type_ in sorted(topics.items()):
         links = " ".join(

@@ -1,4 +1,4 @@
-"""The pages of web_video_server: each image is encoded once for all clients that want it so."""
+"""The pages of web_video_server: each image is encoded once for all clients that request the same encoding."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 _SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Topics and encodings at a time: each image is encoded for each of them."""
+"""Concurrent feeds (a topic in one encoding): each image is encoded for each of them."""
 _MAX_KEPT = 32_000_000
-"""Bytes of encoded images that are kept for clients that join, of all feeds; larger ones are not kept."""
+"""Bytes of encoded images stored for new clients, of all feeds together; larger ones are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -40,12 +40,12 @@ Listener = Callable[[File | BridgeError], None]
 
 
 class _Feed:
-    """The images of a topic in one encoding: the newest is encoded, in a worker, as often as that goes."""
+    """The images of a topic in one encoding: a worker encodes the newest image, as often as it can."""
 
     def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
         self.last: File | BridgeError | None = None
-        """What was encoded last: a client that joins need not wait for the next image of a slow or latched topic."""
+        """The last encoded image, so that a new client need not wait for the next one of a slow or latched topic."""
 
         self._graph = graph
         self._request = request
@@ -54,11 +54,11 @@ class _Feed:
         self._work: asyncio.Task[None] | None = None
 
     def open(self) -> None:
-        """Subscribe."""
+        """Subscribe to the topic."""
         self._graph.subscribe(self._request.topic, self._arrived)
 
     def close(self) -> None:
-        """Unsubscribe."""
+        """Unsubscribe from the topic."""
         self._graph.unsubscribe(self._request.topic, self._arrived)
         self._newest = None
         self._keep(None)
@@ -89,7 +89,7 @@ class _Feed:
         self._work = None
 
     def _keep(self, found: File | BridgeError | None) -> None:
-        """Keep what was encoded last, if all feeds together keep little enough."""
+        """Store the last encoded image, unless all feeds together would exceed _MAX_KEPT."""
         self._shared.kept -= _size(self.last)
         self.last = found
         if self._shared.kept + _size(found) > _MAX_KEPT:
@@ -103,14 +103,14 @@ def _size(found: File | BridgeError | None) -> int:
 
 @dataclass
 class _Shared:
-    """What all feeds share: the pixels that are worked on at a time, the bytes of images that are kept."""
+    """What all feeds share: the limit on concurrently processed pixels, and the bytes of stored images."""
 
     work: Capacity
     kept: int = 0
 
 
 class VideoPages:
-    """Serves images of topics. On the loop."""
+    """Serves images of topics. Runs on the loop."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -120,7 +120,7 @@ class VideoPages:
 
     @property
     def handlers(self) -> Mapping[str, HttpHandler]:
-        """Return what answers each path."""
+        """Return the request handler of each path."""
         return {
             "/": self._guarded(self._topics),
             "/stream": self._guarded(self._stream),
@@ -201,7 +201,7 @@ class VideoPages:
     # --- within
 
     async def _look(self, exchange: Exchange) -> Snapshot | None:
-        """Return the graph; where it cannot be read, answer so."""
+        """Return the graph; if it cannot be read, send an error response and return None."""
         try:
             found = await fetch(self._graph.node._node.master)
         except (MasterUnreachableError, RpcError) as error:
@@ -213,7 +213,7 @@ class VideoPages:
         self, exchange: Exchange, request: VideoRequest, start: Callable[[], None]
     ) -> None:
         graph = await self._look(exchange)
-        # A client may have disconnected meanwhile; then nothing would end its part in the images.
+        # If the client has disconnected meanwhile, do not start: nothing would end its stream.
         if graph is None or not exchange.is_open:
             return
         topic = self._graph.node.resolve(request.topic)
@@ -230,7 +230,7 @@ class VideoPages:
             start()
 
     def _join(self, exchange: Exchange, request: VideoRequest, listener: Listener) -> Callable[[], None]:
-        """Let a client have the images; return what ends it, which the client's end does, too."""
+        """Send the images to a client; return a function that stops it, which is also called when the client disconnects."""
         feed = self._feeds.get(request)
         is_new = feed is None
         if feed is None:
@@ -255,7 +255,7 @@ class VideoPages:
 
 
 def _nothing() -> None:
-    """End what has not started."""
+    """Do nothing, for a stream that has not started."""
 
 
 def _refuse(exchange: Exchange, status: int, why: str) -> None:

@@ -1,4 +1,4 @@
-"""Image messages -> JPEG and PNG. Pure; by OpenCV, simplejpeg or Pillow, whichever is installed."""
+"""Convert image messages to JPEG and PNG. Pure; uses OpenCV, simplejpeg or Pillow, whichever is installed."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ IMAGE = "sensor_msgs/Image"
 COMPRESSED = "sensor_msgs/CompressedImage"
 
 _FASTEST_PNG = 1
-MAX_PIXELS = 16_000_000
-"""Pixels of a compressed image, and of one that is made larger."""
+MAX_PIXELS = 16_000_000  # in a compressed image, and in an enlarged one
 _LENGTH = struct.Struct("<I")
-_STAMPED = 12  # bytes of a header's number and time, before the length of its frame
-_HEAD_BYTES = 100_000  # of a file, in which its size is: other data may be before it, such as a preview
-_ROWS = 256  # of an image of numbers that are scaled at a time: as numbers of 64 bits they take eight times the memory
+_STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
+# of a file to search for the image's size; other data, such as a preview, may precede it
+_HEAD_BYTES = 100_000
+_ROWS = 256  # of a numeric image to scale at a time: as 64-bit numbers they take eight times the memory
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return a serialized message's image as a file and its content type. Raise BridgeError."""
+    """Return the image of a serialized message as an encoded file, and its content type. Raise BridgeError."""
     from sensor_msgs.msg import CompressedImage, Image
 
     try:
@@ -52,10 +52,10 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
         return _file(image, picture), f"image/{picture.format or 'jpeg'}"
     except BridgeError:
         raise
-    except Exception as error:  # the libraries for images raise errors of many kinds on bad data
+    except Exception as error:  # image libraries raise errors of many types for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
-            # Without the command that installs it, which names the server's interpreter: this goes to clients.
+            # Do not include the install command with the server's interpreter path: this text is sent to clients.
             why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
         raise BridgeError(f"the image cannot be shown: {why}") from error
 
@@ -65,14 +65,14 @@ def _content_type(data: bytes) -> str:
 
 
 def _is_as_wanted(data: bytes, picture: Picture) -> bool:
-    """Return whether a compressed image needs no change."""
+    """Return whether a compressed image can be passed unchanged."""
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
 
 
 def _colors(image: Pixels, encoding: str) -> Pixels:
-    """Return an image as gray or BGR of 8 bits; numbers that are not colors are scaled to their largest."""
+    """Return an image as 8-bit gray or BGR; numeric images are scaled to their largest value."""
 
     if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
         return image
@@ -88,7 +88,7 @@ def _colors(image: Pixels, encoding: str) -> Pixels:
 
 
 def _scaled(image: Pixels) -> Pixels:
-    """Return numbers as gray: the largest is white; negative ones, infinities and NaN are black."""
+    """Return a numeric image as gray: the largest value is white; negative values, infinities and NaN are black."""
     import numpy as np
 
     def values(start: int) -> Pixels:
@@ -105,7 +105,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return how many pixels are worked on for a serialized message, as far as that can be known before."""
+    """Return the number of pixels to process for a serialized message, as far as it is known in advance."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:
@@ -119,20 +119,20 @@ def work_of(type_: str, body: bytes | memoryview) -> int:
 
 
 def _by_opencv(image: Pixels, encoding: str) -> Pixels:
-    """Return an image of YUV, or of a Bayer pattern with OpenCV, in colors; without OpenCV YUV is gray."""
+    """Convert a YUV or Bayer image to colors with OpenCV; without OpenCV, YUV becomes gray."""
     cv2 = opencv()
     if cv2 is None:
         return converted(image, encoding, "mono8")
     if encoding == "yuv422":
         return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
-    # OpenCV names a pattern by the pixels of its second row and column.
+    # OpenCV names a pattern by the pixels in its second row and column.
     name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
     found: Pixels = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
     return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
 
 
 def _debayered(image: Pixels, encoding: str) -> Pixels:
-    """Return the colors of a Bayer pattern, each cell of four pixels as one."""
+    """Return the colors of a Bayer pattern, with each cell of four pixels as one pixel."""
     import numpy as np
 
     eight = converted(image, "mono16", "mono8") if encoding.endswith("16") else image
@@ -147,9 +147,9 @@ def _debayered(image: Pixels, encoding: str) -> Pixels:
 
 
 def _changed(image: Pixels, picture: Picture) -> Pixels:
-    """Return an image in the wanted size, turned upside down where wanted."""
+    """Return an image in the requested size, rotated by 180 degrees if requested."""
     if image.dtype != "uint8":
-        # Of a compressed image with 16 bits.
+        # A compressed image may have 16 bits.
         image = (image >> 8).astype("uint8")
     if picture.is_inverted:
         image = image[::-1, ::-1]
