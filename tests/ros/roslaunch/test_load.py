@@ -408,6 +408,12 @@ def test_long_substitutions_take_no_time(packages: Packages, text: str, why: str
         load(packages, f'<param name="p" value="{text}"/>')
 
 
+def test_substitution_of_several_lines_is_refused_in_one_line(packages: Packages) -> None:
+    with pytest.raises(LaunchError, match="cannot hold another") as raised:
+        load(packages, '<rosparam subst_value="true">a: $(arg(b)\nc: d</rosparam>')
+    assert "\n" not in str(raised.value)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no yes")
 @pytest.mark.parametrize("command", ["yes", "sh -c 'yes &amp; yes'"])
 def test_command_without_end_is_stopped(packages: Packages, command: str) -> None:

@@ -154,6 +154,8 @@ class Substitution:
 
 
 def _shown(text: str) -> str:
+    """Return a text for an error message: on one line, cut to ``_MAX_SHOWN`` characters."""
+    text = " ".join(text[: _MAX_SHOWN + 1].split()) if "\n" in text else text
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
