@@ -25,6 +25,7 @@ _MATRICES = (
 """Key, field of CameraInfo, and shape; None: any shape."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
+_MAX_DIGITS = 100  # in a number of pixels, leading zeros included
 _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
@@ -115,8 +116,10 @@ def ini_of(name: str, info: CameraInfo) -> str:
 
 
 def _pixels(word: object) -> int:
-    if not isinstance(word, str) or not (word.strip().isdecimal() and int(word) < 1 << 32):
-        raise CalibrationError(f"a width or height is not a number of pixels: {word!r}")
+    digits = word.strip() if isinstance(word, str) else ""
+    # Python converts at most 4300 digits.
+    if not (digits.isdecimal() and len(digits) <= _MAX_DIGITS and int(digits) < 1 << 32):
+        raise CalibrationError(f"a width or height is not a number of pixels: {word!r:.80}")
     return int(word)
 
 
