@@ -23,6 +23,7 @@ _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """Optional packages that Python packages search for; reported as found."""
+_MAX_LOOPS = 100_000  # of a foreach() with RANGE
 _DEEPEST = 40  # nested files and macros; a deeper file includes itself
 
 
@@ -195,7 +196,11 @@ class _Run:
             raise BuildError(str(file), statement.line, f"{statement.name}(): {error}") from error
 
     def _foreach(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        for item in self._loop_items(arguments[1:]):
+        try:
+            items = self._loop_items(arguments[1:])
+        except ValueError as error:
+            raise BuildError(str(file), statement.line, f"foreach(): {error}") from error
+        for item in items:
             self._known[arguments[0]] = item
             try:
                 yield from self._run(statement.body, file)
@@ -206,11 +211,17 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return the items of a loop: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
+        """Return the items of a loop: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``.
+
+        Raise ValueError on a ``RANGE`` of more than ``_MAX_LOOPS`` numbers.
+        """
         if words[:1] == ["RANGE"]:
-            numbers = [int(word) for word in words[1:] if word.isdigit()]
+            numbers = [int(word) for word in words[1:] if word.isdecimal() and len(word) < 20]
             start, stop, step = (0, *numbers, 1) if len(numbers) == 1 else (*numbers, 1, 1, 1)[:3]
-            return [str(number) for number in range(start, stop + 1, step or 1)]
+            step = step or 1
+            if (count := (stop - start) // step + 1) > _MAX_LOOPS:
+                raise ValueError(f"RANGE has {count} numbers, at most {_MAX_LOOPS} are read")
+            return [str(number) for number in range(start, stop + 1, step)]
         if words[:1] != ["IN"]:
             return words
         given = keyword_arguments(tuple(words[1:]), frozenset(["LISTS", "ITEMS", "ZIP_LISTS"]))

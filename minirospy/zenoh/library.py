@@ -28,6 +28,7 @@ __all__ = [
 DEFAULT_PORT = 7447
 DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 MAX_PORT = 65_535
+_MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
 """Zenoh's link protocols; a build of Zenoh reports an error for those that it lacks."""
@@ -199,8 +200,8 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
         host, colon, port = address.rpartition(":")
         if not colon or not port.isdecimal():
             raise EndpointError(text, f"has no port, as {protocol}/{address or 'HOST'}:{DEFAULT_PORT}")
-        if not (0 if listens else 1) <= int(port) <= MAX_PORT:
-            raise EndpointError(text, f"has the port {port}: ports are 1 to {MAX_PORT}")
+        if len(port) > _MAX_PORT_DIGITS or not (0 if listens else 1) <= int(port) <= MAX_PORT:
+            raise EndpointError(text, f"has the port {port:.20}: ports are 1 to {MAX_PORT}")
         if not _HOST.fullmatch(host):
             hint = ": an IPv6 address is in brackets, as [::1]" if ":" in host else ""
             raise EndpointError(

@@ -387,6 +387,7 @@ def test_the_report_survives_any_answer() -> None:
     ("text", "reason"),
     [
         ("host:99999", "has the port 99999"),
+        ("host:" + "9" * 5000, "has the port 99999999999999999999: ports are"),
         ("tcp/host:0", "has the port 0"),
         ("http://host", "is not an endpoint"),
         ("http://host:7447", "is not an endpoint"),

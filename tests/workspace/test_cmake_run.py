@@ -126,6 +126,12 @@ def test_loops(tmp_path: Path) -> None:
     assert said(tmp_path, text) == ["a", "c"]
 
 
+@pytest.mark.parametrize("stop", ["100000", "9999999999999999999"])
+def test_loop_over_too_many_numbers_is_refused(tmp_path: Path, stop: str) -> None:
+    with pytest.raises(BuildError, match=r"foreach\(\): RANGE has .* numbers, at most 100000 are read"):
+        said(tmp_path, f"foreach(N RANGE {stop})\n f(${{N}})\nendforeach()")
+
+
 def test_macros(tmp_path: Path) -> None:
     """What is only defined is not run; a call knows its words."""
     text = (

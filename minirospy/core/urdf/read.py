@@ -52,7 +52,7 @@ def _check_version(root: Element, file: str) -> None:
     numbers = version.split(".")
     if len(numbers) != 2 or not all(number.isdecimal() for number in numbers):
         raise UrdfError(file, root.line, "The version attribute should be in the form 'x.y'")
-    if tuple(map(int, numbers)) != (1, 0):
+    if [number.lstrip("0") for number in numbers] != ["1", ""]:
         raise UrdfError(
             file, root.line, "Invalid 'version' specified; only version 1.0 is currently supported"
         )

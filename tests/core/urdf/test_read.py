@@ -105,13 +105,14 @@ def test_errors_name_file_and_line() -> None:
         " \n",
         "<a>" * 50_000,
         "\ud800",
+        f'<robot name="r" version="{"9" * 5000}.0"/>',
         b"\xff\xfe<",
         b'<?xml version="1.0" encoding="klingon"?><robot name="r"/>',
         '<!DOCTYPE r [<!ENTITY a0 "aaaaaaaaaa">'
         + "".join(f'<!ENTITY a{n} "' + f"&a{n - 1};" * 10 + '">' for n in range(1, 9))
         + ']><robot name="r"><link name="&a8;"/></robot>',
     ],
-    ids=["nothing", "blanks", "deep", "surrogate", "bytes", "encoding", "entities"],
+    ids=["nothing", "blanks", "deep", "surrogate", "version", "bytes", "encoding", "entities"],
 )
 def test_what_is_not_a_description_is_refused(text: str | bytes) -> None:
     with pytest.raises(UrdfError):
