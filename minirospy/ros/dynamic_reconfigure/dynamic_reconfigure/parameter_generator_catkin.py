@@ -6,22 +6,32 @@ Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfg
 
 from __future__ import annotations
 
+import inspect as inspect
+import os as os
 import re
 import sys
+import textwrap as textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from string import Template
 from typing import Literal, TypeAlias
 
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import Entry, Value, generated, header
 
 __all__ = [
     "ParameterGenerator",
+    "Template",
     "bool_t",
     "check_description",
     "check_name",
     "double_t",
+    "inspect",
     "int_t",
+    "os",
+    "re",
     "str_t",
+    "sys",
+    "textwrap",
 ]
 
 str_t = "str"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from minirospy.ros.genpy.genpy.base import MsgGenerationException
+
 __all__ = [
     "COMMENTCHAR",
     "CONSTCHAR",
@@ -12,6 +14,7 @@ __all__ = [
     "SEP",
     "SRV_DIR",
     "InvalidMsgSpec",
+    "MsgGenerationException",
 ]
 
 SEP = "/"

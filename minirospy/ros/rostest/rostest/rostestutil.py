@@ -6,10 +6,13 @@ import logging
 import sys
 from typing import TYPE_CHECKING
 
+from minirospy.ros.rostest.runner.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.ros.rostest.runner.junit import success_junit_xml as test_success_junit_xml
 from minirospy.ros.rostest.runner.unit import (
     create_xml_runner,
     print_runner_summary,
     print_unittest_summary,
+    rostest_name_from_path,
     xml_results_file,
 )
 
@@ -24,6 +27,9 @@ __all__ = [
     "printSummary",
     "printlog",
     "printlogerr",
+    "rostest_name_from_path",
+    "test_failure_junit_xml",
+    "test_success_junit_xml",
     "xmlResultsFile",
 ]
 

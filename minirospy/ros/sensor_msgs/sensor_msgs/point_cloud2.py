@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     """The values of points, of any of the types that fields have."""
 
 __all__ = [
+    "_DATATYPES",
+    "PointCloud2",
+    "PointField",
+    "_get_struct_fmt",
     "create_cloud",
     "create_cloud_xyz32",
     "read_points",

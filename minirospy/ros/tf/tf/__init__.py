@@ -5,10 +5,15 @@ A leading slash of a frame's name is dropped, where tf2 refuses it. Source: http
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from minirospy.base.errors import ConnectivityException, ExtrapolationException, LookupException
 from minirospy.base.errors import TransformException as Exception
 from minirospy.ros.tf.tf.broadcaster import TransformBroadcaster
 from minirospy.ros.tf.tf.listener import Transformer, TransformerROS, TransformListener
+
+if TYPE_CHECKING:
+    from minirospy.ros.tf.tf import broadcaster, listener, transformations
 
 __all__ = [
     "ConnectivityException",
@@ -19,4 +24,7 @@ __all__ = [
     "TransformListener",
     "Transformer",
     "TransformerROS",
+    "broadcaster",
+    "listener",
+    "transformations",
 ]
