@@ -11,7 +11,7 @@ if TYPE_CHECKING:
         run,
         unitrun,
     )
-    from minirospy.ros.rostest.runner.unit import XML_OUTPUT_FLAG
+    from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG
 
 __all__ = [
     "XML_OUTPUT_FLAG",

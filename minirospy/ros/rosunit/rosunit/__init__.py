@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from minirospy.ros.submodules import on_first_use
 
 if TYPE_CHECKING:
-    from minirospy.ros.rostest.runner.unit import (
+    from minirospy.ros.rosunit.rosunit import baretest as baretest
+    from minirospy.ros.rosunit.rosunit import core as core
+    from minirospy.ros.rosunit.rosunit import junitxml
+    from minirospy.ros.rosunit.rosunit import pyunit as pyunit
+    from minirospy.ros.rosunit.rosunit import xmlrunner as xmlrunner
+    from minirospy.ros.rosunit.runner.unit import (
         XML_OUTPUT_FLAG,
         create_xml_runner,
         print_runner_summary,
@@ -14,11 +19,6 @@ if TYPE_CHECKING:
         unitrun,
         xml_results_file,
     )
-    from minirospy.ros.rosunit.rosunit import baretest as baretest
-    from minirospy.ros.rosunit.rosunit import core as core
-    from minirospy.ros.rosunit.rosunit import junitxml
-    from minirospy.ros.rosunit.rosunit import pyunit as pyunit
-    from minirospy.ros.rosunit.rosunit import xmlrunner as xmlrunner
 
 __all__ = [
     "XML_OUTPUT_FLAG",

@@ -1,5 +1,5 @@
 """The names of rosunit.baretest."""
 
-from minirospy.ros.rostest.runner.unit import print_runner_summary, print_unittest_summary
+from minirospy.ros.rosunit.runner.unit import print_runner_summary, print_unittest_summary
 
 __all__ = ["print_runner_summary", "print_unittest_summary"]

@@ -1,6 +1,6 @@
 """The names of rosunit.core."""
 
-from minirospy.ros.rostest.runner.unit import (
+from minirospy.ros.rosunit.runner.unit import (
     XML_OUTPUT_FLAG,
     XMLTestRunner,
     create_xml_runner,

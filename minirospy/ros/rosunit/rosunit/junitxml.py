@@ -1,6 +1,6 @@
 """rosunit.junitxml: files of test results."""
 
-from minirospy.ros.rostest.runner.junit import (
+from minirospy.ros.rosunit.runner.junit import (
     Result,
     TestCaseResult,
     TestError,
@@ -11,8 +11,8 @@ from minirospy.ros.rostest.runner.junit import (
     read,
     read_all,
 )
-from minirospy.ros.rostest.runner.junit import failure_junit_xml as test_failure_junit_xml
-from minirospy.ros.rostest.runner.junit import success_junit_xml as test_success_junit_xml
+from minirospy.ros.rosunit.runner.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.ros.rosunit.runner.junit import success_junit_xml as test_success_junit_xml
 
 __all__ = [
     "Result",

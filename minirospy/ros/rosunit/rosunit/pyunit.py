@@ -1,6 +1,6 @@
 """The names of rosunit.pyunit."""
 
-from minirospy.ros.rostest.runner.unit import (
+from minirospy.ros.rosunit.runner.unit import (
     XML_OUTPUT_FLAG,
     create_xml_runner,
     print_unittest_summary,

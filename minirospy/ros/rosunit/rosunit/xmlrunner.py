@@ -1,5 +1,5 @@
 """The names of rosunit.xmlrunner."""
 
-from minirospy.ros.rostest.runner.unit import XMLTestRunner
+from minirospy.ros.rosunit.runner.unit import XMLTestRunner
 
 __all__ = ["XMLTestRunner"]

@@ -17,8 +17,8 @@ from minirospy.base.child_lifetime import guard_children
 from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import MinirospyError
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.ros.rostest.runner.junit import Result, TestCaseResult, TestError, TestFailure, read
-from minirospy.ros.rostest.runner.unit import XML_OUTPUT_FLAG
+from minirospy.ros.rosunit.runner.junit import Result, TestCaseResult, TestError, TestFailure, read
+from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG
 
 __all__ = ["POLL_SECONDS", "interrupt_noted", "run_bare"]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
-from minirospy.ros.rostest.runner.junit import (
+from minirospy.ros.rosunit.runner.junit import (
     Result,
     TestCaseResult,
     TestError,
