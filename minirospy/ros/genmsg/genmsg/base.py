@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.ros.genpy.genpy.base import MsgGenerationException
+from minirospy.base.errors import MessageException
 
 __all__ = [
     "COMMENTCHAR",
@@ -29,3 +29,7 @@ IODELIM = "---"
 
 class InvalidMsgSpec(Exception):
     """A definition does not parse."""
+
+
+class MsgGenerationException(MessageException):
+    """No class can be made from a definition."""

@@ -37,8 +37,8 @@ from minirospy.ros.genmsg.genmsg.msgs import (
     resolve_type,
     why_invalid,
 )
+from minirospy.ros.genmsg.genmsg.names import package_resource_name
 from minirospy.ros.genmsg.genmsg.srvs import SrvSpec
-from minirospy.ros.roslib.roslib.names import package_resource_name
 
 __all__ = [
     "COMMENTCHAR",
