@@ -28,7 +28,7 @@ _INTERNAL = {
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
     "bondpy": "machine",
     "camera_calibration_parsers": "convert texts",
-    "dynamic_reconfigure": "dynparam generated header",
+    "dynamic_reconfigure": "dynparam generated",
     "image_geometry": "rectification",
     "kdl_parser_py": "tree",
     "message_filters": "stamps",
