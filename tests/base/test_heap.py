@@ -1,4 +1,4 @@
-"""runtime/master/heap: what a master frees is free for others."""
+"""base/heap: what a master frees is free for others."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from minirospy.runtime.master import master as masters
 
 PROGRAM = """
-from minirospy.runtime.master.heap import return_large_blocks
+from minirospy.base.heap import return_large_blocks
 
 def megabytes():
     with open("/proc/self/statm") as file:
