@@ -105,7 +105,6 @@ PURE_FILES = (
             "parameter_values.py",
             "rules.py",
             "service_links.py",
-            "xxh3.py",
             "zenoh_keys.py",
         )
     }
